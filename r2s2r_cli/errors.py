@@ -1,0 +1,90 @@
+"""One error family. Every message says what, where, expected, received, and one pasteable hint."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """The process exit codes of `docs/reference/exit-codes.md`."""
+
+    DONE = 0
+    BUG = 1
+    USAGE = 2
+    GATE = 3
+    INPUT = 4
+    HARDWARE = 5
+    NUMERICAL = 6
+    INTERRUPTED = 130
+
+
+EXIT_CODE_MEANING: dict[ExitCode, str] = {
+    ExitCode.DONE: "done, or already up to date",
+    ExitCode.BUG: "a bug in r2s2r: unexpected error, traceback on stderr",
+    ExitCode.USAGE: "usage: unknown command, option, key or name, or a request that would lose data",
+    ExitCode.GATE: "gate not met: `validate` found errors, `status --check` found stale artifacts",
+    ExitCode.INPUT: "artifact, project or input missing, unreadable, damaged, or of the wrong kind or version",
+    ExitCode.HARDWARE: "hardware or link failure, emergency stop",
+    ExitCode.NUMERICAL: "numerical failure: not finite, not converged, not identifiable",
+    ExitCode.INTERRUPTED: "interrupted; nothing is half-written, long work can be resumed",
+}
+
+
+class R2S2RError(Exception):
+    """A failure that the user can act on. Never raised for bugs.
+
+    what: one sentence, no full stop. where: file (and HDF5 path, or line and column), or option.
+    expected / received: the two values that disagree, as text. hint: a command that can be pasted.
+    """
+
+    exit_code: ExitCode = ExitCode.BUG
+
+    def __init__(self, what: str, *, hint: str, where: str = "", expected: str = "", received: str = "") -> None:
+        super().__init__(what)
+        self.what = what
+        self.where = where
+        self.expected = expected
+        self.received = received
+        self.hint = hint
+
+    def lines(self) -> list[str]:
+        """The message as it is printed, one fact a line, without the leading `error:`."""
+        facts = [("where", self.where), ("expected", self.expected), ("received", self.received)]
+        return [self.what, *(f"  {name}: {text}" for name, text in facts if text), f"hint: {self.hint}"]
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+
+class UsageError(R2S2RError):
+    """The request itself is wrong, or would overwrite something that cannot be made again."""
+
+    exit_code = ExitCode.USAGE
+
+
+class GateError(R2S2RError):
+    """The command worked, and what it checked did not pass."""
+
+    exit_code = ExitCode.GATE
+
+
+class InputError(R2S2RError):
+    """A file that the user gave (CSV, TOML, JSON, folder) cannot be used as it is."""
+
+    exit_code = ExitCode.INPUT
+
+
+class ArtifactError(InputError):
+    """An artifact or the project is missing, damaged, or of another kind or version."""
+
+
+class HardwareError(R2S2RError):
+    """A port, camera or board failed; the robot has been told to stop where the protocol allows it."""
+
+    exit_code = ExitCode.HARDWARE
+
+
+class NumericalError(R2S2RError):
+    """The numbers went wrong: not finite, not converged, not identifiable."""
+
+    exit_code = ExitCode.NUMERICAL

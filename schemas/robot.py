@@ -1,0 +1,175 @@
+"""The robot description: what `robot.toml` holds. SI; suffixes name the unit where a person types a number.
+
+The engine and the rig both build their model from this file and share nothing else.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from schemas.base import Frozen
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Vector3 = tuple[float, float, float]
+ROBOT_SCHEMA_VERSION = 1
+
+
+class Lump(Frozen):
+    """A part of a rod, counted as a solid of its own around the rod's axis."""
+
+    name: str
+    mass_kg: Positive
+    offset_m: float
+    """Centre along the rod from the middle between the caps; positive towards the odd cap."""
+    shape: Literal["point", "sphere", "cylinder", "tube"]
+    radius_m: NonNegative = 0.0
+    length_m: NonNegative = 0.0
+    inner_radius_m: NonNegative = 0.0
+
+
+class Rod(Frozen):
+    """A rigid rod with two spherical end caps, numbered 2 i (offset -length/2) and 2 i + 1 (+length/2)."""
+
+    name: str
+    length_m: Positive
+    """Cap centre to cap centre."""
+    radius_m: Positive
+    cap_radius_m: Positive
+    parts: tuple[Lump, ...] = Field(min_length=1)
+
+
+class Cable(Frozen):
+    """A cable between two end caps. Index = position in the list."""
+
+    caps: tuple[int, int]
+    kind: Literal["actuated", "passive"]
+    stiffness_n_per_m: Positive
+    damping_n_s_per_m: NonNegative
+    stiffness2_n_per_m2: float = 0.0
+    stiffness3_n_per_m3: float = 0.0
+    """Force [N] = stiffness x + stiffness2 x^2 + stiffness3 x^3, x the stretch beyond the rest length [m]."""
+    rest_length_m: Positive | None = None
+    """Passive cables only: an actuated cable's rest length is set by its winch."""
+    sites_m: tuple[Vector3, Vector3]
+    """Attachment points in the rod frame R of each cap's rod (origin in the middle, z towards the odd cap)."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.caps[0] // 2 == self.caps[1] // 2:
+            raise ValueError(f"a cable must join two rods, caps {self.caps} lie on one")
+        if (self.kind == "passive") != (self.rest_length_m is not None):
+            raise ValueError("rest_length_m belongs to passive cables, and to them only")
+        return self
+
+
+class Motor(Frozen):
+    """The winch of one actuated cable."""
+
+    cable: int = Field(ge=0)
+    no_load_rad_per_s: Positive
+    speed: Annotated[float, Field(gt=0, le=1)]
+    """Fraction of the no-load speed at full command (the paper's motor speed)."""
+    winch_radius_m: Positive
+    board: str = ""
+    sign: Literal[-1, 1] = 1
+    """Sign of the wire command that reels in."""
+
+
+class Sensor(Frozen):
+    """A capacitive stretch sensor: capacitance [F] = slope length + offset."""
+
+    cable: int = Field(ge=0)
+    slope_f_per_m: float | None = None
+    offset_f: float | None = None
+    """None: not calibrated."""
+    stiffness_n_per_m: NonNegative = 0.0
+    """Of the sensor tendon that runs parallel to an actuated cable; 0 where the cable itself is the sensor."""
+
+
+class Pid(Frozen):
+    """The low-level controller: position = (length - min_length) / range, latched `done` within the tolerance."""
+
+    p: NonNegative
+    i: NonNegative
+    d: NonNegative
+    tolerance: Positive
+    min_length_m: Positive
+    range_m: Positive
+    rate_hz: Positive
+    step_timeout_s: Positive
+
+
+class Limits(Frozen):
+    """What a healthy robot never leaves; `validate` and the host's safety checks use it."""
+
+    cable_length_min_m: Positive
+    cable_length_max_m: Positive
+    cap_height_max_m: Positive
+
+
+class Contact(Frozen):
+    """Prior of the ground contact, before identification."""
+
+    friction: NonNegative
+    restitution: Annotated[float, Field(ge=0, le=1)]
+
+
+class HsvRange(Frozen):
+    """Colour range of one rod; hue 0..180 as in 8-bit OpenCV, low > high wraps round red."""
+
+    rod: str
+    hue: tuple[float, float]
+    saturation_min: NonNegative
+    value_min: NonNegative
+
+
+class Robot(Frozen):
+    """A cable-driven robot of rigid rods and cables. Any number of both."""
+
+    schema_version: Literal[1]
+    name: str
+    title: str
+    illustrative: bool = False
+    """True: a made-up robot, not one that was measured."""
+    attachment: Literal["surface", "rod_end"]
+    rods: tuple[Rod, ...] = Field(min_length=1)
+    cables: tuple[Cable, ...] = Field(min_length=1)
+    motors: tuple[Motor, ...]
+    sensors: tuple[Sensor, ...] = ()
+    pid: Pid
+    limits: Limits
+    contact: Contact
+    colors: tuple[HsvRange, ...] = ()
+    rest_caps_m: tuple[Vector3, ...]
+    """End-cap centres in the rest state, all actuated cables extended, on the ground; frame W."""
+
+    @property
+    def n_caps(self) -> int:
+        """Number of end caps, two a rod."""
+        return 2 * len(self.rods)
+
+    @property
+    def actuated(self) -> tuple[int, ...]:
+        """Indices of the actuated cables; targets and commands have this order."""
+        return tuple(i for i, cable in enumerate(self.cables) if cable.kind == "actuated")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for i, cable in enumerate(self.cables):
+            for cap in cable.caps:
+                if not 0 <= cap < self.n_caps:
+                    raise ValueError(f"cables.{i}.caps: end cap {cap} does not exist, there are {self.n_caps}")
+        winched = sorted(motor.cable for motor in self.motors)
+        if winched != list(self.actuated):
+            raise ValueError(f"motors: one per actuated cable {list(self.actuated)}, received cables {winched}")
+        for i, sensor in enumerate(self.sensors):
+            if sensor.cable >= len(self.cables):
+                raise ValueError(f"sensors.{i}.cable: cable {sensor.cable} does not exist")
+        if len(self.rest_caps_m) != self.n_caps:
+            raise ValueError(f"rest_caps_m: one point per end cap ({self.n_caps}), received {len(self.rest_caps_m)}")
+        if self.limits.cable_length_min_m >= self.limits.cable_length_max_m:
+            raise ValueError("limits: cable_length_min_m must be below cable_length_max_m")
+        return self

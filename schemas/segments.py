@@ -1,0 +1,32 @@
+"""Target intervals and segments, as tables inside a run."""
+
+from __future__ import annotations
+
+from schemas.base import GroupSpec
+from schemas.base import column
+
+
+INTERVALS = GroupSpec(
+    path="runs/{run}/intervals",
+    description="target intervals: maximal time spans of one constant target vector; row i is interval i + 1",
+    datasets=(
+        column("first", "int64", ("interval",), "index", "first kept frame (index among kept frames)"),
+        column("last", "int64", ("interval",), "index", "last kept frame"),
+        column("t_first", "float64", ("interval",), "s", "time of the first kept frame"),
+        column("t_last", "float64", ("interval",), "s", "time of the last kept frame"),
+        column("target", "float64", ("interval", "actuated"), "1", "the target vector"),
+    ),
+)
+
+SEGMENTS = GroupSpec(
+    path="runs/{run}/segments",
+    description="segments: intervals cut again where the control of a cable reverses",
+    datasets=(
+        column("interval", "int64", ("segment",), "index", "interval it belongs to, 1-based"),
+        column("first", "int64", ("segment",), "index", "first kept frame (index among kept frames)"),
+        column("last", "int64", ("segment",), "index", "key frame: the last kept frame"),
+        column("t_first", "float64", ("segment",), "s", "time of the first kept frame"),
+        column("t_last", "float64", ("segment",), "s", "time of the key frame"),
+        column("direction", "int32", ("segment", "actuated"), "1", "-1 extends, 0 holds, +1 reels in"),
+    ),
+)

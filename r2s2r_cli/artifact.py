@@ -25,7 +25,16 @@ class Blobs:
     count: int
 
 
-Value = np.ndarray | Blobs
+@dataclass(frozen=True)
+class Rows:
+    """An array too long for memory: its blocks in order along the first axis."""
+
+    blocks: Iterable[np.ndarray]
+    shape: tuple[int, ...]
+    dtype: np.dtype
+
+
+Value = np.ndarray | Blobs | Rows
 
 
 @dataclass(frozen=True)
@@ -36,10 +45,10 @@ class Group:
     attributes: Mapping[str, Scalar] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """The array of dataset `name`; KeyError if absent, TypeError for encoded frames."""
+        """The array of dataset `name`; KeyError if absent, TypeError if it is streamed."""
         value = self.datasets[name]
-        if isinstance(value, Blobs):
-            raise TypeError(f"{name} holds encoded frames, not an array")
+        if not isinstance(value, np.ndarray):
+            raise TypeError(f"{name} is streamed, not an array in memory")
         return value
 
     def __contains__(self, name: str) -> bool:

@@ -1,0 +1,42 @@
+"""Canonical JSON and its digest: the same settings give the same hash, whatever their order or comments."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+_READ = 1 << 20
+
+
+def canonical_json(value: Any) -> str:
+    """JSON with sorted keys and no white space; floats as Python writes them; NaN refused."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+def json_sha256(value: Any) -> str:
+    """Digest of the canonical JSON of `value`."""
+    return hashlib.sha256(canonical_json(value).encode()).hexdigest()
+
+
+def file_sha256(path: Path) -> str:
+    """Digest of the bytes of a file. Raises OSError."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(_READ):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def folder_sha256(path: Path) -> str:
+    """Digest of the relative names and bytes of all files below `path`, in sorted order. Raises OSError."""
+    digest = hashlib.sha256()
+    for file in sorted(p for p in path.rglob("*") if p.is_file()):
+        digest.update(f"{file.relative_to(path).as_posix()}\0{file_sha256(file)}\n".encode())
+    return digest.hexdigest()
+
+
+def source_sha256(path: Path) -> str:
+    """Digest of a source that is not an artifact, file or folder. Raises OSError."""
+    return folder_sha256(path) if path.is_dir() else file_sha256(path)

@@ -1,0 +1,142 @@
+"""The sealed head of an artifact: a JSON header in the HDF5 user block, readable without HDF5.
+
+Layout of the block: one line `r2s2r-artifact 1 <sha256 of the JSON> <its length>`, the JSON, spaces,
+a newline. The HDF5 body follows at the next power of two from 4096 (docs/adr/0003).
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from r2s2r_cli.errors import ArtifactError
+from schemas.header import Header
+
+MAGIC = b"r2s2r-artifact 1 "
+MIN_BLOCK = 4096
+MAX_BLOCK = 1 << 22
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_LINE = len(MAGIC) + 64 + 1 + 10 + 1
+_READ = 1 << 20
+
+
+class NotAnArtifact(ArtifactError):
+    """The file does not begin with an r2s2r header: another program's file, or a damaged head."""
+
+
+def block_size(header: Header) -> int:
+    """Size of the user block for this header: a power of two of at least 4096 bytes."""
+    size = MIN_BLOCK
+    while size < _LINE + len(_encode(header)) + 1:
+        size *= 2
+    return size
+
+
+def write_block(path: Path, header: Header, size: int) -> None:
+    """Write the header into the reserved user block of `size` bytes at the start of `path`."""
+    body = _encode(header)
+    line = MAGIC + hashlib.sha256(body).hexdigest().encode() + b" %010d\n" % len(body)
+    block = (line + body).ljust(size - 1) + b"\n"
+    if len(block) != size:
+        raise ValueError(f"header of {len(body)} bytes does not fit into a block of {size}")
+    with path.open("r+b") as file:
+        file.write(block)
+
+
+def read_header(path: Path) -> Header:
+    """The header of an artifact, checked against its own digest.
+
+    Raises ArtifactError: no such file, not an artifact, or the head is damaged.
+    """
+    header, _ = read_header_and_block(path)
+    return header
+
+
+def read_header_and_block(path: Path) -> tuple[Header, int]:
+    """The header, and the offset in bytes at which the HDF5 body begins."""
+    try:
+        with path.open("rb") as file:
+            line = file.read(_LINE)
+            if not line.startswith(MAGIC):
+                raise not_an_artifact(path, line)
+            digest, length = _parse(path, line)
+            body = file.read(length)
+    except OSError as error:
+        raise unreadable(path, error) from error
+    if hashlib.sha256(body).hexdigest() != digest:
+        raise _damaged(path, "its digest does not match its text")
+    try:
+        header = Header.model_validate_json(body)
+    except ValidationError as error:
+        raise _damaged(path, error.errors()[0]["msg"]) from error
+    return header, block_size(header)
+
+
+def body_sha256(path: Path, offset: int) -> tuple[str, int]:
+    """Digest and length of the bytes of `path` from `offset` on."""
+    digest, length = hashlib.sha256(), 0
+    with path.open("rb") as file:
+        file.seek(offset)
+        while block := file.read(_READ):
+            digest.update(block)
+            length += len(block)
+    return digest.hexdigest(), length
+
+
+def not_an_artifact(path: Path, head: bytes) -> NotAnArtifact:
+    """Name what the file is instead, as far as its first bytes tell."""
+    if not head:
+        received = "an empty file"
+    elif head.startswith(HDF5_SIGNATURE):
+        received = "an HDF5 file of another program"
+    else:
+        received = f"a file that begins {head[:16]!r}"
+    return NotAnArtifact(
+        "this is not an r2s2r artifact, or its head is damaged",
+        where=str(path),
+        expected="a file that begins 'r2s2r-artifact'",
+        received=received,
+        hint=f"r2s2r inspect '{path}'",
+    )
+
+
+def unreadable(path: Path, error: OSError) -> ArtifactError:
+    """Say in words why `path` cannot be read."""
+    if isinstance(error, FileNotFoundError):
+        return ArtifactError(
+            "there is no such file", where=str(path), expected="an artifact", hint=f"ls -la '{path.parent}'"
+        )
+    if isinstance(error, IsADirectoryError):
+        return ArtifactError(
+            "this is a directory, not an artifact", where=str(path), expected="a file", hint=f"ls -la '{path}'"
+        )
+    return ArtifactError(
+        "the file cannot be read", where=str(path), received=error.strerror or str(error), hint=f"ls -la '{path}'"
+    )
+
+
+def _encode(header: Header) -> bytes:
+    return header.model_dump_json().encode()
+
+
+def _parse(path: Path, line: bytes) -> tuple[str, int]:
+    try:
+        digest, length = line[len(MAGIC) :].split()
+        size = int(length)
+    except ValueError as error:
+        raise _damaged(path, f"its first line reads {line!r}") from error
+    if not 0 < size <= MAX_BLOCK:
+        raise _damaged(path, f"it claims a length of {size} bytes")
+    return digest.decode("ascii", "replace"), size
+
+
+def _damaged(path: Path, received: str) -> ArtifactError:
+    return NotAnArtifact(
+        "the head of this artifact is damaged",
+        where=str(path),
+        expected="an intact header",
+        received=received,
+        hint=f"r2s2r recover '{path}'",
+    )

@@ -1,0 +1,193 @@
+"""Write an artifact once: whole, verified and sealed, or not at all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from r2s2r_cli import __version__
+from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Rows, Scalar, Value
+from r2s2r_cli.store.atomic import replacing
+from r2s2r_cli.store.hashing import PROVENANCE, digest_file
+from r2s2r_cli.store.header import block_size, body_sha256, write_block
+from r2s2r_cli.store.layout import BLOB_BYTES, BLOB_OFFSET, check_layout, on_disk
+from schemas.base import ArtifactSpec, DatasetSpec
+from schemas.header import Header, Provenance
+from schemas.versions import KINDS
+
+CREATED_BY = f"r2s2r {__version__}"
+_CHUNK_BYTES = 1 << 18
+_BLOB_BUFFER = 1 << 20
+_ZEROS = "0" * 64
+
+
+def write_artifact(path: Path, data: ArtifactData, provenance: Provenance, *, title: str = "") -> Header:
+    """Write `data` to `path` and return its header.
+
+    Temp file in the same directory, flush, close, reopen and verify, fsync, replace, fsync of the directory.
+    Raises ArtifactError (disk full, no permission) and leaves what was there; ValueError where `data` departs
+    from the schema, which is a bug of the caller.
+    """
+    spec = KINDS[data.kind]
+    title = title or spec.title
+    draft = Header(
+        kind=spec.kind, schema_version=spec.version, title=title, created_by=CREATED_BY, content_sha256=_ZEROS,
+        seal_sha256=_ZEROS, body_sha256=_ZEROS, body_bytes=10**15, provenance=provenance,
+        datasets={name: _ZEROS for name in _dataset_paths(data, spec)},
+    )  # fmt: skip
+    size = block_size(draft)
+    with replacing(path) as temp:
+        _write_body(temp, data, spec, draft, size)
+        header = _seal(temp, spec, draft, size)
+        write_block(temp, header, size)
+    return header
+
+
+def _write_body(temp: Path, data: ArtifactData, spec: ArtifactSpec, header: Header, size: int) -> None:
+    with h5py.File(temp, "w", userblock_size=size, libver="v110") as file:
+        for name, value in (
+            ("kind", header.kind), ("schema_version", header.schema_version), ("title", header.title),
+            ("created_by", header.created_by), ("content_sha256", _ZEROS), ("seal_sha256", _ZEROS),
+        ):  # fmt: skip
+            _set_attribute(file, name, value)
+        for path, group in sorted(data.groups.items()):
+            _write_group(file, path, group, spec)
+        record = file.create_group(PROVENANCE)
+        for name, value in header.provenance.model_dump(mode="json").items():
+            text = json.dumps(value, sort_keys=True, ensure_ascii=False).encode()
+            record.create_dataset(name, data=np.array(text, dtype=f"S{len(text)}"))
+        file.flush()
+
+
+def _write_group(file: h5py.File, path: str, group: Group, spec: ArtifactSpec) -> None:
+    layout = spec.group(path)
+    if layout is None:
+        raise ValueError(f"{spec.kind} has no group {path}")
+    node = file.require_group(path)
+    for name, scalar in sorted(group.attributes.items()):
+        _set_attribute(node, name, scalar)
+    for name, value in sorted(group.datasets.items()):
+        dataset = layout.dataset(name)
+        if dataset is None:
+            raise ValueError(f"{spec.kind} has no dataset {path}/{name}")
+        _write_value(node, dataset, value)
+
+
+def _write_value(node: h5py.Group, spec: DatasetSpec, value: Value) -> None:
+    if isinstance(value, Blobs):
+        (_, data_spec), (_, offset_spec) = on_disk(spec)
+        _write_blobs(node.require_group(spec.path), data_spec, offset_spec, value)
+        return
+    if isinstance(value, Rows):
+        _write_rows(node, spec.path, spec, value)
+        return
+    array = np.asarray(value)
+    dtype = array.dtype if spec.dtype == "str" else np.dtype(spec.dtype)
+    if array.dtype != dtype:
+        raise ValueError(f"{spec.path}: dtype {array.dtype}, the schema says {dtype}")
+    _write_rows(node, spec.path, spec, Rows(iter([array]), array.shape, dtype))
+
+
+def _write_rows(node: h5py.Group, name: str, spec: DatasetSpec, rows: Rows) -> None:
+    target = _create(node, name, rows.shape, rows.dtype, spec)
+    start = 0
+    for block in rows.blocks:
+        if block.ndim == 0:
+            target[()] = block
+            return
+        target[start : start + len(block)] = block
+        start += len(block)
+    if rows.shape and start != rows.shape[0]:
+        raise ValueError(f"{spec.path}: {start} rows came, {rows.shape[0]} were promised")
+
+
+def _write_blobs(node: h5py.Group, data_spec: DatasetSpec, offset_spec: DatasetSpec, blobs: Blobs) -> None:
+    target = _create(node, BLOB_BYTES, (0,), np.dtype(np.uint8), data_spec, growing=True)
+    offsets = [0]
+    for piece in _buffered(blobs, offsets):
+        start = target.shape[0]
+        target.resize(start + len(piece), axis=0)
+        target[start:] = np.frombuffer(piece, dtype=np.uint8)
+    if len(offsets) != blobs.count + 1:
+        raise ValueError(f"{data_spec.path}: {len(offsets) - 1} frames came, {blobs.count} were promised")
+    array = np.array(offsets, dtype=np.uint64)
+    _write_rows(node, BLOB_OFFSET, offset_spec, Rows(iter([array]), array.shape, array.dtype))
+
+
+def _buffered(blobs: Blobs, offsets: list[int]) -> Iterator[bytes]:
+    """Frames joined to pieces of about 1 MB: one HDF5 resize a piece instead of one a frame."""
+    buffer = bytearray()
+    for item in blobs.items:
+        buffer += item
+        offsets.append(offsets[-1] + len(item))
+        if len(buffer) >= _BLOB_BUFFER:
+            yield bytes(buffer)
+            buffer.clear()
+    if buffer:
+        yield bytes(buffer)
+
+
+def _create(
+    node: h5py.Group, name: str, shape: tuple[int, ...], dtype: np.dtype, spec: DatasetSpec, *, growing: bool = False
+) -> h5py.Dataset:
+    options: dict[str, object] = {}
+    if shape and (growing or 0 not in shape):
+        row = max(1, int(np.prod(shape[1:], dtype=np.int64)) * dtype.itemsize)
+        length = max(1, _CHUNK_BYTES // row)
+        chunk = (length if growing else min(shape[0], length), *shape[1:])
+        options = {"chunks": chunk, "fletcher32": True}
+        if not growing:  # encoded images do not compress further
+            options |= {"compression": "gzip", "compression_opts": 4, "shuffle": True}
+        else:
+            options["maxshape"] = (None, *shape[1:])
+    target = node.create_dataset(name, shape=shape, dtype=dtype, **options)
+    _set_attribute(target, "unit", spec.unit)
+    _set_attribute(target, "dims", ",".join(spec.dims))
+    _set_attribute(target, "frame", spec.frame)
+    _set_attribute(target, "description", spec.description)
+    return target
+
+
+def _set_attribute(node: h5py.Group | h5py.Dataset, name: str, value: Scalar) -> None:
+    if isinstance(value, str):
+        encoded = value.encode()  # fixed length: no object types in an artifact
+        node.attrs.create(name, np.array(encoded, dtype=h5py.string_dtype("utf-8", max(1, len(encoded)))))
+    elif isinstance(value, bool):
+        node.attrs.create(name, np.bool_(value))
+    elif isinstance(value, int):
+        node.attrs.create(name, np.int64(value))
+    else:
+        if not np.isfinite(value):
+            raise ValueError(f"attribute {name} is {value}; leave out what is not known")
+        node.attrs.create(name, np.float64(value))
+
+
+def _seal(temp: Path, spec: ArtifactSpec, draft: Header, size: int) -> Header:
+    """Reopen, check the layout, and write the digests of what can be read back."""
+    with h5py.File(temp, "r+") as file:
+        mismatches = check_layout(file, spec)
+        if mismatches:
+            raise ValueError(f"not the layout of {spec.kind}: {mismatches[0]}")
+        digests = digest_file(file)
+        file.attrs.modify("content_sha256", np.array(digests.content.encode(), dtype=h5py.string_dtype("utf-8", 64)))
+        file.attrs.modify("seal_sha256", np.array(digests.seal.encode(), dtype=h5py.string_dtype("utf-8", 64)))
+    body, length = body_sha256(temp, size)
+    return draft.model_copy(
+        update={
+            "content_sha256": digests.content, "seal_sha256": digests.seal, "datasets": digests.datasets,
+            "body_sha256": body, "body_bytes": length,
+        }
+    )  # fmt: skip
+
+
+def _dataset_paths(data: ArtifactData, spec: ArtifactSpec) -> Iterator[str]:
+    for path, group in data.groups.items():
+        layout = spec.group(path)
+        for name in group.datasets:
+            dataset = layout.dataset(name) if layout else None
+            for disk_name, _ in on_disk(dataset) if dataset else ():
+                yield f"{path}/{disk_name}"

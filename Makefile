@@ -1,0 +1,76 @@
+# Two commands do everything on a fresh machine: `make demo` and `make test`. `make help` lists the rest.
+# Needs only: GNU make, and Python 3.11 or 3.12 with its venv module. Never calls sudo.
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+SHELL := bash
+.SHELLFLAGS := -eu -o pipefail -c
+
+# Where this file lies, also when it was named by `make -f some/where/Makefile`. Paths with spaces are fine.
+ROOT := $(shell cd "$$(dirname "$$(printf %s '$(MAKEFILE_LIST)' | sed 's/^ //')")" && pwd -P)
+HERE := $(shell pwd -P)
+
+GOALS := help demo test test-slow lint docs check clean iterate status
+.PHONY: $(GOALS)
+
+ifneq ($(ROOT),$(HERE))
+$(GOALS):
+	@$(MAKE) --no-print-directory -C "$(ROOT)" $@
+else
+
+PYTHON ?= python3
+VENV   := .venv
+PY     := $(VENV)/bin/python
+# Two workers on the two cores; `make test PYTEST_FLAGS=` runs in one process, `PYTEST_FLAGS="-k store"` a part.
+PYTEST_FLAGS ?= -n auto --dist loadfile
+DEMO   ?= demo
+PROJECT ?= .
+ITER   ?= 001
+SOURCE ?=
+
+help:  ## this list
+	@printf 'usage: make TARGET\n\n'
+	@sed -n 's/^\([a-z -]*\):.*##  *\(.*\)/  \1\t\2/p' Makefile | expand -t 14
+
+demo: $(VENV)/.run-stamp  ## make a sample project, import, validate and draw it (in ./demo)
+	@PATH="$(ROOT)/$(VENV)/bin:$$PATH" bash examples/01_first_project/run.sh "$(DEMO)"
+
+test: $(VENV)/.dev-stamp  ## the test suite, without the slow tests
+	@$(PY) -m pytest $(PYTEST_FLAGS)
+
+test-slow: $(VENV)/.dev-stamp  ## the slow tests: kills while writing, damaged files, malformed inputs
+	@$(PY) -m pytest $(PYTEST_FLAGS) -m slow
+
+lint: $(VENV)/.dev-stamp  ## style, types, import layers
+	@echo 'ruff check';        $(PY) -m ruff check .
+	@echo 'ruff format';       $(PY) -m ruff format --check .
+	@echo 'mypy';              $(PY) -m mypy
+	@echo 'import layers';     $(VENV)/bin/lint-imports --no-logo --no-cache
+
+docs: $(VENV)/.run-stamp  ## regenerate docs/reference, schemas/json and schemas/LAYOUT.md
+	@$(PY) -m schemas.generate
+	@$(PY) -m r2s2r_cli.docs
+
+check: lint test  ## lint and test: what to run before a commit
+
+iterate status: $(VENV)/.run-stamp  ## the loop of a project: make iterate PROJECT=dir ITER=001 [SOURCE=log.csv]
+	@$(MAKE) --no-print-directory -C "$(PROJECT)" -f "$(ROOT)/r2s2r_cli/templates/project.mk" $@ \
+	  R2S2R="$(ROOT)/$(VENV)/bin/r2s2r" ITER="$(ITER)" SOURCE="$(SOURCE)"
+
+clean:  ## remove what this Makefile made: .venv, ./demo, caches
+	rm -rf "$(VENV)" demo build dist r2s2r.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	find r2s2r_cli schemas tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# The virtual environment. A stamp is older than pyproject.toml: the dependencies are brought up to date.
+# `--editable`: a change of the source needs no new installation.
+$(VENV)/.run-stamp: pyproject.toml .ci/system-libs .ci/venv
+	@bash .ci/system-libs
+	@bash .ci/venv "$(PYTHON)" "$(VENV)" '.'
+	@touch $@
+
+$(VENV)/.dev-stamp: pyproject.toml .ci/system-libs .ci/venv
+	@bash .ci/system-libs
+	@bash .ci/venv "$(PYTHON)" "$(VENV)" '.[dev]'
+	@touch $@ $(VENV)/.run-stamp
+
+endif

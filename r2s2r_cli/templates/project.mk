@@ -1,0 +1,49 @@
+# The loop of this project: one rule a stage, with the artifact as target. `make help` says how to use it.
+# Make only orders the stages. Whether anything is computed is decided by each command from content hashes (of its
+# inputs, settings and stage version): where the artifact is fresh it says so and touches the file, so that make rests.
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help iterate status check
+
+R2S2R  ?= r2s2r
+ITER   ?= 001
+SOURCE ?=
+
+I   := iterations/$(ITER)
+RUN := "$(R2S2R)" --iteration $(ITER)
+
+# The artifacts of one iteration, in order. A new stage is one name here and one rule below.
+RECORD   := $(I)/10-record.h5
+ESTIMATE := $(I)/20-estimate.h5
+ARTIFACTS := $(RECORD) $(ESTIMATE)
+
+# Raw runs cannot be made again: make must never delete them, whatever fails.
+.PRECIOUS: $(RECORD)
+
+help:
+	@echo 'make iterate ITER=001 SOURCE="a.csv b.csv"   bring the iteration up to date (SOURCE: logs to import, the first time)'
+	@echo 'make status                                  what is fresh, what is stale and why'
+	@echo 'make check                                   exit code 3 where something is stale or does not validate'
+
+iterate: $(ARTIFACTS)
+
+ifneq ($(strip $(SOURCE)),)
+$(RECORD): $(SOURCE) robot.toml project.toml
+	$(RUN) import $(SOURCE)
+else
+$(RECORD):
+	@echo 'error: $@ is not there, and there is no log to import' >&2
+	@echo 'hint: make iterate ITER=$(ITER) SOURCE="a.csv b.csv"' >&2
+	@exit 2
+endif
+
+$(ESTIMATE): $(RECORD) robot.toml project.toml
+	$(RUN) estimate
+
+status:
+	@"$(R2S2R)" status
+
+check:
+	@"$(R2S2R)" status --check
+	@"$(R2S2R)" validate

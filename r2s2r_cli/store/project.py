@@ -1,0 +1,148 @@
+"""The project directory: where things are, and how the settings of a stage come together."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from r2s2r_cli.errors import ArtifactError, InputError, UsageError
+from r2s2r_cli.store.toml import check_model, load_model, read_toml
+from schemas.config import ProjectFile, RunConfig
+from schemas.robot import Robot
+from schemas.versions import KINDS
+
+PROJECT_FILE = "project.toml"
+CONFIG_FILE = "config.toml"
+ITERATIONS = "iterations"
+JOURNAL_SUFFIX = ".journal"
+_HEAD_KEYS = ("schema_version", "name", "robot")
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One pass of the loop: a directory `iterations/NNN`."""
+
+    number: int
+    path: Path
+
+    def artifact(self, kind: str) -> Path:
+        """Where this iteration keeps its artifact of `kind`, written or not."""
+        return self.path / KINDS[kind].filename
+
+
+@dataclass(frozen=True)
+class Project:
+    """A project directory with its files."""
+
+    root: Path
+    file: ProjectFile
+
+    @classmethod
+    def find(cls, start: Path | None = None) -> Project:
+        """The project of `start` (default: the working directory) or of its nearest parent.
+
+        Raises ArtifactError where there is none; InputError where project.toml is wrong.
+        """
+        explicit = start is not None
+        origin = (start or Path.cwd()).absolute()
+        candidates = [origin] if explicit else [origin, *origin.parents]
+        for root in candidates:
+            if (root / PROJECT_FILE).is_file():
+                return cls(root, load_model(root / PROJECT_FILE, ProjectFile))
+        raise ArtifactError(
+            "there is no project here",
+            where=str(origin),
+            expected=f"a directory with {PROJECT_FILE}" + ("" if explicit else ", here or above"),
+            received="none",
+            hint="r2s2r init myrobot && cd myrobot",
+        )
+
+    @property
+    def robot_path(self) -> Path:
+        """The robot description."""
+        return self.root / self.file.robot
+
+    def robot(self) -> Robot:
+        """The robot description, checked. Raises InputError."""
+        return load_model(self.robot_path, Robot)
+
+    def iterations(self) -> list[Iteration]:
+        """All iterations, in order."""
+        folder = self.root / ITERATIONS
+        found = [p for p in folder.iterdir() if re.fullmatch(r"\d{3,}", p.name) and p.is_dir()] if folder.is_dir() else []
+        return [Iteration(int(p.name), p) for p in sorted(found, key=lambda p: int(p.name))]
+
+    def iteration(self, number: int | None, *, create: bool = False) -> Iteration:
+        """Iteration `number`, default the latest (with `create`: the first, where there is none).
+
+        Raises UsageError where it does not exist and is not to be created.
+        """
+        existing = self.iterations()
+        if number is None:
+            if existing:
+                return existing[-1]
+            number = 1
+        if number < 1:
+            raise UsageError("an iteration number is too small", where="--iteration", expected="1 or more",
+                             received=str(number), hint="r2s2r status")  # fmt: skip
+        path = self.root / ITERATIONS / f"{number:03d}"
+        if create or path.is_dir():
+            return Iteration(number, path)
+        known = ", ".join(str(i.number) for i in existing) or "none yet"
+        raise UsageError(f"iteration {number} does not exist", where="--iteration", expected=f"one of: {known}",
+                         received=str(number), hint="r2s2r status")  # fmt: skip
+
+    def artifact(self, kind: str, iteration: Iteration | None) -> Path:
+        """Where the artifact of `kind` lies: in the project, or in the iteration."""
+        if KINDS[kind].level == "project":
+            return self.root / KINDS[kind].filename
+        if iteration is None:
+            raise ValueError(f"{kind} belongs to an iteration")
+        return iteration.artifact(kind)
+
+    def relative(self, path: Path) -> str:
+        """`path` relative to the project, with forward slashes; above it with `../`."""
+        return Path(os.path.relpath(path.resolve(), self.root.resolve())).as_posix()
+
+    def config(self, iteration: Iteration | None, overrides: dict[str, Any]) -> RunConfig:
+        """The effective settings: project.toml < the iteration's config.toml < `overrides` (dotted keys).
+
+        Raises InputError for a wrong file, UsageError for a wrong override.
+        """
+        values = {k: v for k, v in self.file.model_dump(by_alias=True).items() if k not in _HEAD_KEYS}
+        local = iteration.path / CONFIG_FILE if iteration else None
+        if local is not None and local.is_file():
+            own = read_toml(local)
+            check_model(own, RunConfig, str(local))
+            values = _merge(values, own)
+        for key, value in overrides.items():
+            values = _merge(values, _nest(key, value))
+        try:
+            return check_model(values, RunConfig, "--set" if overrides else str(self.root / PROJECT_FILE))
+        except InputError as error:
+            if not overrides:
+                raise
+            raise UsageError(error.what, where=error.where, expected=error.expected, received=error.received,
+                             hint=error.hint) from error  # fmt: skip
+
+    def journals(self) -> list[Path]:
+        """Recordings that were not sealed."""
+        return sorted((self.root / ITERATIONS).glob(f"*/*{JOURNAL_SUFFIX}"))
+
+
+def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
+    result = dict(base)
+    for key, value in over.items():
+        known = result.get(key)
+        result[key] = _merge(known, value) if isinstance(known, dict) and isinstance(value, dict) else value
+    return result
+
+
+def _nest(key: str, value: Any) -> dict[str, Any]:
+    for part in reversed(key.split(".")):
+        value = {part: value}
+    return value  # type: ignore[no-any-return]
+

@@ -1,0 +1,136 @@
+"""Read artifacts: checked against their seal, migrated to the current version, as plain values."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Value
+from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.store.hashing import PROVENANCE, attributes, walk
+from r2s2r_cli.store.hdf5_errors import translate
+from r2s2r_cli.store.header import body_sha256, read_header_and_block
+from r2s2r_cli.store.isolated import IsolatedReader
+from r2s2r_cli.store.layout import BLOB_BYTES, BLOB_OFFSET
+from schemas.header import Header
+from schemas.versions import KINDS, NoMigration, chain
+
+
+class DamageWarning(UserWarning):
+    """Bytes of a file changed, but nothing that can be read."""
+
+
+def read_artifact(path: Path, kind: str | None = None, *, blobs: bool = False) -> tuple[Header, ArtifactData]:
+    """Header and values of an artifact, in the layout of the current version.
+
+    Encoded frames are left out, or with `blobs=True` read from the file one by one when they are asked for.
+
+    Raises ArtifactError: missing, not an artifact, damaged, of another kind, or of a newer version.
+    """
+    header = checked_header(path, kind)
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            groups = _load(file, path, blobs=blobs)
+    except (OSError, RuntimeError, ValueError, KeyError) as error:
+        raise translate(error, path) from error
+    for _, step in chain(header.kind, header.schema_version):
+        groups = dict(step(groups))
+    return header, ArtifactData(header.kind, groups)
+
+
+def iter_blobs(path: Path, group: str, name: str) -> Iterator[bytes]:
+    """The encoded frames of a dataset, one at a time. The file must have been checked before."""
+    with h5py.File(path, "r", locking=False) as file:
+        node = file[f"{group}/{name}"]
+        offsets = node[BLOB_OFFSET][()]
+        for start, stop in zip(offsets[:-1], offsets[1:], strict=True):
+            yield node[BLOB_BYTES][int(start) : int(stop)].tobytes()
+
+
+def checked_header(path: Path, kind: str | None = None) -> Header:
+    """The header, once it is certain that the file is what its writer sealed.
+
+    Raises ArtifactError otherwise. Warns DamageWarning where bytes changed that nothing reads.
+    """
+    header, offset = read_header_and_block(path)
+    _check_kind(path, header, kind)
+    _check_version(path, header)
+    check_body(path, header, offset)
+    return header
+
+
+def check_body(path: Path, header: Header, offset: int) -> None:
+    """Compare the bytes of the body with the seal, before any HDF5 code sees them.
+
+    Raises ArtifactError with the damaged dataset; warns DamageWarning where only unread bytes changed.
+    """
+    digest, length = body_sha256(path, offset)
+    if digest == header.body_sha256:
+        return
+    if length < header.body_bytes:
+        raise ArtifactError(
+            "the file was cut off",
+            where=str(path),
+            expected=f"{header.body_bytes} bytes of data",
+            received=f"{length} bytes",
+            hint=f"r2s2r recover '{path}'",
+        )
+    with IsolatedReader() as reader:
+        report = reader.verify(path)
+    if report["content_ok"] and report["seal_ok"]:
+        warnings.warn(f"{path}: bytes changed that nothing reads; the content hash still holds", DamageWarning, 2)
+        return
+    first = report["problems"][0]
+    raise ArtifactError(
+        first["what"],
+        where=f"{path}:/{first['where'].lstrip('/')}",
+        expected=first["expected"],
+        received=first["received"],
+        hint=f"r2s2r recover '{path}'",
+    )
+
+
+def _check_kind(path: Path, header: Header, kind: str | None) -> None:
+    if header.kind not in KINDS or (kind is not None and header.kind != kind):
+        raise ArtifactError(
+            "this artifact is of another kind",
+            where=str(path),
+            expected=kind or " | ".join(KINDS),
+            received=header.kind,
+            hint=f"r2s2r inspect '{path}'",
+        )
+
+
+def _check_version(path: Path, header: Header) -> None:
+    try:
+        chain(header.kind, header.schema_version)
+    except NoMigration as error:
+        raise ArtifactError(
+            "this version of the artifact cannot be read",
+            where=str(path),
+            expected=f"version {KINDS[header.kind].version} of kind {header.kind}, or one that migrates to it",
+            received=str(error),
+            hint="pip install --upgrade r2s2r",
+        ) from error
+
+
+def _load(file: h5py.File, path: Path, *, blobs: bool) -> dict[str, Group]:
+    """All groups as they are, whatever the version: migrations run on this."""
+    groups: dict[str, Group] = {}
+    for name, node in sorted(walk(file)):
+        if not isinstance(node, h5py.Group) or name == PROVENANCE or set(node) == {BLOB_BYTES, BLOB_OFFSET}:
+            continue
+        datasets: dict[str, Value] = {}
+        for child, leaf in node.items():
+            if isinstance(leaf, h5py.Dataset):
+                datasets[child] = np.asarray(leaf[()])
+            elif blobs and set(leaf) == {BLOB_BYTES, BLOB_OFFSET}:
+                datasets[child] = Blobs(iter_blobs(path, name, child), len(leaf[BLOB_OFFSET]) - 1)
+        found = attributes(node)
+        if datasets or found or not len(node):
+            groups[name] = Group(datasets, found)
+    return groups

@@ -1,0 +1,97 @@
+"""Is an artifact still what its inputs, settings and stage version would give? If not, why not, in words.
+
+Decided by content hashes and values, never by file times or source text. Reads headers only, no HDF5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from r2s2r_cli.errors import R2S2RError
+from r2s2r_cli.store.canonical import source_sha256
+from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.project import Project
+from schemas.header import Header, InputRef
+from schemas.versions import KINDS
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a stage would use if it ran now."""
+
+    stage_version: int
+    settings: Mapping[str, Any]
+    robot: Mapping[str, Any]
+
+
+def reasons(project: Project, header: Header, wanted: Wanted) -> list[str]:
+    """Why the artifact with this header is stale, one sentence a cause; empty: it is fresh."""
+    made = header.provenance
+    found: list[str] = []
+    if made.stage_version != wanted.stage_version:
+        found.append(f"stage {made.stage} changed: made by version {made.stage_version}, now {wanted.stage_version}")
+    found += [f"setting {made.stage}.{text}" for text in differences(made.settings, wanted.settings)]
+    found += [f"robot.toml: {text}" for text in differences(made.robot, wanted.robot)]
+    for ref in made.inputs:
+        found += input_reasons(project, ref)
+    return found
+
+
+def input_reasons(project: Project, ref: InputRef) -> list[str]:
+    """Why one recorded input no longer matches. A source outside the project may be gone: that is not stale."""
+    path = project.root / ref.path
+    if ref.kind in KINDS:
+        try:
+            now = read_header(path).content_sha256
+        except R2S2RError as error:
+            return [f"input {ref.path}: {error.what}"]
+        return [] if now == ref.sha256 else [f"input {ref.path} changed: its content hash is another"]
+    try:
+        changed = path.exists() and source_sha256(path) != ref.sha256
+    except OSError as error:
+        return [f"input {ref.path} cannot be read: {error.strerror}"]
+    return [f"input {ref.path} changed: its bytes are others"] if changed else []
+
+
+def differences(old: Mapping[str, Any], new: Mapping[str, Any], prefix: str = "") -> list[str]:
+    """`key was a, is b` for every value that differs between two nested mappings."""
+    found: list[str] = []
+    for key in sorted({**old, **new}):
+        name = f"{prefix}{key}"
+        before, after = _plain(old.get(key)), _plain(new.get(key))
+        if isinstance(before, Mapping) and isinstance(after, Mapping):
+            found += differences(before, after, f"{name}.")
+        elif before != after:
+            found.append(f"{name} was {_text(before)}, is {_text(after)}")
+    return found
+
+
+def artifact_ref(project: Project, path: Path, header: Header) -> InputRef:
+    """The reference to an artifact that serves as an input."""
+    return InputRef(
+        path=project.relative(path), kind=header.kind, schema_version=header.schema_version, sha256=header.content_sha256
+    )
+
+
+def source_ref(project: Project, path: Path) -> InputRef:
+    """The reference to a file or folder from outside. Raises OSError."""
+    kind = "folder" if path.is_dir() else "file"
+    return InputRef(path=project.relative(path), kind=kind, sha256=source_sha256(path))
+
+
+def _plain(value: Any) -> Any:
+    """Lists as mappings by index, so that a difference names the one entry."""
+    if isinstance(value, list | tuple):
+        return {str(i): item for i, item in enumerate(value)}
+    return value
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return "absent"
+    if isinstance(value, Mapping):
+        return f"a table of {len(value)}"
+    return repr(value)

@@ -1,0 +1,110 @@
+"""TOML files that people write: read, checked against their model, errors in words with near matches."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from r2s2r_cli.errors import InputError
+
+Model = TypeVar("Model", bound=BaseModel)
+MAX_BYTES = 4 << 20
+"""A TOML file larger than this was not written by hand."""
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The parsed file. Raises InputError: missing, not text, not TOML (with line and column)."""
+    return parse_toml(read_text(path), str(path))
+
+
+def read_text(path: Path) -> str:
+    """A small UTF-8 text file. Raises InputError."""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError("the file is too large for a TOML file", where=str(path), expected="at most 4 MB",
+                             received=f"{path.stat().st_size} bytes", hint=f"ls -la '{path}'")  # fmt: skip
+        return path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError("the file is not UTF-8 text", where=f"{path}, byte {error.start}", expected="UTF-8 text",
+                         received=repr(error.object[error.start : error.start + 1]),
+                         hint=f"file '{path}'") from error  # fmt: skip
+    except OSError as error:
+        raise InputError("the file cannot be read", where=str(path), received=error.strerror or str(error),
+                         hint=f"ls -la '{path.parent}'") from error  # fmt: skip
+
+
+def parse_toml(text: str, where: str) -> dict[str, Any]:
+    """Parse TOML text. Raises InputError with the position."""
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        raise InputError("the file is not valid TOML", where=where, expected="TOML", received=str(error)[:200],
+                         hint=f"look at the place named in {where}: values are text in quotes, numbers, true, false "
+                         "or [lists]") from error  # fmt: skip
+
+
+def load_model(path: Path, model: type[Model]) -> Model:
+    """Read and check a TOML file. Raises InputError naming the first wrong key, with the nearest right one."""
+    return check_model(read_toml(path), model, str(path))
+
+
+def check_model(values: dict[str, Any], model: type[Model], where: str) -> Model:
+    """Check parsed values against their model. Raises InputError as `load_model` does."""
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        raise first_problem(error, model, where) from error
+
+
+def first_problem(error: ValidationError, model: type[BaseModel], where: str) -> InputError:
+    """The first problem that pydantic found, in our form."""
+    problem = error.errors()[0]
+    key = ".".join(str(part) for part in problem["loc"])
+    if problem["type"] == "extra_forbidden":
+        return _unknown_key(problem["loc"], key, model, where)
+    if problem["type"] == "missing":
+        return InputError("a key is missing", where=where, expected=f"a value for {key}", received="nothing",
+                          hint=f"add '{key.rpartition('.')[2]} = ...' to {where}")  # fmt: skip
+    received = "" if isinstance(problem["input"], dict | list) else repr(problem["input"])[:80]
+    return InputError(
+        f"the value of {key} is not allowed" if key else "the values do not fit together",
+        where=f"{where}, key {key}" if key else where,
+        expected=problem["msg"].removeprefix("Value error, "),
+        received=received,
+        hint=f"correct {key or 'the named keys'} in {where}",
+    )
+
+
+def _unknown_key(loc: tuple[int | str, ...], key: str, model: type[BaseModel], where: str) -> InputError:
+    known = _keys_at(model, loc[:-1])
+    near = difflib.get_close_matches(str(loc[-1]), known, n=1, cutoff=0.5)
+    hint = f"rename it to '{near[0]}' in {where}" if near else f"remove it from {where}; known keys: {', '.join(known)}"
+    return InputError(f"unknown key {key}", where=where, expected=near[0] if near else " | ".join(known),
+                      received=str(loc[-1]), hint=hint)  # fmt: skip
+
+
+def _keys_at(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
+    """The keys that the (possibly nested) model at `loc` knows."""
+    current: Any = model
+    for part in loc:
+        if isinstance(part, int):
+            continue
+        fields = {field.alias or name: field for name, field in current.model_fields.items()}
+        current = _model_in(fields[part].annotation)
+        if current is None:
+            return []
+    return [field.alias or name for name, field in current.model_fields.items()]
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        found = _model_in(argument)
+        if found is not None:
+            return found
+    return None

@@ -11,7 +11,7 @@ DROP_REASONS = {
     0: "kept",
     1: "duplicate: less than 20 ms after the last kept frame",
     2: "time runs backwards",
-    3: "not finite",
+    3: "not observed: a coordinate or the stamp is not finite",
 }
 
 
@@ -23,7 +23,7 @@ RUN = GroupSpec(
         AttributeSpec(name="origin", type="str", description="where the data came from",
                       choices=("robot", "rig", "trajectory_csv", "authors_folder", "tum_rgbd")),
         AttributeSpec(name="nature", type="str", description="what kind of truth this is",
-                      choices=("measured", "simulated", "kinematic sample")),
+                      choices=("measured", "simulated", "kinematic sample", "not stated")),
         AttributeSpec(name="source", type="str", description="in words: robot, date, gait, who published it"),
         AttributeSpec(name="robot", type="str", description="name of the robot description"),
         AttributeSpec(name="start_unix", type="float", unit="unix s", required=False,
@@ -34,6 +34,11 @@ RUN = GroupSpec(
                       description="controller: length between position 0 and 1"),
         AttributeSpec(name="pid_tolerance", type="float", required=False,
                       description="controller: position error at which a cable is done"),
+        AttributeSpec(name="pid_p", type="float", required=False, description="controller: proportional gain"),
+        AttributeSpec(name="pid_i", type="float", required=False, description="controller: integral gain"),
+        AttributeSpec(name="pid_d", type="float", required=False, description="controller: derivative gain"),
+        AttributeSpec(name="frame_stated", type="str", required=False,
+                      description="coordinate frame, in the words of the source"),
         AttributeSpec(name="motor_speed", type="float", required=False,
                       description="fraction of the no-load speed"),
         AttributeSpec(name="winch_radius", type="float", unit="m", required=False,
@@ -62,6 +67,8 @@ CAPS = GroupSpec(
                       description="cap radius minus mean height of the lowest cap: what to add to z"),
         AttributeSpec(name="stamp_jitter", type="float", unit="s", required=False,
                       description="standard deviation of the gaps between kept frames"),
+        AttributeSpec(name="noise_sd_stated", type="float", unit="m", required=False,
+                      description="noise per axis, as the source states it"),
     ),
 )  # fmt: skip
 
@@ -87,6 +94,7 @@ SENSORS = GroupSpec(
           nan_means="not received"),
         column("length", "float64", ("t_sensor", "sensor"), "m", "length as the source's own calibration gave it",
           required=False, nan_means="not received"),
+        column("cable", "int64", ("sensor",), "index", "cable that each sensor measures", required=False),
     ),
 )  # fmt: skip
 
@@ -136,6 +144,8 @@ CAMERA = GroupSpec(
     datasets=(
         column("t", "float64", ("t_color",), "s", "time of the colour frame", required=False),
         column("color", "blobs", ("t_color",), "byte", "encoded colour images (PNG or JPEG)", required=False),
+        column("source_frame", "int64", ("t_color",), "index", "number of the colour frame in the source",
+          required=False),
         column("t_depth", "float64", ("t_depth",), "s", "time of the depth frame", required=False),
         column("depth", "blobs", ("t_depth",), "byte", "encoded 16-bit depth images (PNG)", required=False),
         column("pair", "int64", ("t_color",), "index", "depth frame that belongs to each colour frame, -1 none",

@@ -1,10 +1,12 @@
-"""Target intervals and segments, as tables inside a run."""
+"""Target intervals and segments, as tables inside a run.
+
+Frames are counted among the kept frames of `caps`; in a run without caps, among the kept frames of `commands`.
+"""
 
 from __future__ import annotations
 
 from schemas.base import GroupSpec
 from schemas.base import column
-
 
 INTERVALS = GroupSpec(
     path="runs/{run}/intervals",
@@ -15,8 +17,10 @@ INTERVALS = GroupSpec(
         column("t_first", "float64", ("interval",), "s", "time of the first kept frame"),
         column("t_last", "float64", ("interval",), "s", "time of the last kept frame"),
         column("target", "float64", ("interval", "actuated"), "1", "the target vector"),
+        column("complete", "bool", ("interval",), "bool",
+               "another row follows it, or it has moved to its end: it may be trained on and judged"),
     ),
-)
+)  # fmt: skip
 
 SEGMENTS = GroupSpec(
     path="runs/{run}/segments",
@@ -27,6 +31,8 @@ SEGMENTS = GroupSpec(
         column("last", "int64", ("segment",), "index", "key frame: the last kept frame"),
         column("t_first", "float64", ("segment",), "s", "time of the first kept frame"),
         column("t_last", "float64", ("segment",), "s", "time of the key frame"),
-        column("direction", "int32", ("segment", "actuated"), "1", "-1 extends, 0 holds, +1 reels in"),
+        column("direction", "int32", ("segment", "actuated"), "1",
+               "-1 extends, 0 holds, +1 reels in; absent where the control was not logged", required=False),
+        column("complete", "bool", ("segment",), "bool", "as in intervals"),
     ),
-)
+)  # fmt: skip

@@ -10,8 +10,7 @@ R2S2R  ?= r2s2r
 ITER   ?= 001
 SOURCE ?=
 
-I   := iterations/$(ITER)
-RUN := "$(R2S2R)" --iteration $(ITER)
+I := iterations/$(ITER)
 
 # The artifacts of one iteration, in order. A new stage is one name here and one rule below.
 RECORD   := $(I)/10-record.h5
@@ -30,7 +29,7 @@ iterate: $(ARTIFACTS)
 
 ifneq ($(strip $(SOURCE)),)
 $(RECORD): $(SOURCE) robot.toml project.toml
-	$(RUN) import $(SOURCE)
+	"$(R2S2R)" import --iteration $(ITER) $(SOURCE)
 else
 $(RECORD):
 	@echo 'error: $@ is not there, and there is no log to import' >&2
@@ -39,7 +38,7 @@ $(RECORD):
 endif
 
 $(ESTIMATE): $(RECORD) robot.toml project.toml
-	$(RUN) estimate
+	"$(R2S2R)" estimate --iteration $(ITER)
 
 status:
 	@"$(R2S2R)" status

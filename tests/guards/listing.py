@@ -36,12 +36,16 @@ def name(path: Path) -> str:
 
 @functools.cache
 def commands() -> dict[str, Any]:
-    """Registered subcommands by name, as the command line sees them."""
+    """Registered commands as the command line sees them, by name; those of a group as `group command`."""
     import typer.main
 
     from r2s2r_cli.app import app
 
-    return dict(typer.main.get_group(app).commands)
+    found: dict[str, Any] = {}
+    for top, command in typer.main.get_group(app).commands.items():
+        below = getattr(command, "commands", None)
+        found |= {top: command} if below is None else {f"{top} {sub}": inner for sub, inner in below.items()}
+    return found
 
 
 def shell_lines(markdown: str) -> list[str]:

@@ -9,10 +9,9 @@ import pytest
 from tests.guards.listing import ROOT, name, project_files
 
 # Put together from parts, so that this file does not contain what it forbids.
-HOSTS = [".".join(parts) for parts in (("pypi", "org"), ("pythonhosted", "org"), ("npmjs", "org"), ("npmjs", "com"),
-                                       ("debian", "org"), ("download", "pytorch", "org"))]  # fmt: skip
+HOSTS = [f"{host}.org" for host in ("pypi", "pythonhosted", "npmjs", "debian", "pytorch")]
 FOLDERS = [
-    "/".join(["", *parts]) for parts in (("work", "main"), ("work", "shared"), ("opt", "wheels"), ("opt", "pypi"))
+    f"/{top}/{below}" for top, below in (("work", "main"), ("work", "shared"), ("opt", "wheels"), ("opt", "pypi"))
 ]
 
 

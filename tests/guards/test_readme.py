@@ -26,12 +26,10 @@ def test_readme_names_only_commands_that_exist() -> None:
     lines = [shlex.split(line) for line in shell_lines(TEXT) if line.startswith("r2s2r ")]
     assert lines, "the README shows no r2s2r command"
     for words in lines:
-        command = next(word for word in words[1:] if not word.startswith("-"))
-        assert command in commands(), words
-        known = {
-            option for parameter in commands()[command].params for option in parameter.opts + parameter.secondary_opts
-        }
-        used = {word.partition("=")[0] for word in words[words.index(command) + 1 :] if word.startswith("--")}
+        command = next((name for name in (" ".join(words[1:3]), words[1]) if name in commands()), None)
+        assert command is not None, words
+        known = {text for parameter in commands()[command].params for text in parameter.opts}
+        used = {word.partition("=")[0] for word in words if word.startswith("--")}
         assert used <= known | {"--help"}, words
 
 

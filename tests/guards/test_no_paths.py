@@ -10,9 +10,7 @@ from tests.guards.listing import ROOT, name, project_files
 
 # Put together from parts, so that this file does not contain what it forbids.
 HOSTS = [f"{host}.org" for host in ("pypi", "pythonhosted", "npmjs", "debian", "pytorch")]
-FOLDERS = [
-    f"/{top}/{below}" for top, below in (("work", "main"), ("work", "shared"), ("opt", "wheels"), ("opt", "pypi"))
-]
+FOLDERS = [f"/{folder}" for folder in ("work/main", "work/shared", "opt/wheels", "opt/pypi")]
 
 
 def forbidden() -> list[str]:

@@ -15,9 +15,7 @@ from schemas.policy import POLICY
 from schemas.recording import RECORDING
 from schemas.simulation import SIMULATION
 
-KINDS: dict[str, ArtifactSpec] = {
-    spec.kind: spec for spec in (CALIBRATION, RECORDING, ESTIMATE, POLICY, SIMULATION)
-}
+KINDS: dict[str, ArtifactSpec] = {spec.kind: spec for spec in (CALIBRATION, RECORDING, ESTIMATE, POLICY, SIMULATION)}
 """The artifact kinds by name, in the order of the data."""
 
 Groups = Mapping[str, Any]
@@ -53,3 +51,7 @@ def chain(
             raise NoMigration(f"no step from version {start} to {start + 1} of kind {kind}")
         steps.append((start, step))
     return steps
+
+
+STAGE_VERSIONS: dict[str, int] = {"import": 1, "calibrate": 1, "estimate": 1}
+"""Raised by hand when a stage computes something else from the same input; `status` then calls its results stale."""

@@ -10,9 +10,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.store.worker import READY
 
-BASE_LIMIT_S = 20.0
-"""Covers the start of the child on a loaded machine."""
+START_LIMIT_S = 60.0
+"""Covers the imports of the child on a loaded machine."""
+BASE_LIMIT_S = 10.0
+"""For any file, however small, on a loaded machine."""
 BYTES_PER_S = 20e6
 """Slowest reading that is still waited for."""
 
@@ -51,20 +54,16 @@ class IsolatedReader:
     def _ask(self, call: Literal["verify", "tree"], path: Path) -> dict[str, Any]:
         limit = BASE_LIMIT_S + path.stat().st_size / BYTES_PER_S
         child = self._running()
-        assert child.stdin is not None and child.stdout is not None  # noqa: S101 - both are pipes
         try:
-            child.stdin.write(json.dumps({"call": call, "path": str(path)}) + "\n")
-            child.stdin.flush()
-            with selectors.DefaultSelector() as selector:
-                selector.register(child.stdout, selectors.EVENT_READ)
-                ready = selector.select(limit)
-            line = child.stdout.readline() if ready else ""
+            print(json.dumps({"call": call, "path": str(path)}), file=child.stdin, flush=True)
+            answer = _line(child, limit)
         except BrokenPipeError:
-            ready, line = True, ""
-        if line:
-            return json.loads(line)  # type: ignore[no-any-return]
+            answer = ""
+        if answer:
+            return json.loads(answer)  # type: ignore[no-any-return]
         self.close()
-        what = "crashed the HDF5 library" if ready else f"kept the HDF5 library busy for over {limit:.0f} s"
+        slow = answer is None
+        what = f"kept the HDF5 library busy for over {limit:.0f} s" if slow else "crashed the HDF5 library"
         raise ArtifactError(
             f"the file {what}: its structure is damaged",
             where=str(path),
@@ -80,4 +79,18 @@ class IsolatedReader:
                 [sys.executable, "-m", "r2s2r_cli.store.worker"],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
             )  # fmt: skip
+            if _line(self._child, START_LIMIT_S) != f"{READY}\n":
+                self.close()
+                raise RuntimeError(
+                    "the reader process did not start: run 'python -m r2s2r_cli.store.worker' to see why"
+                )
         return self._child
+
+
+def _line(child: subprocess.Popen[str], limit_s: float) -> str | None:
+    """The child's next line; empty if it died, None if it kept silent for `limit_s`."""
+    if child.stdout is None:
+        raise RuntimeError("the reader process has no output pipe")
+    with selectors.DefaultSelector() as selector:
+        selector.register(child.stdout, selectors.EVENT_READ)
+        return child.stdout.readline() if selector.select(limit_s) else None

@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -69,6 +69,7 @@ class Journal:
         self.head = head
         self._index = {stream.path: i for i, stream in enumerate(head.streams)}
         self._synced = time.monotonic()
+        self._end = 0
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
@@ -105,11 +106,13 @@ class Journal:
 
     def _write(self, data: bytes) -> None:
         try:
-            written = os.write(self._descriptor, data)
-            if written != len(data):
-                raise OSError(28, "no space left on device")
+            view = memoryview(data)
+            while view:
+                view = view[os.write(self._descriptor, view) :]
         except OSError as error:
+            os.ftruncate(self._descriptor, self._end)  # or the torn record would hide what comes after it
             raise disk_error(error, self.path) from error
+        self._end += len(data)
 
 
 def read_head(path: Path) -> tuple[JournalHead, int]:
@@ -136,20 +139,57 @@ def read_head(path: Path) -> tuple[JournalHead, int]:
         ) from error
 
 
-def records(path: Path) -> Iterator[tuple[int, int, int]]:
-    """(stream number, offset, length) of every whole record, in order; stops at the first torn or damaged one."""
-    _, start = read_head(path)
+@dataclass(frozen=True)
+class Place:
+    """Where a whole record lies in the journal."""
+
+    stream: int
+    start: int
+    """Offset of the record [byte]."""
+    offset: int
+    """Offset of its payload [byte]."""
+    length: int
+
+
+def records(path: Path) -> Iterator[Place]:
+    """Every whole record, in order. Damaged stretches are skipped, a torn last record ends the search."""
+    _, position = read_head(path)
+    size = path.stat().st_size
     with path.open("rb") as file:
-        file.seek(start)
-        while len(head := file.read(_RECORD.size)) == _RECORD.size:
-            mark, number, length, crc = _RECORD.unpack(head)
-            if mark != _MARK or length > MAX_RECORD:
-                return
-            offset = file.tell()
-            payload = file.read(length)
-            if len(payload) != length or zlib.crc32(payload) != crc:
-                return
-            yield number, offset, length
+        while position < size:
+            place = _record_at(file, position)
+            if place is None:
+                position = _next_mark(file, position + 1, size)
+                continue
+            yield place
+            position = place.offset + place.length
+
+
+def _record_at(file: BinaryIO, position: int) -> Place | None:
+    file.seek(position)
+    head = file.read(_RECORD.size)
+    if len(head) < _RECORD.size:
+        return None
+    mark, number, length, crc = _RECORD.unpack(head)
+    if mark != _MARK or length > MAX_RECORD:
+        return None
+    payload = file.read(length)
+    if len(payload) != length or zlib.crc32(payload) != crc:
+        return None
+    return Place(number, position, position + _RECORD.size, length)
+
+
+def _next_mark(file: BinaryIO, position: int, size: int) -> int:
+    """Position of the next record mark, or `size`."""
+    step = 1 << 20
+    while position < size:
+        file.seek(position)
+        window = file.read(step + len(_MARK))
+        found = window.find(_MARK)
+        if found >= 0:
+            return position + found
+        position += step
+    return size
 
 
 def decode(stream: Stream, payload: bytes) -> dict[str, np.ndarray | bytes]:
@@ -188,7 +228,11 @@ def _encode(stream: Stream, row: Mapping[str, Any]) -> bytes:
 
 def _to_json(head: JournalHead) -> dict[str, Any]:
     streams = [
-        {"path": s.path, "attributes": dict(s.attributes), "fields": [[f.name, f.dtype, list(f.shape)] for f in s.fields]}
+        {
+            "path": s.path,
+            "attributes": dict(s.attributes),
+            "fields": [[f.name, f.dtype, list(f.shape)] for f in s.fields],
+        }
         for s in head.streams
     ]
     groups = {path: dict(attributes) for path, attributes in head.groups.items()}

@@ -103,7 +103,9 @@ def _check_groups(
                 if full in datasets:
                     yield from _check_dataset(full, datasets[full], expected, sizes)
                 elif dataset.required:
-                    yield Mismatch(full, "a required dataset is missing", f"{expected.dtype} {expected.dims}", "nothing")
+                    yield Mismatch(
+                        full, "a required dataset is missing", f"{expected.dtype} {expected.dims}", "nothing"
+                    )
 
 
 def on_disk(dataset: DatasetSpec) -> list[tuple[str, DatasetSpec]]:

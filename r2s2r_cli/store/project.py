@@ -72,7 +72,9 @@ class Project:
     def iterations(self) -> list[Iteration]:
         """All iterations, in order."""
         folder = self.root / ITERATIONS
-        found = [p for p in folder.iterdir() if re.fullmatch(r"\d{3,}", p.name) and p.is_dir()] if folder.is_dir() else []
+        found = (
+            [p for p in folder.iterdir() if re.fullmatch(r"\d{3,}", p.name) and p.is_dir()] if folder.is_dir() else []
+        )
         return [Iteration(int(p.name), p) for p in sorted(found, key=lambda p: int(p.name))]
 
     def iteration(self, number: int | None, *, create: bool = False) -> Iteration:
@@ -145,4 +147,3 @@ def _nest(key: str, value: Any) -> dict[str, Any]:
     for part in reversed(key.split(".")):
         value = {part: value}
     return value  # type: ignore[no-any-return]
-

@@ -17,6 +17,7 @@ from r2s2r_cli.store.header import body_sha256, read_header_and_block
 from r2s2r_cli.store.isolated import IsolatedReader
 from r2s2r_cli.store.layout import BLOB_BYTES, BLOB_OFFSET
 from schemas.header import Header
+from schemas.results import NodeInfo
 from schemas.versions import KINDS, NoMigration, chain
 
 
@@ -134,3 +135,22 @@ def _load(file: h5py.File, path: Path, *, blobs: bool) -> dict[str, Group]:
         if datasets or found or not len(node):
             groups[name] = Group(datasets, found)
     return groups
+
+
+def describe(path: Path) -> list[NodeInfo]:
+    """Groups and datasets of a checked artifact with shape, unit, frame and meaning, without reading the data."""
+    nodes = []
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            for name, node in sorted(walk(file)):
+                if name.startswith(PROVENANCE):
+                    continue
+                found = attributes(node)
+                if isinstance(node, h5py.Dataset):
+                    words = {key: str(found.get(key, "")) for key in ("unit", "dims", "frame", "description")}
+                    nodes.append(NodeInfo(path=name, dtype=str(node.dtype), shape=node.shape, **words))
+                else:
+                    nodes.append(NodeInfo(path=name, attributes=found))
+    except (OSError, RuntimeError, ValueError, KeyError) as error:
+        raise translate(error, path) from error
+    return nodes

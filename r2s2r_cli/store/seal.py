@@ -11,13 +11,13 @@ import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Rows, Value
 from r2s2r_cli.errors import ArtifactError
-from r2s2r_cli.store.journal import Field, JournalHead, Stream, decode, read_head, records
+from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.journal import Field, JournalHead, Place, Stream, decode, read_head, records
+from r2s2r_cli.store.read import checked_header
 from r2s2r_cli.store.write import write_artifact
 from schemas.header import Header, Provenance
 
 _ROWS_A_BLOCK = 256
-_Place = tuple[int, int]
-"""Offset and length of a record."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,10 @@ class Sealed:
     header: Header
     rows: dict[str, int]
     """Rows by stream."""
+    torn_bytes: int
+    """Bytes of a torn last row that were left out."""
     lost_bytes: int
-    """Bytes of a torn last record that were left out."""
+    """Bytes of damaged rows in the middle; where there are any, the journal is kept beside the artifact."""
 
 
 def seal(journal: Path, target: Path, *, recovered: bool = False) -> Sealed:
@@ -37,7 +39,10 @@ def seal(journal: Path, target: Path, *, recovered: bool = False) -> Sealed:
     Nothing is lost on failure: the journal stays until the artifact is verified under its name.
     Raises ArtifactError: damaged head, no rows, target exists, disk full.
     """
+    head, end = read_head(journal)
     if target.exists():
+        if read_header(target).provenance == Provenance.model_validate(head.provenance):
+            return _finish(journal, checked_header(target), {}, 0)  # killed between sealing and tidying up
         raise ArtifactError(
             "an artifact of that name exists already",
             where=str(target),
@@ -45,11 +50,12 @@ def seal(journal: Path, target: Path, *, recovered: bool = False) -> Sealed:
             received="one",
             hint=f"mv '{target}' '{target.with_suffix('.old.h5')}' && r2s2r recover '{journal}'",
         )
-    head, end = read_head(journal)
-    places: dict[int, list[_Place]] = defaultdict(list)
-    for number, offset, length in records(journal):
-        places[number].append((offset, length))
-        end = offset + length
+    places: dict[int, list[Place]] = defaultdict(list)
+    lost = 0
+    for place in records(journal):
+        lost += place.start - end
+        end = place.offset + place.length
+        places[place.stream].append(place)
     if not places:
         raise ArtifactError(
             "the journal holds no rows, there is nothing to keep",
@@ -58,13 +64,21 @@ def seal(journal: Path, target: Path, *, recovered: bool = False) -> Sealed:
             received="none",
             hint=f"rm '{journal}'",
         )
+    torn = journal.stat().st_size - end
     header = write_artifact(target, _data(journal, head, places, recovered), Provenance.model_validate(head.provenance))
-    lost = journal.stat().st_size - end
-    journal.unlink()
-    return Sealed(header, {head.streams[n].path: len(p) for n, p in sorted(places.items())}, lost)
+    rows = {head.streams[n].path: len(p) for n, p in sorted(places.items())}
+    return _finish(journal, header, rows, torn, lost)
 
 
-def _data(journal: Path, head: JournalHead, places: dict[int, list[_Place]], recovered: bool) -> ArtifactData:
+def _finish(journal: Path, header: Header, rows: dict[str, int], torn: int, lost: int = 0) -> Sealed:
+    if lost:  # damage in the middle: keep the bytes, somebody may want to look at them
+        journal.rename(journal.with_suffix(".journal-damaged"))
+    else:
+        journal.unlink()
+    return Sealed(header, rows, torn, lost)
+
+
+def _data(journal: Path, head: JournalHead, places: dict[int, list[Place]], recovered: bool) -> ArtifactData:
     groups: dict[str, Group] = {}
     for path, attributes in head.groups.items():
         extra = {"recovered": True} if recovered and path.count("/") == 1 else {}
@@ -77,18 +91,18 @@ def _data(journal: Path, head: JournalHead, places: dict[int, list[_Place]], rec
     return ArtifactData(head.kind, groups)
 
 
-def _value(journal: Path, stream: Stream, field: Field, places: list[_Place]) -> Value:
+def _value(journal: Path, stream: Stream, field: Field, places: list[Place]) -> Value:
     if field.dtype == "blobs":
         return Blobs((bytes(row) for row in _column(journal, stream, field, places)), len(places))
     blocks = _stacked(_column(journal, stream, field, places))
     return Rows(blocks, (len(places), *field.shape), np.dtype(field.dtype))
 
 
-def _column(journal: Path, stream: Stream, field: Field, places: list[_Place]) -> Iterator[np.ndarray | bytes]:
+def _column(journal: Path, stream: Stream, field: Field, places: list[Place]) -> Iterator[np.ndarray | bytes]:
     with journal.open("rb") as file:
-        for offset, length in places:
-            file.seek(offset)
-            yield decode(stream, file.read(length))[field.name]
+        for place in places:
+            file.seek(place.offset)
+            yield decode(stream, file.read(place.length))[field.name]
 
 
 def _stacked(rows: Iterator[np.ndarray | bytes]) -> Iterator[np.ndarray]:

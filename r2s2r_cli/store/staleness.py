@@ -72,7 +72,10 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any], prefix: str = ""
 def artifact_ref(project: Project, path: Path, header: Header) -> InputRef:
     """The reference to an artifact that serves as an input."""
     return InputRef(
-        path=project.relative(path), kind=header.kind, schema_version=header.schema_version, sha256=header.content_sha256
+        path=project.relative(path),
+        kind=header.kind,
+        schema_version=header.schema_version,
+        sha256=header.content_sha256,
     )
 
 

@@ -111,7 +111,9 @@ def _read_through(path: str, node: h5py.Dataset | h5py.Group) -> dict[str, str] 
         attributes(node)
         if isinstance(node, h5py.Dataset):
             if node.dtype.hasobject:
-                return _problem(path, "artifacts have no object dtypes", "numbers or fixed-length text", str(node.dtype))
+                return _problem(
+                    path, "artifacts have no object dtypes", "numbers or fixed-length text", str(node.dtype)
+                )
             for _ in blocks(node):
                 pass
     except Exception as error:

@@ -10,6 +10,8 @@ import os
 import resource
 import sys
 
+READY = "ready"
+"""First line of the child: tells a child that cannot start from one that a file has crashed."""
 MEMORY_BYTES = 4 << 30
 """Address space of the child: a damaged size field must not take the machine down."""
 
@@ -23,6 +25,8 @@ def main() -> None:
     from r2s2r_cli.store.verify import tree, verify
 
     calls = {"verify": verify, "tree": tree}
+    answers.write(READY + "\n")
+    answers.flush()
     for line in sys.stdin:
         request = json.loads(line)
         answer = calls[request["call"]](request["path"])

@@ -37,7 +37,7 @@ def write_artifact(path: Path, data: ArtifactData, provenance: Provenance, *, ti
     draft = Header(
         kind=spec.kind, schema_version=spec.version, title=title, created_by=CREATED_BY, content_sha256=_ZEROS,
         seal_sha256=_ZEROS, body_sha256=_ZEROS, body_bytes=10**15, provenance=provenance,
-        datasets={name: _ZEROS for name in _dataset_paths(data, spec)},
+        datasets=dict.fromkeys(_dataset_paths(data, spec), _ZEROS),
     )  # fmt: skip
     size = block_size(draft)
     with replacing(path) as temp:

@@ -1,0 +1,101 @@
+"""The command line: the list of commands, and the one place where an error becomes an exit code."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from r2s2r_cli import __version__
+from r2s2r_cli.commands import COMMANDS, GROUPS
+from r2s2r_cli.console import print_error
+from r2s2r_cli.errors import ExitCode, R2S2RError, UsageError
+
+BUG_MESSAGE = "this is a bug in r2s2r, please report it with the lines above"
+
+
+class ErrorGroup(TyperGroup):
+    """Turns every outcome into an exit code of `errors.ExitCode`; tracebacks are for bugs only."""
+
+    def main(self, args: Any = None, prog_name: str | None = None, **extra: Any) -> Any:
+        """Run; leave through SystemExit with one of our codes."""
+        arguments = list(sys.argv[1:] if args is None else args)
+        extra["standalone_mode"] = False
+        code = run_guarded(lambda: super(ErrorGroup, self).main(arguments, prog_name, **extra), "--json" in arguments)
+        sys.exit(code)
+
+
+def run_guarded(call: Any, as_json: bool) -> int:
+    """Run `call` and return its exit code; errors are printed in our form."""
+    try:
+        result = call()
+        sys.stdout.flush()
+        return result if isinstance(result, int) else ExitCode.DONE
+    except R2S2RError as error:
+        print_error(error, as_json=as_json)
+        return error.exit_code
+    except typer.TyperException as error:
+        print_error(_usage_error(error), as_json=as_json)
+        return ExitCode.USAGE
+    except (KeyboardInterrupt, typer.Abort):
+        print("interrupted: nothing is half-written", file=sys.stderr)
+        return ExitCode.INTERRUPTED
+    except BrokenPipeError:
+        _silence_stdout()
+        return ExitCode.DONE
+    except Exception:
+        traceback.print_exc()
+        print(BUG_MESSAGE, file=sys.stderr)
+        return ExitCode.BUG
+
+
+def _usage_error(error: typer.TyperException) -> UsageError:
+    message = error.format_message() if hasattr(error, "format_message") else str(error)
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context is not None else "r2s2r"
+    return UsageError(message.rstrip(".").strip(), where=command, hint=f"{command} --help")
+
+
+def _silence_stdout() -> None:
+    """The reader of the pipe went away (`| head`): not an error, but Python must not complain at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+app = typer.Typer(
+    name="r2s2r",
+    cls=ErrorGroup,
+    help="Close the gap between a cable-driven robot and its simulator, and say what causes the rest.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
+def _version(value: bool) -> None:
+    if value:
+        print(f"r2s2r {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
+    ] = False,
+) -> None:
+    del version
+
+
+for _name, _function in COMMANDS.items():
+    app.command(_name, no_args_is_help=False)(_function)
+for _name, _group in GROUPS.items():
+    app.add_typer(_group, name=_name)
+
+
+def main() -> None:
+    """Entry point of the console script."""
+    app()

@@ -1,0 +1,103 @@
+"""Where words go: data on stdout (one JSON document with --json), talk, progress and hints on stderr."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from r2s2r_cli.errors import R2S2RError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from pydantic import BaseModel
+
+NO_PROGRESS = "R2S2R_NO_PROGRESS"
+
+
+class Console:
+    """The two streams of one command. Colours follow the terminal and NO_COLOR; nothing is said by colour alone."""
+
+    def __init__(self, *, json: bool = False, quiet: bool = False) -> None:
+        self.json = json
+        self.quiet = quiet
+
+    def document(self, result: BaseModel) -> None:
+        """The command's one JSON document, if --json was given."""
+        if self.json:
+            print(result.model_dump_json(by_alias=True, indent=2))
+
+    def data(self, text: str) -> None:
+        """A line of data for people; silent with --json."""
+        if not self.json:
+            print(text)
+
+    def table(self, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+        """A table of data for people; silent with --json. Numbers (cells that begin like one) stand right."""
+        if self.json:
+            return
+        from rich import box
+        from rich.console import Console as RichConsole
+        from rich.table import Table
+        from rich.text import Text
+
+        body = [[str(cell) for cell in row] for row in rows]
+        table = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
+        for i, name in enumerate(columns):
+            numeric = bool(body) and all(_is_number(row[i]) for row in body)
+            table.add_column(name, justify="right" if numeric else "left", overflow="fold")
+        for row in body:
+            table.add_row(*(Text(cell) for cell in row))
+        width = None if sys.stdout.isatty() else 160
+        RichConsole(file=sys.stdout, width=width, highlight=False).print(table)
+
+    def say(self, text: str) -> None:
+        """A remark on stderr; silent with --quiet."""
+        if not self.quiet:
+            print(text, file=sys.stderr)
+
+    def warn(self, text: str) -> None:
+        """A warning on stderr, never silenced."""
+        print(f"warning: {text}", file=sys.stderr)
+
+    def hint(self, command: str) -> None:
+        """What to run next; silent with --quiet."""
+        self.say(f"hint: {command}")
+
+    @contextmanager
+    def progress(self, title: str, total: int) -> Iterator[Callable[[int], None]]:
+        """A bar with rate and time left on stderr; yields a function that takes the number of items just done.
+
+        Silent when piped, with --quiet, or where R2S2R_NO_PROGRESS is set.
+        """
+        if self.quiet or not sys.stderr.isatty() or os.environ.get(NO_PROGRESS):
+            yield lambda done: None
+            return
+        from rich.console import Console as RichConsole
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        rate = TextColumn("{task.speed:.0f}/s" if total else "")
+        columns = (TextColumn(title), BarColumn(), MofNCompleteColumn(), rate, TimeRemainingColumn())
+        with Progress(*columns, console=RichConsole(stderr=True), transient=True) as bar:
+            task = bar.add_task(title, total=total)
+            yield lambda done: bar.update(task, advance=done)
+
+
+def print_error(error: R2S2RError, *, as_json: bool) -> None:
+    """The error on stderr for people, and with --json as the document on stdout as well."""
+    if as_json:
+        from schemas.results import ErrorResult
+
+        document = ErrorResult(
+            exit_code=int(error.exit_code), what=error.what, where=error.where, expected=error.expected,
+            received=error.received, hint=error.hint,
+        )  # fmt: skip
+        print(document.model_dump_json(by_alias=True, indent=2))
+    print("\n".join([f"error: {error.what}", *error.lines()[1:]]), file=sys.stderr)
+
+
+def _is_number(cell: str) -> bool:
+    return not cell or cell[0] in "-+0123456789"

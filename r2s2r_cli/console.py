@@ -30,6 +30,10 @@ class Console:
         if self.json:
             print(result.model_dump_json(by_alias=True, indent=2))
 
+    def raw(self, text: str) -> None:
+        """Text on stdout that is data in both forms."""
+        print(text)
+
     def data(self, text: str) -> None:
         """A line of data for people; silent with --json."""
         if not self.json:
@@ -45,7 +49,9 @@ class Console:
         from rich.text import Text
 
         body = [[str(cell) for cell in row] for row in rows]
-        table = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
+        if title:
+            print(f"\n{title}")
+        table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
         for i, name in enumerate(columns):
             numeric = bool(body) and all(_is_number(row[i]) for row in body)
             table.add_column(name, justify="right" if numeric else "left", overflow="fold")

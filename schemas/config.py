@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from schemas.base import Frozen
 from schemas.estimate import EstimateSettings
@@ -13,12 +13,16 @@ from schemas.estimate import EstimateSettings
 class ImportSettings(Frozen):
     """Settings of `import`."""
 
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
     rod_length_tolerance: Annotated[float, Field(gt=0, lt=0.5)] = 0.05
     """Largest relative departure of the fitted rod length from robot.toml; beyond it is another robot or unit."""
 
 
 class CalibrateSettings(Frozen):
     """Settings of `calibrate`."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
 
     swap_threshold_m: Annotated[float, Field(gt=0)] = 0.05
     """A recalibration that moves a length by more than this is reported as a swapped sensor."""

@@ -9,12 +9,23 @@ from collections.abc import Callable
 
 import typer
 
+from r2s2r_cli.commands.bench import bench_app
+from r2s2r_cli.commands.doctor import doctor
+from r2s2r_cli.commands.export import export
+from r2s2r_cli.commands.init import init
+from r2s2r_cli.commands.inspect import inspect
 from r2s2r_cli.commands.status import status
 
 COMMANDS: dict[str, Callable[..., None]] = {
+    "init": init,
     "status": status,
+    "inspect": inspect,
+    "doctor": doctor,
+    "export": export,
 }
 """Subcommands in the order of the data, then of use."""
 
-GROUPS: dict[str, typer.Typer] = {}
+GROUPS: dict[str, typer.Typer] = {
+    "bench": bench_app,
+}
 """Subcommands that have subcommands."""

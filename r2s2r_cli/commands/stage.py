@@ -191,8 +191,8 @@ def print_config(settings: Mapping[str, Any], console: Console) -> None:
     if console.json:
         import json
 
-        print(json.dumps(settings, indent=2))
+        console.raw(json.dumps(settings, indent=2))
         return
     import tomlkit
 
-    print(tomlkit.dumps(dict(settings)), end="")
+    console.raw(tomlkit.dumps(dict(settings)).rstrip())

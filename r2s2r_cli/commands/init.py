@@ -1,0 +1,73 @@
+"""`r2s2r init`: a new project: settings, robot description, Makefile."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from r2s2r_cli.console import Console
+from r2s2r_cli.errors import UsageError
+from r2s2r_cli.options import JsonOption, QuietOption
+from r2s2r_cli.store.atomic import write_text
+from r2s2r_cli.store.project import ITERATIONS, PROJECT_FILE
+from schemas.results import InitResult
+
+
+def init(
+    directory: Annotated[Path, typer.Argument(help="Directory of the new project; made if it is not there.")] = Path(),
+    robot: Annotated[
+        str, typer.Option("--robot", help="threebar | threebar-330 | sixbar (illustrative).")
+    ] = "threebar",
+    attachment: Annotated[
+        str, typer.Option("--attachment", help="surface (the paper's) | rod_end (NTRT's): where cables attach.")
+    ] = "surface",
+    name: Annotated[str | None, typer.Option("--name", help="Project name; default: that of the directory.")] = None,
+    sample: Annotated[
+        bool, typer.Option("--sample", help="Add sample.csv: closed-form kinematics, labelled so, to try import on.")
+    ] = False,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the sample's noise.")] = 0,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Make a project: project.toml (settings), robot.toml (the robot, every number with its source), Makefile.
+
+    Example: r2s2r init myrobot --robot threebar
+    """
+    from r2s2r_cli.stages.init.project_file import project_toml
+    from r2s2r_cli.stages.init.robots import robot_toml
+
+    console = Console(json=json, quiet=quiet)
+    root = directory.absolute()
+    title = name or root.name or "project"
+    files = {PROJECT_FILE: project_toml(title), "robot.toml": robot_toml(robot, attachment), "Makefile": _makefile()}
+    if sample:
+        from r2s2r_cli.stages.init.sample import kinematic_sample
+
+        files["sample.csv"], files["sample.toml"] = kinematic_sample(seed)
+    _refuse_overwriting(root, files)
+    for file, text in files.items():
+        write_text(root / file, text)
+    (root / ITERATIONS).mkdir(exist_ok=True)
+    console.document(InitResult(project=title, robot=robot, files=tuple(files)))
+    for file in files:
+        console.data(str(directory / file))
+    log = "sample.csv" if sample else "run.csv"
+    console.hint(f"cd {directory} && r2s2r import {log}" if str(directory) != "." else f"r2s2r import {log}")
+
+
+def _makefile() -> str:
+    return resources.files("r2s2r_cli").joinpath("templates", "project.mk").read_text(encoding="utf-8")
+
+
+def _refuse_overwriting(root: Path, files: dict[str, str]) -> None:
+    if root.exists() and not root.is_dir():
+        raise UsageError("a file is in the way of the project directory", where=str(root), expected="a directory",
+                         received="a file", hint="r2s2r init anothername")  # fmt: skip
+    present = [name for name in files if (root / name).exists()]
+    if present:
+        raise UsageError("there is something here already, and init overwrites nothing", where=str(root / present[0]),
+                         expected="a new or empty directory", received=", ".join(present),
+                         hint="r2s2r init anothername")  # fmt: skip

@@ -1,0 +1,90 @@
+"""A run of a recording as the trajectory CSV that `import` reads, or its targets as a policy file."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import numpy as np
+
+from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.errors import InputError
+
+_PID = {"pid_min_length": "min_length_m", "pid_range": "range_m", "pid_tolerance": "tolerance",
+        "motor_speed": "motor_speed", "winch_radius": "winch_radius_m"}  # fmt: skip
+
+
+def trajectory_files(data: ArtifactData, run: str) -> list[tuple[str, bytes]]:
+    """`<run>.csv` and its sidecar `<run>.toml`: `import` gives the same run again.
+
+    Raises InputError where the run has no observed end caps on the time of its commands.
+    """
+    caps, commands = _need(data, run, "caps"), _need(data, run, "commands")
+    if not np.array_equal(caps["t"], commands["t"]):
+        raise _cannot(run, "end caps and commands on one time axis", "two time axes")
+    columns = [("t_s", caps["t"])]
+    for i in range(caps["p_WE"].shape[1]):
+        columns += [(f"cap{i}_{axis}_m", caps["p_WE"][:, i, k]) for k, axis in enumerate("xyz")]
+    for name in ("target", "control"):
+        if name in commands:
+            columns += [(f"{name}{i}", commands[name][:, i]) for i in range(commands[name].shape[1])]
+    sensors = data.group(run, "sensors")
+    if sensors is not None and "length" in sensors and np.array_equal(sensors["t"], caps["t"]):
+        columns += [(f"length{i}_m", sensors["length"][:, i]) for i in range(sensors["length"].shape[1])]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([name for name, _ in columns])
+    writer.writerows([[repr(float(v)) for v in row] for row in zip(*(c for _, c in columns), strict=True)])
+    return [(f"{run}.csv", text.getvalue().encode()), (f"{run}.toml", _sidecar(data.groups[f"runs/{run}"]))]
+
+
+def policy_file(data: ArtifactData, run: str) -> tuple[str, bytes]:
+    """`<run>.policy.toml`: the target intervals of a run as a policy. Raises InputError where it has none."""
+    import tomlkit
+
+    targets = _need(data, run, "intervals")["target"]
+    document = tomlkit.document()
+    document["schema_version"] = 1
+    document["robot"] = str(data.groups[f"runs/{run}"].attributes["robot"])
+    document["name"] = run
+    document["description"] = f"targets of the run {run}, in their order"
+    document["repeat"] = 1
+    steps = tomlkit.aot()
+    for target in targets:
+        step = tomlkit.table()
+        step["target"] = [float(value) for value in target]
+        steps.append(step)
+    document["steps"] = steps
+    return f"{run}.policy.toml", tomlkit.dumps(document).encode()
+
+
+def _sidecar(run: Group) -> bytes:
+    import tomlkit
+
+    document = tomlkit.document()
+    for name in ("robot", "nature", "source"):
+        document[name] = str(run.attributes[name])
+    pid = tomlkit.table()
+    for name, key in _PID.items():
+        if name in run.attributes:
+            pid[key] = float(run.attributes[name])
+    if pid:
+        document["pid"] = pid
+    return tomlkit.dumps(document).encode()
+
+
+def _need(data: ArtifactData, run: str, stream: str) -> Group:
+    group = data.group(run, stream)
+    if group is None:
+        raise _cannot(run, f"a group runs/{run}/{stream}", "none")
+    return group
+
+
+def _cannot(run: str, expected: str, received: str) -> InputError:
+    return InputError(
+        "this run cannot be exported in that form",
+        where=f"run {run}",
+        expected=expected,
+        received=received,
+        hint="r2s2r export FILE --to csv",
+    )

@@ -42,10 +42,14 @@ test-slow: $(VENV)/.dev-stamp  ## the slow tests: kills while writing, damaged f
 	@$(PY) -m pytest $(PYTEST_FLAGS) -m slow
 
 lint: $(VENV)/.dev-stamp  ## style, types, import layers
-	@echo 'ruff check';        $(PY) -m ruff check .
-	@echo 'ruff format';       $(PY) -m ruff format --check .
-	@echo 'mypy';              $(PY) -m mypy
-	@echo 'import layers';     $(VENV)/bin/lint-imports --no-logo --no-cache
+	@failed=; \
+	look() { echo "== $$*"; "$$@" || failed="$$failed, $$1 $$2"; }; \
+	PATH="$(ROOT)/$(VENV)/bin:$$PATH"; \
+	look ruff check .; \
+	look ruff format --check --quiet .; \
+	look mypy --no-error-summary; \
+	look lint-imports --no-logo --no-cache; \
+	if [ -n "$$failed" ]; then echo "make lint failed:$${failed#,}"; exit 1; fi
 
 docs: $(VENV)/.run-stamp  ## regenerate docs/reference, schemas/json and schemas/LAYOUT.md
 	@$(PY) -m schemas.generate

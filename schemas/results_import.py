@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import Literal
 
+from pydantic import Field
+
 from schemas.base import Frozen
 
+LengthUnit = Literal["m", "dm", "cm", "mm"]
 ImportFormat = Literal["trajectory_csv", "authors_folder", "tum_rgbd"]
 
 
@@ -54,7 +57,7 @@ class ImportReport(Frozen):
     robot: str
     nature: str
     source: str
-    unit: Literal["m", "dm", "cm", "mm"] = "m"
+    unit: LengthUnit = "m"
     """Length unit of the source's columns; the recording is in metres."""
     rows: int
     kept: int
@@ -74,8 +77,8 @@ class ImportReport(Frozen):
     rod_length_sd_m: tuple[float, ...] = ()
     rod_length_robot_m: tuple[float, ...] = ()
     ground_offset_m: float | None = None
-    streams: dict[str, int] = {}
+    streams: dict[str, int] = Field(default_factory=dict)
     """Samples a stream (`caps`, `commands`, `camera/color` ...)."""
-    missing: dict[str, int] = {}
+    missing: dict[str, int] = Field(default_factory=dict)
     """What the source should have and has not, counted (`color`, `depth`, `data`, `motor`, `capacitance` ...)."""
     warnings: tuple[str, ...] = ()

@@ -1,0 +1,176 @@
+"""Reading what the user points at: every way in which a path can be wrong becomes an InputError."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import shlex
+import stat
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from r2s2r_cli.errors import InputError
+
+MIB = 1024 * 1024
+MAX_CSV_BYTES = 256 * MIB
+"""Two hours at 30 frames a second of 40 columns are 80 MiB: a larger file is not a run."""
+MAX_TEXT_BYTES = 4 * MIB
+"""Sidecar, JSON of one frame, camera configuration."""
+MAX_IMAGE_BYTES = 64 * MIB
+"""A 16-bit image of 8 megapixels, uncompressed, is 16 MiB."""
+_SHOWN = 60
+
+
+def shown(value: object) -> str:
+    """A value as it may stand in a message: printable, in quotes, at most 60 characters."""
+    text = repr(value) if isinstance(value, str) else str(value)
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}... ({len(text)} characters)"
+
+
+def nearest(name: str, known: list[str]) -> str:
+    """` (did you mean ...?)` for a misspelt name, else empty."""
+    close = difflib.get_close_matches(name, known, n=1)
+    return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def file_size(path: Path, what: str, *, limit: int) -> int:
+    """Size of a regular file [byte].
+
+    Raises InputError where it is missing, a folder, a device or pipe (reading one could hang), unreadable, in a loop
+    of links, or larger than `limit`.
+    """
+    status = _status(path, what)
+    if stat.S_ISDIR(status.st_mode):
+        raise InputError(
+            f"{what} is a folder", where=str(path), expected="a file", received="a folder", hint=f"ls {quoted(path)}"
+        )
+    if not stat.S_ISREG(status.st_mode):
+        raise InputError(
+            f"{what} is not a regular file",
+            where=str(path),
+            expected="a file",
+            received="a device, pipe or socket",
+            hint=f"copy the data into a file first: cat {quoted(path)} > data.csv",
+        )
+    if status.st_size > limit:
+        raise InputError(
+            f"{what} is too large to be one run",
+            where=str(path),
+            expected=f"at most {limit // MIB} MiB",
+            received=f"{status.st_size / MIB:.0f} MiB",
+            hint="split it into one file a run",
+        )
+    return status.st_size
+
+
+def read_source(path: Path, what: str, *, limit: int) -> bytes:
+    """Bytes of a file that the user named. Raises InputError as `file_size` does."""
+    file_size(path, what, limit=limit)
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise _unreadable(path, what, error) from error
+
+
+def read_ends(path: Path, what: str, *, head: int, tail: int) -> tuple[bytes, bytes]:
+    """First and last bytes of an image, without reading the rest. Raises InputError as `file_size` does."""
+    size = file_size(path, what, limit=MAX_IMAGE_BYTES)
+    try:
+        with path.open("rb") as file:
+            first = file.read(head)
+            file.seek(max(0, size - tail))
+            return first, file.read(tail)
+    except OSError as error:
+        raise _unreadable(path, what, error) from error
+
+
+def list_folder(path: Path, what: str) -> list[str]:
+    """Names in a folder, sorted. Raises InputError where it is missing, not a folder or unreadable."""
+    status = _status(path, what)
+    if not stat.S_ISDIR(status.st_mode):
+        raise InputError(f"{what} is not a folder", where=str(path), expected="a folder", hint=f"ls -l {quoted(path)}")
+    try:
+        return sorted(entry.name for entry in path.iterdir())
+    except OSError as error:
+        raise _unreadable(path, what, error) from error
+
+
+@dataclass(frozen=True)
+class FileBytes:
+    """The bytes of files in order, read only when they are asked for; can be gone through again and again."""
+
+    paths: tuple[Path, ...]
+    what: str
+
+    def __iter__(self) -> Iterator[bytes]:
+        for path in self.paths:
+            yield read_source(path, self.what, limit=MAX_IMAGE_BYTES)
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+
+def decode(data: bytes, what: str, where: str) -> str:
+    """UTF-8 text, a byte-order mark taken off. Raises InputError with line and column of the first bad byte."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise InputError(
+            f"{what} is UTF-16 text",
+            where=where,
+            expected="UTF-8",
+            received="a UTF-16 byte-order mark",
+            hint=f"iconv -f UTF-16 -t UTF-8 {quoted(where)} > utf8.csv",
+        )
+    zero = data.find(b"\0")
+    if zero >= 0:
+        raise InputError(
+            f"{what} holds NUL bytes",
+            where=f"{where}:{data.count(10, 0, zero) + 1}",
+            expected="text",
+            received="a NUL byte: a binary file, or one damaged by a crash while it was written",
+            hint=f"look at it: head -c 300 {quoted(where)} | xxd",
+        )
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(10, 0, error.start) + 1
+        column = error.start - (data.rfind(10, 0, error.start) + 1) + 1
+        raise InputError(
+            f"{what} is not UTF-8 text",
+            where=f"{where}:{line}:{column}",
+            expected="UTF-8",
+            received=f"byte 0x{data[error.start]:02x}",
+            hint=f"iconv -f LATIN1 -t UTF-8 {quoted(where)} > utf8.csv",
+        ) from error
+
+
+def _status(path: Path, what: str) -> os.stat_result:
+    try:
+        return path.stat()
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise InputError(
+            f"{what} does not exist" + _sibling(path),
+            where=str(path),
+            hint=f"ls {quoted(path.parent)}",
+        ) from error
+    except (OSError, ValueError) as error:
+        raise _unreadable(path, what, error) from error
+
+
+def _sibling(path: Path) -> str:
+    try:
+        return nearest(path.name, [entry.name for entry in path.parent.iterdir()])
+    except (OSError, ValueError):
+        return ""
+
+
+def _unreadable(path: Path, what: str, error: Exception) -> InputError:
+    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    return InputError(
+        f"{what} cannot be read", where=shown(str(path)), received=reason, hint=f"ls -ld {quoted(shown(str(path)))}"
+    )
+
+
+def quoted(path: object) -> str:
+    """A path as it can be pasted into a shell."""
+    return shlex.quote(str(path))

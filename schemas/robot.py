@@ -87,6 +87,14 @@ class Sensor(Frozen):
     """None: not calibrated."""
     stiffness_n_per_m: NonNegative = 0.0
     """Of the sensor tendon that runs parallel to an actuated cable; 0 where the cable itself is the sensor."""
+    rest_length_m: Positive | None = None
+    """Below it the sensor tendon is slack; needed where its stiffness is above 0."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.stiffness_n_per_m > 0 and self.rest_length_m is None:
+            raise ValueError("a sensor tendon with a stiffness needs rest_length_m")
+        return self
 
 
 class Pid(Frozen):
@@ -144,7 +152,10 @@ class Robot(Frozen):
     contact: Contact
     colors: tuple[HsvRange, ...] = ()
     rest_caps_m: tuple[Vector3, ...]
-    """End-cap centres in the rest state, all actuated cables extended, on the ground; frame W."""
+    """End-cap centres in the rest state, all actuated cables extended, on the ground; frame W.
+
+    The frames R in which `sites_m` are given are those of this pose: x is the direction perpendicular to the rod that
+    points most upwards, z points to the odd cap (docs/concepts/attachment.md)."""
 
     @property
     def n_caps(self) -> int:

@@ -1,0 +1,1 @@
+"""What `init` writes: robot descriptions with the source of every number, and a closed-form sample."""

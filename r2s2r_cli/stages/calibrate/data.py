@@ -69,7 +69,7 @@ def history_groups(
         **{name: np.array([getattr(c, name) for c in changes], float) for name in ("elapsed", "change", "change_max")},
         "state": np.array([c.state for c in changes], dtype=np.uint8),
     }
-    attributes = {"range_from": ranges.source, "swap_threshold": swap_threshold}
+    attributes: dict[str, Scalar] = {"range_from": ranges.source, "swap_threshold": swap_threshold}
     return {"history": Group(entries, attributes), "drift": Group(drift)}
 
 
@@ -89,9 +89,9 @@ def tendon_groups(curves: Sequence[Curve], fits: Sequence[CurveFit], mean: Avera
         "mean": mean.mean,
         "sd": mean.sd,
     }
-    attributes: dict[str, Scalar] = {f"k{i + 1}_mean": float(mean.k[i]) for i in range(3)}
-    attributes |= {"x_common": mean.x_common, "monotone": mean.monotone}
-    return {"tendon_points": Group(points), "tendons": Group(table, attributes)}
+    averages: dict[str, Scalar] = {f"k{i + 1}_mean": float(mean.k[i]) for i in range(3)}
+    averages |= {"x_common": mean.x_common, "monotone": mean.monotone}
+    return {"tendon_points": Group(points), "tendons": Group(table, averages)}
 
 
 def mass_groups(parts: Mapping[int, Sequence[Lump]], properties: Mapping[int, MassProperties]) -> dict[str, Group]:

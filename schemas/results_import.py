@@ -82,3 +82,9 @@ class ImportReport(Frozen):
     missing: dict[str, int] = Field(default_factory=dict)
     """What the source should have and has not, counted (`color`, `depth`, `data`, `motor`, `capacitance` ...)."""
     warnings: tuple[str, ...] = ()
+
+
+class ImportReports(Frozen):
+    """All runs of one import."""
+
+    runs: tuple[ImportReport, ...]

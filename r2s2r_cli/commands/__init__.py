@@ -10,14 +10,18 @@ from collections.abc import Callable
 import typer
 
 from r2s2r_cli.commands.bench import bench_app
+from r2s2r_cli.commands.calibrate import calibrate
 from r2s2r_cli.commands.doctor import doctor
 from r2s2r_cli.commands.export import export
+from r2s2r_cli.commands.import_ import import_
 from r2s2r_cli.commands.init import init
 from r2s2r_cli.commands.inspect import inspect
 from r2s2r_cli.commands.status import status
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "init": init,
+    "calibrate": calibrate,
+    "import": import_,
     "status": status,
     "inspect": inspect,
     "doctor": doctor,

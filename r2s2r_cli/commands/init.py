@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from importlib import resources
 from pathlib import Path
 from typing import Annotated
@@ -16,14 +17,21 @@ from r2s2r_cli.store.project import ITERATIONS, PROJECT_FILE
 from schemas.results import InitResult
 
 
+class Attachment(StrEnum):
+    """What `--attachment` takes."""
+
+    SURFACE = "surface"
+    ROD_END = "rod_end"
+
+
 def init(
     directory: Annotated[Path, typer.Argument(help="Directory of the new project; made if it is not there.")] = Path(),
     robot: Annotated[
         str, typer.Option("--robot", help="threebar | threebar-330 | sixbar (illustrative).")
     ] = "threebar",
     attachment: Annotated[
-        str, typer.Option("--attachment", help="surface (the paper's) | rod_end (NTRT's): where cables attach.")
-    ] = "surface",
+        Attachment, typer.Option("--attachment", help="Where cables attach: surface as in the paper, rod_end as in NTRT.")
+    ] = Attachment.SURFACE,
     name: Annotated[str | None, typer.Option("--name", help="Project name; default: that of the directory.")] = None,
     sample: Annotated[
         bool, typer.Option("--sample", help="Add sample.csv: closed-form kinematics, labelled so, to try import on.")
@@ -36,17 +44,14 @@ def init(
 
     Example: r2s2r init myrobot --robot threebar
     """
+    from r2s2r_cli.stages.init.init import init_texts
     from r2s2r_cli.stages.init.project_file import project_toml
-    from r2s2r_cli.stages.init.robots import robot_toml
 
     console = Console(json=json, quiet=quiet)
     root = directory.absolute()
     title = name or root.name or "project"
-    files = {PROJECT_FILE: project_toml(title), "robot.toml": robot_toml(robot, attachment), "Makefile": _makefile()}
-    if sample:
-        from r2s2r_cli.stages.init.sample import kinematic_sample
-
-        files["sample.csv"], files["sample.toml"] = kinematic_sample(seed)
+    texts = init_texts(robot, attachment.value, sample_seed=seed if sample else None)
+    files = {PROJECT_FILE: project_toml(title), **texts, "Makefile": _makefile()}
     _refuse_overwriting(root, files)
     for file, text in files.items():
         write_text(root / file, text)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +12,8 @@ from r2s2r_cli.artifact import ArtifactData, Group
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from schemas.results_import import ImportReport, ImportReports
 
 ROD_COLORS = ("#c1272d", "#2a7f3e", "#0b5fa5", "#b8860b", "#6b3fa0", "#3b8ea5")
 """Rods in their order; the first three are the robot's own red, green and blue."""
@@ -107,3 +109,58 @@ def _top_view(axes: Axes, caps: Group) -> None:
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="x [m]", ylabel="y [m]", title="from above: first frame (pale) and last")
     axes.legend(fontsize=7)
+
+
+def import_rows(report: ImportReport) -> list[tuple[str, str]]:
+    """What `import` found, as (what, found) rows with units."""
+    dropped = report.dropped
+    rows = [
+        ("nature", report.nature),
+        ("frames kept", f"{report.kept} of {report.rows} rows, {report.duration_s:.2f} s"),
+        ("dropped", f"{dropped.total} ({dropped.total / max(1, report.rows):.0%}): {dropped.duplicate} duplicates "
+         f"(< 20 ms after a kept frame), {dropped.backwards} backwards in time, {dropped.not_observed} not observed"),
+    ]  # fmt: skip
+    if report.frame_gap_median_s is not None and report.stamp_jitter_s is not None:
+        rows.append(("frame gap", f"median {1e3 * report.frame_gap_median_s:.0f} ms, jitter of the stamps "
+                     f"{1e3 * report.stamp_jitter_s:.0f} ms (sd)"))  # fmt: skip
+    if report.gaps:
+        longest = max(report.gaps, key=lambda gap: gap.length_s)
+        rows.append(("gaps", f"{len(report.gaps)}, the longest {longest.length_s:.2f} s after {longest.after_s:.2f} s"))
+    rows.append(("target intervals", f"{report.intervals} ({report.intervals_complete} complete), "
+                 f"{report.segments} segments"))  # fmt: skip
+    if report.noise is not None:
+        held = f"; held by the source: {', '.join(report.noise.held)}" if report.noise.held else ""
+        rows.append(("noise per axis", f"{1e3 * report.noise.low_m:.1f} to {1e3 * report.noise.high_m:.1f} mm (sd), "
+                     f"median {1e3 * report.noise.median_m:.1f} mm{held}"))  # fmt: skip
+    for i, length in enumerate(report.rod_length_m):
+        rows.append((f"rod {i}", f"{1e3 * length:.1f} +- {1e3 * report.rod_length_sd_m[i]:.1f} mm between cap centres, "
+                     f"robot.toml says {1e3 * report.rod_length_robot_m[i]:.1f} mm"))  # fmt: skip
+    if report.ground_offset_m is not None:
+        rows.append(("ground offset", f"{1e3 * report.ground_offset_m:.1f} mm: the lowest cap lies that much too low "
+                     "on average"))  # fmt: skip
+    if report.streams:
+        rows.append(("samples", ", ".join(f"{name} {count}" for name, count in report.streams.items())))
+    if report.missing:
+        rows.append(("missing", ", ".join(f"{name} {count}" for name, count in report.missing.items())))
+    return rows
+
+
+def recording_page(reports: ImportReports, pictures: Mapping[str, bytes]) -> bytes:
+    """The HTML page of an import: its report and its pictures."""
+    from r2s2r_cli.views.page import Page, PageTable, Picture, render
+
+    frames = sum(report.kept for report in reports.runs)
+    intervals = sum(report.intervals for report in reports.runs)
+    warnings = [f"{report.run}: {text}" for report in reports.runs for text in report.warnings]
+    made = ("simulated", "kinematic sample")
+    samples = [f"{r.run}: {r.nature}, not a measurement" for r in reports.runs if r.nature in made]
+    return render(
+        Page(
+            title="Import",
+            sentence=f"{len(reports.runs)} run{'s' * (len(reports.runs) > 1)} with {frames} kept frames in "
+            f"{intervals} target intervals.",
+            labels=[*samples, *warnings],
+            tables=[PageTable(f"run {r.run}: {r.source}", ["what", "found"], import_rows(r)) for r in reports.runs],
+            pictures=[Picture(f"run {run}", png) for run, png in pictures.items()],
+        )
+    )

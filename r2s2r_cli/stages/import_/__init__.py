@@ -19,10 +19,8 @@ from schemas.results_import import ImportFormat
 from schemas.robot import Robot
 from schemas.sidecar import Sidecar
 
-__all__ = ["FORMATS", "STAGE_VERSION", "ImportedRun", "find_format", "import_source", "merge_runs"]
+__all__ = ["FORMATS", "ImportedRun", "find_format", "import_source", "merge_runs"]
 
-STAGE_VERSION = 1
-"""Raised when the same source gives another recording."""
 FORMATS: tuple[ImportFormat, ...] = ("trajectory_csv", "authors_folder", "tum_rgbd")
 
 

@@ -1,0 +1,141 @@
+"""The frame of the command line: exit codes, where words go, hints, overrides."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from r2s2r_cli import errors
+from r2s2r_cli.app import BUG_MESSAGE, app, run_guarded
+from r2s2r_cli.errors import ExitCode, R2S2RError, UsageError
+from r2s2r_cli.options import parse_overrides
+
+FAMILY = [
+    (errors.UsageError, 2),
+    (errors.GateError, 3),
+    (errors.InputError, 4),
+    (errors.ArtifactError, 4),
+    (errors.HardwareError, 5),
+    (errors.NumericalError, 6),
+]
+
+
+def raising(error: BaseException) -> object:
+    """A call that raises."""
+
+    def call() -> None:
+        raise error
+
+    return call
+
+
+@pytest.mark.parametrize(("kind", "code"), FAMILY)
+def test_every_error_has_its_exit_code(kind: type[R2S2RError], code: int, capsys: pytest.CaptureFixture[str]) -> None:
+    """Each member of the error family leaves with the documented code, its facts and one hint on stderr."""
+    error = kind("it broke", where="here", expected="this", received="that", hint="r2s2r status")
+    assert run_guarded(raising(error), False) == code
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.splitlines() == [
+        "error: it broke", "  where: here", "  expected: this", "  received: that", "hint: r2s2r status",
+    ]  # fmt: skip
+
+
+def test_an_interrupt_leaves_with_130(capsys: pytest.CaptureFixture[str]) -> None:
+    """Ctrl-C is not an error with a traceback."""
+    assert run_guarded(raising(KeyboardInterrupt()), False) == ExitCode.INTERRUPTED
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_a_bug_shows_its_traceback(capsys: pytest.CaptureFixture[str]) -> None:
+    """Only an unexpected exception gives a traceback, and it says that it is our fault."""
+    assert run_guarded(raising(ZeroDivisionError()), False) == ExitCode.BUG
+    err = capsys.readouterr().err
+    assert "Traceback" in err
+    assert BUG_MESSAGE in err
+
+
+def test_an_error_is_a_document_with_json(capsys: pytest.CaptureFixture[str]) -> None:
+    """With --json a failure is one JSON document on stdout, so that a script need not read prose."""
+    run_guarded(raising(UsageError("it broke", where="--set", hint="r2s2r --help")), True)
+    document = json.loads(capsys.readouterr().out)
+    assert (document["schema"], document["exit_code"], document["where"]) == ("r2s2r.error/1", 2, "--set")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["statsu"], "status"),
+        (["status", "--jsno"], "--json"),
+        (["export"], "path"),
+        (["export", "x.h5", "--to", "xlsx"], "csv"),
+        (["init", "--seed", "many"], "--seed"),
+    ],
+)
+def test_misspelt_usage_names_the_cure(arguments: list[str], words: str) -> None:
+    """Unknown commands, options and values leave with 2, name what is near, and end with one hint line."""
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == ExitCode.USAGE
+    assert words in result.stderr
+    assert result.stderr.splitlines()[-1].startswith("hint: r2s2r")
+    assert result.stdout == ""
+
+
+@pytest.mark.parametrize("name", ["--help", "--version"])
+def test_help_and_version_go_to_stdout(name: str) -> None:
+    """What was asked for is data."""
+    result = CliRunner().invoke(app, [name])
+    assert result.exit_code == 0
+    assert "r2s2r" in result.stdout
+    assert result.stderr == ""
+
+
+def test_no_project_is_said_with_a_hint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Outside a project a command says so and how to make one."""
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(app, ["status"])
+    assert result.exit_code == ExitCode.INPUT
+    assert result.stderr.splitlines()[-1].startswith("hint: r2s2r init")
+
+
+def test_a_closed_pipe_is_not_an_error(tmp_path: Path) -> None:
+    """`r2s2r ... | head -1` ends quietly."""
+    command = f"'{sys.executable}' -m r2s2r_cli doctor --quick | head -1"
+    shell = subprocess.run(["bash", "-c", f"set -o pipefail; {command}"], capture_output=True, text=True, cwd=tmp_path)
+    assert "Traceback" not in shell.stderr
+    assert "Exception ignored" not in shell.stderr
+
+
+def test_no_escape_codes_when_piped(tmp_path: Path) -> None:
+    """Piped output is plain text, whatever the terminal."""
+    environment = {**os.environ, "TERM": "xterm-256color"}
+    child = subprocess.run(
+        [sys.executable, "-m", "r2s2r_cli", "doctor", "--quick"], capture_output=True, cwd=tmp_path, env=environment
+    )
+    assert child.returncode == 0
+    assert b"\x1b[" not in child.stdout + child.stderr
+
+
+def test_overrides_are_toml_values() -> None:
+    """--set takes numbers, booleans, lists and bare words."""
+    items = ["a.b=0.5", "a.c=true", "d=[1, 2]", "e=word", "f=1=2"]
+    assert parse_overrides(items) == {"a.b": 0.5, "a.c": True, "d": [1, 2], "e": "word", "f": "1=2"}
+
+
+@pytest.mark.parametrize("item", ["novalue", "=3", ""])
+def test_an_override_without_a_value_is_refused(item: str) -> None:
+    """--set without KEY=VALUE is a usage error."""
+    with pytest.raises(UsageError, match="no value"):
+        parse_overrides([item])
+
+
+def test_typer_errors_are_still_of_one_family() -> None:
+    """Typer vendors click: the exceptions we translate are the ones it raises."""
+    assert issubclass(typer.BadParameter, typer.TyperException)

@@ -1,0 +1,1 @@
+"""What each subcommand does, as functions from values to values. Nothing here touches the project on disk."""

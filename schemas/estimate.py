@@ -15,9 +15,9 @@ from schemas.segments import INTERVALS, SEGMENTS
 class EstimateSettings(Frozen):
     """Settings of `estimate`. The reasons and the figures behind the defaults: docs/concepts/estimate.md."""
 
-    target_kick_m_per_s: Annotated[float, Field(ge=0, le=1)] = Field(
-        default=0.03,
-        description="sudden change of a cap's velocity when the target changes, sd per axis [m/s]; half the speed of a cable",
+    switch_kick_m_per_s: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=0.02,
+        description="sudden change of a cap's velocity when a motor is switched, sd per axis [m/s]; a third of a cable's speed",
     )
     gate_probability: Annotated[float, Field(gt=0, lt=0.5)] = Field(
         default=1e-4,
@@ -66,6 +66,8 @@ GROUND = GroupSpec(
                       "of the run"),
         AttributeSpec(name="shift", type="float", unit="m",
                       description="what was added to z so that the ground lies at z = 0; equals -offset"),
+        AttributeSpec(name="height_error", type="float", unit="m", required=False, description="error of heights that smoothing does not take "
+                      "away: usual height of the third lowest cap, which carries a robot at rest"),
         AttributeSpec(name="tilt_known", type="bool",
                       description="true: the contacts spread widely enough to tell the slope"),
     ),
@@ -107,7 +109,7 @@ FRAMES = GroupSpec(
           "in standard deviations, root mean square over axes", nan_means="not observed, or not used"),
         column("contact", "bool", ("frame", "cap"), "bool", "the cap touches the ground, as far as heights can tell"),
         column("contact_probability", "float64", ("frame", "cap"), "1", "probability that the cap is lower than the clearance and "
-          "neither rises nor falls, from height, velocity and their standard deviations"),
+          "neither rises nor falls, from height, velocity and their standard deviations, height_error included"),
         column("length", "float64", ("frame", "cable"), "m", "distance between the centres of the two end caps of each cable; "
           "the controller of the 3-bar robot counts in this length"),
         column("length_sd", "float64", ("frame", "cable"), "m", "standard deviation of that distance"),
@@ -126,9 +128,9 @@ TRACKS = GroupSpec(
         column("held", "bool", ("cap", "xyz"), "bool", "the source held this coordinate (ground constraint of a tracker): "
           "its noise is not known, the median of the run stands in"),
         column("speed_change", "float64", ("cap",), "m/s", "process noise: standard deviation of the change of velocity "
-          "over 1 s, per axis, at the maximum of the likelihood"),
-        column("innovation_variance", "float64", ("cap",), "1", "mean squared innovation over its variance; 1 where the assumed "
-          "noise is right, below 1 where it is too large"),
+          "over 1 s, per axis, as used: twice the density of highest likelihood"),
+        column("innovation_variance", "float64", ("cap",), "1", "mean squared innovation over its variance, at the highest "
+          "likelihood; 1 where the assumed noise is right, below 1 where it is too large"),
         column("innovation_lag1", "float64", ("cap",), "1", "correlation of neighbouring innovations; 0 where they are white"),
         column("white", "bool", ("cap",), "bool", "that correlation lies within 2 standard deviations of 0"),
     ),

@@ -48,6 +48,8 @@ class GroundFigures(Frozen):
     shift_sd_m: float
     offset_recording_m: float
     """The simpler figure of `import`: cap radius minus mean height of the lowest cap, an upper estimate."""
+    height_error_m: float | None
+    """Usual height of the third lowest cap, which carries a robot at rest: what heights are worth. None: it does not stand on three."""
     slope: tuple[float, float] | None
     slope_sd: tuple[float, float] | None
     """None: the contacts do not spread widely enough."""

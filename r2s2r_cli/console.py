@@ -54,7 +54,7 @@ class Console:
         table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
         for i, name in enumerate(columns):
             numeric = bool(body) and all(_is_number(row[i]) for row in body)
-            table.add_column(name, justify="right" if numeric else "left", overflow="fold")
+            table.add_column(Text(name), justify="right" if numeric else "left", overflow="fold")
         for row in body:
             table.add_row(*(Text(cell) for cell in row))
         width = None if sys.stdout.isatty() else 160

@@ -178,16 +178,17 @@ def _source(path: Path) -> Source:
 
 
 def _draw(data: ArtifactData, report: CalibrationReport, robot: Robot) -> Iterator[tuple[str, bytes]]:
-    from r2s2r_cli.views.calibration import calibration_page, draw_calibration
+    from r2s2r_cli.views.calibration import draw_calibration
+    from r2s2r_cli.views.calibration_page import calibration_page
 
     pictures = dict(draw_calibration(data, robot))
     for name, png in pictures.items():
         yield f"-{name}.png", png
-    yield ".html", calibration_page(data, report, pictures)
+    yield ".html", calibration_page(report, pictures)
 
 
 def _show(report: CalibrationReport, console: Console) -> None:
-    from r2s2r_cli.views.calibration import report_tables
+    from r2s2r_cli.views.calibration_page import report_tables
 
     for table in report_tables(report):
         console.table(table.title, table.columns, table.rows)

@@ -1,0 +1,96 @@
+"""`r2s2r estimate`: 10-record.h5 -> 20-estimate.h5, the state of the robot at every kept frame."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from r2s2r_cli.console import Console
+from r2s2r_cli.options import (
+    DryRunOption,
+    ForceOption,
+    IterationOption,
+    JsonOption,
+    ProjectOption,
+    QuietOption,
+    SetOption,
+    ShowConfigOption,
+    parse_overrides,
+)
+from r2s2r_cli.store.project import Project
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from r2s2r_cli.artifact import ArtifactData
+    from schemas.results_estimate import EstimateReport
+    from schemas.robot import Robot
+
+
+def estimate(
+    project: ProjectOption = None,
+    iteration: IterationOption = None,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+    dry_run: DryRunOption = False,
+    force: ForceOption = False,
+    set_: SetOption = None,
+    show_config: ShowConfigOption = False,
+) -> None:
+    """Estimate states from the observed end caps: smoothed positions with covariance, velocities, poses, contacts.
+
+    Puts the ground at z = 0 and makes the rods rigid; marks outliers and jumps of the tracker instead of hiding them.
+
+    Example: r2s2r estimate --iteration 1
+    """
+    from r2s2r_cli.commands.stage import StageRun, print_config, require_input, show_outcome, wanted
+    from r2s2r_cli.store.header import read_header
+    from r2s2r_cli.store.staleness import artifact_ref
+
+    console = Console(json=json, quiet=quiet)
+    here = Project.find(project)
+    place = here.iteration(iteration)
+    overrides = parse_overrides(set_)
+    if show_config:
+        print_config(wanted(here, place, "estimate", overrides, {}).settings, console)
+        return
+    source = place.artifact("recording")
+    require_input(source, f"r2s2r import run.csv --iteration {place.number}")
+    run = StageRun(
+        stage="estimate", kind="estimate", project=here, iteration=place, console=console,
+        inputs=[artifact_ref(here, source, read_header(source))], overrides=overrides, dry_run=dry_run, force=force,
+    )  # fmt: skip
+    outcome: list[EstimateReport] = []
+
+    def compute() -> tuple[ArtifactData, EstimateReport]:
+        from r2s2r_cli.stages.estimate import estimate as compute_states
+        from r2s2r_cli.store.read import read_artifact
+
+        _, recording = read_artifact(source, "recording")
+        data, report = compute_states(recording, here.robot(), here.config(place, overrides).estimate)
+        outcome.append(report)
+        return data, report
+
+    result = run.run(compute, lambda data, _: _draw(data, here.robot(), outcome[0]))
+    show_outcome(result, console)
+    for report in outcome:
+        _show(report, console)
+
+
+def _draw(data: ArtifactData, robot: Robot, report: EstimateReport) -> Iterator[tuple[str, bytes]]:
+    from r2s2r_cli.views.estimate import draw_estimate
+    from r2s2r_cli.views.estimate_page import estimate_page
+
+    pictures = dict(draw_estimate(data, robot))
+    for run, png in pictures.items():
+        yield f"-{run}.png", png
+    yield ".html", estimate_page(report, data, pictures)
+
+
+def _show(report: EstimateReport, console: Console) -> None:
+    from r2s2r_cli.views.estimate_page import report_tables
+
+    for table in report_tables(report):
+        console.table(table.title, table.columns, table.rows)
+    for run in report.runs:
+        for text in run.warnings:
+            console.warn(f"{run.run}: {text}")

@@ -1,0 +1,97 @@
+"""`r2s2r calibrate` in a project: robot.toml is edited, earlier parts are kept, nothing is chosen for the user."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from r2s2r_cli.store.read import read_artifact
+from tests.commands.conftest import document, invoke
+
+SLOPE_PF_PER_MM, OFFSET_PF = 0.03, 16.0
+MASSES = """
+[[part]]
+name = "rod"
+mass_kg = 0.04
+offset_m = 0.0
+shape = "cylinder"
+radius_m = 0.0016
+length_m = 0.3
+"""
+
+
+@pytest.fixture
+def points(project: Path) -> Path:
+    """Two planted sets of nine exact lines, the second with 1 pF more."""
+    rows = ["file,sensor_id,sensor,length_mm,capacitance_pF"]
+    for name, extra in (("monday", 0.0), ("friday", 1.0)):
+        for sensor in range(9):
+            for length in (100, 120, 140, 160, 180):
+                rows.append(f"{name},{sensor},S{sensor},{length},{OFFSET_PF + extra + SLOPE_PF_PER_MM * length:.4f}")
+    path = project / "points.csv"
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def sensor_zero() -> dict[str, float]:
+    """Sensor 0 of robot.toml."""
+    found: dict[str, float] = tomllib.loads(Path("robot.toml").read_text())["sensors"][0]
+    return found
+
+
+def test_of_several_sets_none_is_chosen(points: Path) -> None:
+    """Without --use robot.toml stays as it is, byte for byte, and the hint names the sets."""
+    before = Path("robot.toml").read_bytes()
+    result = invoke("calibrate", "--points", "points.csv")
+    assert result.exit_code == 0
+    assert "monday" in result.stderr.splitlines()[-1]
+    assert Path("robot.toml").read_bytes() == before
+
+
+def test_the_chosen_set_goes_into_robot_toml(points: Path) -> None:
+    """--use writes the planted line in SI, and every comment and other line survives."""
+    before = Path("robot.toml").read_text().splitlines()
+    assert invoke("calibrate", "--points", "points.csv", "--use", "friday").exit_code == 0
+    assert sensor_zero()["slope_f_per_m"] == pytest.approx(SLOPE_PF_PER_MM * 1e-9, rel=1e-3)
+    assert sensor_zero()["offset_f"] == pytest.approx((OFFSET_PF + 1) * 1e-12, rel=1e-3)
+    assert set(before) - set(Path("robot.toml").read_text().splitlines()) == set()
+
+
+def test_a_later_part_keeps_the_earlier_one(points: Path) -> None:
+    """Masses given later join the sensor lines in calibration.h5; both sources are its inputs."""
+    assert invoke("calibrate", "--points", "points.csv").exit_code == 0
+    Path("masses.toml").write_text(MASSES)
+    answer = document("calibrate", "--masses", "masses.toml")
+    assert set(answer["inputs"]) == {"points.csv", "masses.toml"}
+    _, data = read_artifact(Path("calibration.h5"), "calibration")
+    assert {"lines", "masses"} <= set(data.groups)
+    assert invoke("status", "--check").exit_code == 0
+
+
+def test_a_changed_source_makes_it_stale(points: Path) -> None:
+    """status names the file whose bytes are others."""
+    assert invoke("calibrate", "--points", "points.csv").exit_code == 0
+    points.write_text(points.read_text() + "\n")
+    result = invoke("status", "--check")
+    assert result.exit_code == 3
+    assert "points.csv changed" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        ((), 2),
+        (("--points", "absent.csv"), 4),
+        (("--points", "points.csv", "--use", "mondey"), 2),
+        (("--points", "project.toml"), 4),
+        (("--masses", "points.csv"), 4),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused(points: Path, arguments: tuple[str, ...], code: int) -> None:
+    """Nothing to do, a missing file, an unknown set, a file of another form: refused with a hint, nothing written."""
+    result = invoke("calibrate", *arguments)
+    assert result.exit_code == code
+    assert result.stderr.splitlines()[-1].startswith("hint: ")
+    assert not Path("calibration.h5").exists()

@@ -1,0 +1,188 @@
+"""Stage commands in a project: what they write, when they run again, and what they refuse."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.read import read_artifact
+from tests.commands.conftest import document, invoke
+
+RECORD = "iterations/001/10-record.h5"
+ESTIMATE = "iterations/001/20-estimate.h5"
+
+
+def test_init_overwrites_nothing(project: Path) -> None:
+    """A second init in the same place is refused, and every file stays as it is."""
+    before = {path: path.read_bytes() for path in project.iterdir() if path.is_file()}
+    result = invoke("init", ".")
+    assert result.exit_code == 2
+    assert {path: path.read_bytes() for path in before} == before
+
+
+@pytest.mark.parametrize("robot", ["threebar", "threebar-330", "sixbar"])
+@pytest.mark.parametrize("attachment", ["surface", "rod_end"])
+def test_init_knows_every_robot(tmp_path: Path, robot: str, attachment: str) -> None:
+    """Each robot with each attachment gives a project that validates."""
+    root = tmp_path / "p"
+    assert invoke("init", str(root), "--robot", robot, "--attachment", attachment).exit_code == 0
+    result = invoke("validate", "--project", str(root))
+    assert result.exit_code == 0, result.stderr
+
+
+def test_import_keeps_every_row_of_the_source(project: Path) -> None:
+    """Rows that are left out later are still in the recording, with their reason."""
+    rows = len((project / "sample.csv").read_text().splitlines()) - 1
+    report = document("import", "sample.csv")["report"]["runs"][0]
+    _, data = read_artifact(project / RECORD, "recording")
+    caps = data.groups["runs/sample/caps"]
+    assert len(caps["t"]) == rows == report["rows"]
+    assert (caps["drop_reason"] == 0).sum() == report["kept"] < rows
+
+
+def test_a_fresh_artifact_is_not_made_again(estimated: Path) -> None:
+    """The second run says fresh, leaves every byte, and touches the file so that make rests."""
+    before = {name: (estimated / name).read_bytes() for name in (RECORD, ESTIMATE)}
+    times = {name: (estimated / name).stat().st_mtime_ns for name in before}
+    assert document("import", "sample.csv")["state"] == "fresh"
+    assert document("estimate")["state"] == "fresh"
+    assert {name: (estimated / name).read_bytes() for name in before} == before
+    assert all((estimated / name).stat().st_mtime_ns > time for name, time in times.items())
+
+
+def test_the_same_inputs_give_the_same_content(estimated: Path, tmp_path: Path) -> None:
+    """Another project, the same sample and settings: the content hashes are equal, and inspect --same-as says so."""
+    other = tmp_path / "other"
+    assert invoke("init", str(other), "--sample").exit_code == 0
+    assert invoke("import", "--project", str(other), str(other / "sample.csv")).exit_code == 0
+    assert invoke("estimate", "--project", str(other)).exit_code == 0
+    for name in (RECORD, ESTIMATE):
+        assert read_header(estimated / name).content_sha256 == read_header(other / name).content_sha256
+        assert document("inspect", str(estimated / name), "--same-as", str(other / name))["same"]
+
+
+def test_force_gives_the_same_content_again(estimated: Path) -> None:
+    """--force computes again; nothing but times differs."""
+    before = read_header(estimated / ESTIMATE)
+    assert document("estimate", "--force")["state"] == "done"
+    after = read_header(estimated / ESTIMATE)
+    assert after.content_sha256 == before.content_sha256
+
+
+def test_dry_run_writes_nothing(project: Path) -> None:
+    """--dry-run says what would be made and why, and leaves the directory alone."""
+    before = sorted(project.rglob("*"))
+    answer = document("import", "sample.csv", "--dry-run")
+    assert (answer["state"], answer["reasons"]) == ("dry_run", ["there is no artifact yet"])
+    assert sorted(project.rglob("*")) == before
+
+
+def test_another_log_does_not_replace_a_recording(estimated: Path) -> None:
+    """Importing another log into the same iteration is refused, with the iteration to use instead."""
+    shutil.copy("sample.csv", "second.csv")
+    shutil.copy("sample.toml", "second.toml")
+    result = invoke("import", "second.csv")
+    assert result.exit_code == 2
+    assert result.stderr.splitlines()[-1] == "hint: r2s2r import second.csv --iteration 2"
+    assert invoke("import", "second.csv", "--iteration", "2").exit_code == 0
+
+
+def test_several_logs_become_several_runs(project: Path) -> None:
+    """`import a.csv b.csv` makes one run a file, named by its stem, and estimate takes them all."""
+    shutil.copy("sample.csv", "second.csv")
+    shutil.copy("sample.toml", "second.toml")
+    assert invoke("import", "sample.csv", "second.csv").exit_code == 0
+    assert invoke("estimate").exit_code == 0
+    _, data = read_artifact(project / ESTIMATE, "estimate")
+    assert data.runs() == ["sample", "second"]
+
+
+def test_estimate_without_a_recording_says_what_to_run(project: Path) -> None:
+    """A missing input names the command that makes it."""
+    (project / "iterations/001").mkdir(parents=True)
+    result = invoke("estimate")
+    assert result.exit_code == 4
+    assert "r2s2r import" in result.stderr.splitlines()[-1]
+
+
+def test_settings_come_from_four_layers(estimated: Path) -> None:
+    """project.toml < iteration config.toml < --set; --show-config prints what holds."""
+    key = "contact_clearance_m"
+    shown = lambda *more: document("estimate", "--show-config", *more)[key]  # noqa: E731
+    assert shown() == 0.003
+    text = Path("project.toml").read_text()
+    Path("project.toml").write_text(text.replace(f"{key} = 0.003", f"{key} = 0.004"))
+    assert shown() == 0.004
+    Path("iterations/001/config.toml").write_text(f"[estimate]\n{key} = 0.005\n")
+    assert shown() == 0.005
+    assert shown("--set", f"estimate.{key}=0.006") == 0.006
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("estimate.contact_clearence_m=1", "contact_clearance_m"),
+        ("estimte.contact_clearance_m=1", "estimate"),
+        ("estimate.contact_clearance_m=-1", "greater than 0"),
+        ("estimate.contact_clearance_m=thick", "number"),
+    ],
+)
+def test_a_wrong_override_names_the_right_one(estimated: Path, override: str, words: str) -> None:
+    """A misspelt key or an impossible value of --set is a usage error with the near match."""
+    result = invoke("estimate", "--set", override)
+    assert result.exit_code == 2
+    assert words in result.stderr
+
+
+def test_an_override_is_remembered(estimated: Path) -> None:
+    """What was made with --set is not stale for it, and is made again without it."""
+    assert document("estimate", "--set", "estimate.contact_clearance_m=0.004")["state"] == "done"
+    assert invoke("status", "--check").exit_code == 0
+    answer = document("estimate")
+    assert answer["state"] == "done"
+    assert answer["reasons"] == ["setting estimate.contact_clearance_m was 0.004, is 0.003"]
+
+
+def test_json_of_a_stage_is_one_document(project: Path) -> None:
+    """stdout holds one JSON document and nothing else; the talk is on stderr."""
+    result = invoke("import", "sample.csv", "--json")
+    answer = json.loads(result.stdout)
+    assert answer["schema"] == "r2s2r.stage/1"
+    assert answer["artifact"] == RECORD
+    assert "wrote" in result.stderr
+    assert invoke("import", "sample.csv", "--json", "--quiet", "--force").stderr == ""
+
+
+def test_pages_are_self_contained(estimated: Path) -> None:
+    """The HTML pages refer to nothing outside themselves, and carry the label of the sample."""
+    pages = list((estimated / "iterations/001").glob("*.html"))
+    assert {page.name for page in pages} == {"10-record.html", "20-estimate.html"}
+    for page in pages:
+        text = page.read_text()
+        assert "http" not in text
+        assert "kinematic sample" in text
+        assert "data:image/png;base64," in text
+
+
+def test_the_real_crawl(project: Path, real_dir: Path) -> None:
+    """The published figures of the real crawl: 11 intervals, a third duplicates, 1-4 mm noise, 4 mm ground offset."""
+    report = document("import", str(real_dir / "tribar_crawl" / "crawl.csv"))["report"]["runs"][0]
+    assert report["intervals"] == 11
+    assert 0.30 < report["dropped"]["duplicate"] / report["rows"] < 0.40
+    assert 0.5e-3 < report["noise"]["low_m"] < report["noise"]["high_m"] < 4.5e-3
+    assert 3e-3 < report["ground_offset_m"] < 5e-3
+    assert document("estimate")["state"] == "done"
+
+
+def test_the_real_calibrations(project: Path, real_dir: Path) -> None:
+    """The straight-line residuals of the three real sets are 1.2, 1.6 and 1.9 mm; failed fits are flagged."""
+    folder = real_dir / "tribar_calibration"
+    points, history = folder / "length_capacitance_points.csv", folder / "calibration_history_2025.json"
+    report = document("calibrate", "--points", str(points), "--history", str(history))["report"]
+    assert sorted(round(1e3 * fitted["rms_m"], 1) for fitted in report["sets"]) == [1.2, 1.6, 1.9]
+    dead = [f for f in report["history"]["failed"] if "zero" in f["state"]]
+    assert {(f["date"][:10], f["sensor"]) for f in dead} >= {("2025-01-14", 6), ("2025-01-14", 7), ("2025-01-14", 8)}

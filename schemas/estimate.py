@@ -94,8 +94,8 @@ FRAMES = GroupSpec(
         column("t", "float64", ("frame",), "s", "time since the start of the run"),
         column("source_frame", "int64", ("frame",), "index", "row of the recording's caps that this frame is"),
         column("p_WE", "float64", ("frame", "cap", "xyz"), "m", "end caps: smoothed, rods rigid, on the ground", frame="W"),
-        column("cov_p_WE", "float64", ("frame", "cap", "xyz", "xyz2"), "m^2", "covariance of each end cap; the caps of a rod "
-          "are correlated along it, which is not stored", frame="W"),
+        column("cov_p_WE", "float64", ("frame", "cap", "xyz", "xyz2"), "m^2", "covariance of each end cap, that of "
+          "the ground included; the caps of a rod are correlated along it, which is not stored", frame="W"),
         column("v_WE", "float64", ("frame", "cap", "xyz"), "m/s", "velocity of the end caps", frame="W"),
         column("sd_v_WE", "float64", ("frame", "cap", "xyz"), "m/s", "standard deviation of the velocity, per axis", frame="W"),
         column("p_WR", "float64", ("frame", "rod", "xyz"), "m", "middle between the caps of each rod", frame="W"),

@@ -51,11 +51,13 @@ def _frames(state: RunState) -> Group:
     rod_length = np.array([rod.length_m for rod in state.robot.rods])
     caps = np.array([cable.caps for cable in state.robot.cables])
     length, length_sd = cap_distances(p_WE, rods.cov_p, caps)
+    cov_p = rods.cov_p.copy()
+    cov_p[:, :, 2, 2] += state.ground.shift_sd**2
     datasets = {
         "t": state.t,
         "source_frame": state.kept.astype(np.int64),
         "p_WE": p_WE,
-        "cov_p_WE": rods.cov_p,
+        "cov_p_WE": cov_p,
         "v_WE": rods.v_WE,
         "sd_v_WE": np.sqrt(np.diagonal(rods.cov_v, axis1=2, axis2=3)),
         "p_WR": 0.5 * (p_WE[:, 0::2] + p_WE[:, 1::2]),

@@ -25,6 +25,7 @@ BLUE, ORANGE, GREEN, PURPLE, RED = "#0072b2", "#e69f00", "#009e73", "#cc79a7", "
 _SERIES = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (PURPLE, "D"))
 _GREY, _PALE = "#555555", "#bbbbbb"
 _SWAP = 2
+DAY_S = 86400.0
 
 
 def draw_calibration(data: ArtifactData, robot: Robot) -> Iterator[tuple[str, bytes]]:
@@ -91,27 +92,26 @@ def _sensor(fit: Axes, below: Axes, points: Group, lines: Group, number: int, se
 
 
 def _drift(history: Group, drift: Group) -> bytes:
-    from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
-
     n = history["slope"].shape[1]
     columns = min(3, n)
     rows = math.ceil(n / columns)
     figure = _figure(4.4 * columns, 2.3 * rows + 3.4)
     grid = figure.add_gridspec(rows + 1, columns, height_ratios=(1,) * rows + (1.2,))
     files = list(dict.fromkeys(_texts(history, "file")))
+    ticks = sorted({round(t / DAY_S) for t in np.linspace(history["time"].min(), history["time"].max(), 4)})
+    labels = [f"{datetime.fromtimestamp(DAY_S * day, UTC):%d %b\n%Y}" for day in ticks]
     first: Axes | None = None
     for sensor in range(n):
         row, column = divmod(sensor, columns)
         axes = figure.add_subplot(grid[row, column], sharex=first, sharey=first)
         first = first or axes
         _drift_panel(axes, history, drift, sensor, files)
-        axes.xaxis.set_major_locator(AutoDateLocator(maxticks=6))
-        axes.xaxis.set_major_formatter(ConciseDateFormatter(axes.xaxis.get_major_locator()))
+        axes.set_xticks(ticks, labels)
         if column == 0:
             axes.set_ylabel("deviation [mm]")
     if first is not None:
-        handles, labels = first.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncol=len(labels), fontsize=9, frameon=False)
+        handles, names = first.get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside lower center", ncol=len(names), fontsize=9, frameon=False)
     _drift_sizes(figure.add_subplot(grid[rows, :]), history, drift)
     figure.suptitle(
         "drift: length that one and the same capacitance means, calibration after calibration\n"
@@ -124,7 +124,7 @@ def _drift_panel(axes: Axes, history: Group, drift: Group, sensor: int, files: l
     file = np.array(_texts(history, "file"))
     state, slope, offset = (history[key][:, sensor] for key in ("state", "slope", "offset"))
     middle = history["range"][sensor].mean()
-    dates = np.array([datetime.fromtimestamp(t, UTC) for t in history["time"]])
+    dates = history["time"] / DAY_S
     swapped = drift["after"][(drift["sensor"] == sensor) & (drift["state"] == _SWAP)]
     for i, name in enumerate(files):
         color, marker = _SERIES[i % len(_SERIES)]

@@ -17,6 +17,12 @@ from r2s2r_cli.stages.calibrate.source import Source, near
 ZERO_SLOPE_F_PER_M = 1e-13
 """0.01 pF (the last digit that the boards send) over 100 mm of stretch: below it a slope is zero."""
 
+MAX_SLOPE_F_PER_M = 1e-8
+"""10 pF/mm, 300 times a real sensor: suspect, however few sets there are to compare with."""
+
+MAX_NUMBER = 1e100
+"""Larger numbers are damage, not failed fits."""
+
 SUSPECT_FACTOR = 1.6
 """A slope this far from the sensor's median is suspect. In the 17 real sets that this was chosen on, 142 slopes lie
 between 0.76 and 1.39 of the median and five lie outside 0.53 to 1.79, with nothing between."""
@@ -87,6 +93,7 @@ def flag_slopes(slope: np.ndarray) -> np.ndarray:
     state = np.zeros(slope.shape, dtype=np.uint8)
     state[slope < 0] = NEGATIVE
     state[np.abs(slope) < ZERO_SLOPE_F_PER_M] = ZERO
+    state[slope > MAX_SLOPE_F_PER_M] = SUSPECT
     for sensor in range(slope.shape[1]):
         positive = state[:, sensor] == GOOD
         if positive.sum() >= MIN_FOR_MEDIAN:
@@ -176,7 +183,7 @@ def _numbers(values: Any, where: str, n_sensors: int) -> list[float]:
             hint="give one number per sensor, in the order of the [[sensors]] tables of robot.toml",
         )  # fmt: skip
     for i, value in enumerate(values):
-        number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
+        number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < MAX_NUMBER
         if not number or not math.isfinite(value):
             raise InputError(
                 "not a finite number", where=f"{where}, sensor {i}", expected="a finite number",

@@ -6,6 +6,7 @@ curve, the average used in the simulator.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -31,6 +32,9 @@ ZERO_FORCE = 0.05
 
 MIN_STRETCH_M = 1e-3
 """A curve that ends below 1 mm is no tendon test: the unit is wrong."""
+
+MAX_FORCE_N = 1e5
+"""The weight of 10 t: such a number is not a force in newtons."""
 
 GRID = 101
 """Points of the band."""
@@ -144,22 +148,28 @@ def force_of(k: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 def stiffness_min(k: np.ndarray | Sequence[float], x_max: float) -> float:
     """Smallest slope k1 + 2 k2 x + 3 k3 x^2 [N/m] on 0..x_max: at an end or at the vertex -k2 / (3 k3)."""
+    k1, k2, k3 = (float(value) for value in k)
     at = [0.0, x_max]
-    if k[2] != 0 and 0 < (vertex := -k[1] / (3 * k[2])) < x_max:
-        at.append(float(vertex))
-    return float(min(k[0] + x * (2 * k[1] + 3 * k[2] * x) for x in at))
+    if 0 < -k2 < 3 * k3 * x_max:
+        at.append(-k2 / (3 * k3))
+    return min(k1 + x * (2 * k2 + 3 * k3 * x) for x in at)
 
 
 def falls_from(k: np.ndarray) -> float:
     """First displacement [m], beyond zero, from which the force of the cubic falls; infinity if it never does.
 
-    The smallest positive root of the derivative at which the slope changes from plus to minus (0 if it starts below).
+    The smallest positive root of the derivative at which the slope goes from plus to minus (0 if it starts below zero).
+    The roots are q / (3 k3) and k1 / q with q = -k2 -+ sqrt(k2^2 - 3 k1 k3): exact also where k3 is all but zero.
     """
-    if k[0] < 0 or (k[0] == 0 and (k[1] < 0 or (k[1] == 0 and k[2] < 0))):
+    k1, k2, k3 = (float(value) for value in k)
+    if k1 < 0 or (k1 == 0 and (k2 < 0 or (k2 == 0 and k3 < 0))):
         return 0.0
-    roots = Polynomial([k[0], 2 * k[1], 3 * k[2]]).trim().roots()
-    falling = [float(x) for x in roots.real[roots.imag == 0] if x > 0 and 2 * k[1] + 6 * k[2] * x < 0]
-    return min(falling, default=float("inf"))
+    inside = k2**2 - 3 * k1 * k3
+    if inside < 0:
+        return math.inf
+    q = -k2 - math.copysign(math.sqrt(inside), k2)
+    roots = [top / bottom for top, bottom in ((q, 3 * k3), (k1, q)) if bottom != 0]
+    return min((x for x in roots if x > 0 and k2 + 3 * k3 * x < 0), default=math.inf)
 
 
 def _check(curve: Curve, where: str, lines: np.ndarray, robot: Robot) -> None:
@@ -191,6 +201,12 @@ def _check(curve: Curve, where: str, lines: np.ndarray, robot: Robot) -> None:
             "a stretch that no cable of this robot can have", where=where,
             expected=f"an end between {1e3 * MIN_STRETCH_M:g} and {1e3 * longest:.0f} mm",
             received=f"{1e3 * x.max():.6g} mm", hint="name the column by its unit, displacement_mm or displacement_m",
+        )  # fmt: skip
+    if np.abs(force).max() > MAX_FORCE_N:
+        row = int(np.argmax(np.abs(force)))
+        raise InputError(
+            "a force that no tendon bears", where=f"{where}, line {lines[row]}", expected=f"up to {MAX_FORCE_N:g} N",
+            received=f"{force[row]:.6g} N", hint="give the force in newtons",
         )  # fmt: skip
     if force.max() <= 0 or force.min() < -ZERO_FORCE * force.max():
         row = int(np.argmin(force))

@@ -69,6 +69,7 @@ def test_failed_and_suspect_slopes_are_told_apart() -> None:
 def test_two_slopes_have_no_median_to_be_suspect_against() -> None:
     """With two sets nobody can say which one is wrong."""
     assert flag_slopes(np.array([[3e-11], [9e-11]]))[:, 0].tolist() == [GOOD, GOOD]
+    assert flag_slopes(np.array([[3e-11], [9e80]]))[:, 0].tolist() == [GOOD, SUSPECT]
 
 
 def test_a_shifted_offset_is_the_length_change_in_closed_form() -> None:
@@ -93,7 +94,7 @@ def test_copied_lines_are_no_measurements() -> None:
     assert first.state == CARRIED_OVER and first.change == 0.0
     assert (second.before, second.after, second.elapsed) == (0, 2, 10 * DAY)
     found = spread((first, second))
-    assert (found.n, found.median) == (1, pytest.approx(5e-3))
+    assert found.n == 1 and found.median == pytest.approx(5e-3)
     assert found.median_rate == pytest.approx(5e-3 / (10 * DAY))
 
 
@@ -130,11 +131,9 @@ def test_median_and_percentile_of_planted_changes() -> None:
 def test_the_working_range_of_the_robot(robot: Robot) -> None:
     """Without a points table: actuated cables over the controller's range, passive ones from their rest length up."""
     ranges = working_range(robot, None)
-    low = robot.pid.min_length_m
+    low, rest = robot.pid.min_length_m, robot.cables[6].rest_length_m or 0.0
     np.testing.assert_allclose(ranges.lengths[:6], [[low, low + robot.pid.range_m]] * 6)
-    np.testing.assert_allclose(
-        ranges.lengths[6:], [[robot.cables[6].rest_length_m, robot.limits.cable_length_max_m]] * 3
-    )
+    np.testing.assert_allclose(ranges.lengths[6:], [[rest, robot.limits.cable_length_max_m]] * 3)
 
 
 @pytest.mark.parametrize(

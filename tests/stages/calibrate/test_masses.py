@@ -15,7 +15,7 @@ from schemas.robot import Lump, Robot
 
 def lump(mass: float, offset: float, shape: Any = "point", **sizes: float) -> Lump:
     """A part with a name that does not matter."""
-    return Lump(name="part", mass_kg=mass, offset_m=offset, shape=shape, **sizes)  # type: ignore[arg-type]
+    return Lump(name="part", mass_kg=mass, offset_m=offset, shape=shape, **sizes)
 
 
 @given(st.floats(1e-3, 1), st.floats(1e-3, 1), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))

@@ -104,6 +104,8 @@ def test_where_a_cubic_falls() -> None:
     """The first fall, in closed form: for k1 x + k2 x^2 it is -k1 / (2 k2)."""
     assert falls_from(np.array([80.0, -400.0, 0.0])) == pytest.approx(0.1)
     assert falls_from(np.array([80.0, 0.0, -3000.0])) == pytest.approx(np.sqrt(80 / 9000))
+    assert falls_from(np.array([80.0, -400.0, 1e-13])) == pytest.approx(0.1, rel=1e-12)
+    assert falls_from(np.array([80.0, -1000.0, 4000.0])) == pytest.approx((1000 - np.sqrt(40000)) / 12000)
     assert falls_from(np.array([80.0, -300.0, 4000.0])) == np.inf
     assert falls_from(np.array([80.0, 0.0, 0.0])) == np.inf
     assert falls_from(np.array([-1.0, 100.0, 0.0])) == 0.0
@@ -139,6 +141,7 @@ def table(x: list[object], force: list[object], header: str = "displacement_mm,f
         (table([0, 10, 20, 30, 40], [0, -1, -2, -3, -4]), "pushes"),
         (table([0, 10, 20, 30, 40], [0, 1, 2, -1, 4]), "pushes"),
         (table([0, 10, 20, 30, 40], [0, 0, 0, 0, 0]), "pushes"),
+        (table([0, 10, 20, 30, 40], [0, 1, 2, 3, "4e300"]), "no tendon bears"),
         (table([0, 10, "nan", 30, 40], [0, 1, 2, 3, 4]), "not a number"),
         (table([0, 10, 20, 30, 40], [0, 1, 2, "inf", 4]), "not a number"),
         (table([0, 10, 20, 30, 40], [0, 1, 2, 3, 4], "displacement_m,force_N"), "a stretch that no cable"),

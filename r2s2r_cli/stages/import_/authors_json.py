@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.import_.files import decode, quoted, shown
+from r2s2r_cli.stages.import_.files import clipped, decode, quoted, shown
 
 PF, MM = 1e-12, 1e-3
 G_M_PER_S2 = 9.80665
@@ -63,7 +63,11 @@ def parse_json(data: bytes, where: str, what: str) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         reason = "nested too deep" if isinstance(error, RecursionError) else str(error)
         raise InputError(
-            f"{what} is not usable JSON", where=where, received=shown(reason).strip("'\""), hint=f"cat {quoted(where)}"
+            f"{what} is not usable JSON",
+            where=where + _infinity(text),
+            expected="objects of plain numbers, each key once",
+            received=clipped(reason),
+            hint=f"python3 -m json.tool {quoted(where)}",
         ) from error
     if not isinstance(tree, dict):
         raise InputError(
@@ -121,7 +125,7 @@ def number(value: object, where: str) -> float:
         "a value is not a number",
         where=where,
         expected="a finite number, or null for what was not received",
-        received=shown(json.dumps(value)),
+        received=clipped(json.dumps(value)),
         hint="correct the value, or take this frame's files out",
     )
 
@@ -201,6 +205,12 @@ def _constant(name: str) -> float:
     raise ValueError(f"{name} is not a JSON number")
 
 
+def _infinity(text: str) -> str:
+    """`:line:column` of the first Infinity, which the parser reports without its place; else empty."""
+    at = text.find("Infinity")
+    return f":{text.count(chr(10), 0, at) + 1}:{at - text.rfind(chr(10), 0, at)}" if at >= 0 else ""
+
+
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, value in pairs:
@@ -215,6 +225,6 @@ def _wrong(where: str, key: str, expected: str, received: str) -> InputError:
         "a frame is not as the recorder writes it",
         where=f"{where}: {key}" if key else where,
         expected=expected,
-        received=shown(received),
+        received=clipped(received),
         hint=f"python3 -m json.tool {quoted(where.split(': ')[0])}",
     )

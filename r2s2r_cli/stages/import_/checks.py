@@ -21,6 +21,8 @@ RIGID_SD_M = 0.010
 """A rod whose length varies by more than this is not tracked as one rigid rod: four times the tracker's noise."""
 NEAR_GROUND_M = 0.05
 """The lowest cap of a robot on the ground lies within this of its radius, whatever the tracker's bias."""
+TWISTED = 0.1
+"""Triple product of three rod axes beyond which the handedness of a robot is clear."""
 CLEARLY_M = 0.010
 """Margin that one axis must win by before another is called the up axis."""
 
@@ -43,7 +45,7 @@ def check_rod_length(
     expected = np.array([rod.length_m for rod in robot.rods])
     ratio = length / expected
     if np.abs(ratio - 1).max() > tolerance:
-        raise _wrong_length(length, sd, expected, where, unit, tolerance, known_rods or {})
+        raise _wrong_length(p_WE, expected, where, unit, tolerance, known_rods or {})
     return [
         f"rod {i} is not rigid: its length varies by {1e3 * s:.1f} mm (sd), more than {1e3 * RIGID_SD_M:.0f} mm"
         for i, s in enumerate(sd)
@@ -52,19 +54,18 @@ def check_rod_length(
 
 
 def _wrong_length(
-    length: np.ndarray,
-    sd: np.ndarray,
+    p_WE: np.ndarray,
     expected: np.ndarray,
     where: str,
     unit: LengthUnit,
     tolerance: float,
     known_rods: Mapping[str, Sequence[float]],
 ) -> InputError:
+    length, sd = fit_rod_length(p_WE)
     values = ", ".join(f"{value:.4g}" for value in length)
     robot_values = ", ".join(f"{value:.4g}" for value in expected)
     for word, size in UNITS.items():
-        factor = UNITS[unit] / size
-        if word != unit and np.abs(length / expected * (1 / factor) - 1).max() <= tolerance:
+        if word != unit and np.abs(length * (size / UNITS[unit]) / expected - 1).max() <= tolerance:
             return InputError(
                 f"the end caps are in {UNIT_WORDS[word]}, the columns say {UNIT_WORDS[unit]}",
                 where=where,
@@ -73,6 +74,15 @@ def _wrong_length(
                 hint=f"say so in the header: sed -i.bak -e '1s/_{unit},/_{word},/g' -e '1s/_{unit}$/_{word}/' "
                 f"{quoted(where)}",
             )
+    pairs = _pairs(p_WE, expected, tolerance)
+    if pairs:
+        return InputError(
+            "the caps are numbered otherwise: caps 2 i and 2 i + 1 are not the two ends of rod i",
+            where=where,
+            expected=f"rods of {robot_values} m between caps 0-1, 2-3 ...",
+            received=f"{values} m; rods of that length lie between caps {pairs}",
+            hint="rename the cap columns so that caps 0, 1 belong to the first rod of robot.toml, 2, 3 to the second",
+        )
     if (sd > RIGID_SD_M).any():
         return InputError(
             "caps 2 i and 2 i + 1 do not keep their distance, so they are not the two ends of rod i",
@@ -93,6 +103,16 @@ def _wrong_length(
         received=f"{values} m",
         hint=remedy,
     )
+
+
+def _pairs(p_WE: np.ndarray, expected: np.ndarray, tolerance: float) -> str:
+    """Pairs of caps (`0-5, 1-2`) at the length of a rod in every frame, if each cap has just one such partner."""
+    apart = np.linalg.norm(p_WE[:, :, None] - p_WE[:, None], axis=-1)
+    length, sd = np.median(apart, axis=0), apart.std(axis=0)
+    fits = (np.abs(length / expected.mean() - 1) <= tolerance) & (sd <= RIGID_SD_M)
+    if not (fits.sum(axis=1) == 1).all():
+        return ""
+    return ", ".join(f"{i}-{j}" for i, j in np.argwhere(fits) if i < j)
 
 
 def _best_robot(length: np.ndarray, known_rods: Mapping[str, Sequence[float]], tolerance: float) -> str:
@@ -130,6 +150,34 @@ def check_up_axis(p_WE: np.ndarray, cap_radius: np.ndarray, where: str) -> list[
                 raise _not_up(name, where, unsteady, offset)
         return [f"the ground lies at z = {offset['z']:.3f} m, far from 0: `estimate` must shift it"]
     return []
+
+
+def check_handedness(p_WE: np.ndarray, robot: Robot, where: str) -> None:
+    """Refuse the mirror image of a three-rod robot: a left-handed frame, or the ends of a rod exchanged.
+
+    p_WE: end caps of the kept frames [m], shape (frame, cap, xyz). The triple product of the three rod axes keeps its
+    sign as long as the robot does not turn inside out (real crawl -0.81 .. -0.17, rest state -0.86).
+    Raises InputError.
+    """
+    if len(robot.rods) != 3:
+        return
+    seen, own = _triple_product(p_WE), _triple_product(np.array(robot.rest_caps_m))
+    typical = float(np.median(seen))
+    opposite = float((seen * own < 0).mean())
+    if abs(own) > TWISTED and abs(typical) > TWISTED and opposite > 0.95:
+        raise InputError(
+            "the robot in the data is the mirror image of the one in robot.toml",
+            where=where,
+            expected=f"triple product of the rod axes like that of rest_caps_m, {own:+.2f}",
+            received=f"{typical:+.2f}",
+            hint="look for a left-handed frame (one axis negated, or two exchanged) or exchanged ends of a rod",
+        )
+
+
+def _triple_product(p_WE: np.ndarray) -> np.ndarray:
+    """Of the unit vectors along three rods, even cap to odd cap; shape (...,)."""
+    axis = p_WE[..., 1::2, :] - p_WE[..., 0::2, :]
+    return np.linalg.det(axis / np.linalg.norm(axis, axis=-1, keepdims=True))
 
 
 _TURN = {

@@ -9,7 +9,7 @@ import numpy as np
 
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.import_.checks import UNITS
-from r2s2r_cli.stages.import_.files import nearest, quoted, shown
+from r2s2r_cli.stages.import_.files import clipped, nearest, quoted, shown
 from r2s2r_cli.stages.import_.table import Table
 from schemas.results_import import LengthUnit
 from schemas.robot import Robot
@@ -61,22 +61,25 @@ def find_columns(table: Table, robot: Robot) -> Columns:
     known = [*needed, *([] if has_control else control), *length]
     for i, name in enumerate(table.names):
         if name not in known:
+            near = nearest(name, known)
             raise InputError(
-                f"unknown column {shown(name)}{nearest(name, known)}",
+                f"unknown column {shown(name)}" + (f" (did you mean {near!r}?)" if near else ""),
                 where=f"{where}, column {i + 1}",
                 expected=f"t_s, cap0_x_{unit} .. cap{n_caps - 1}_z_{unit}, target0 .. target{n_actuated - 1}, "
                 f"control0 .., length0_{unit} ..",
                 received=shown(name),
-                hint=f"rename it, or take it out: cut -d, --complement -f{i + 1} {quoted(table.where)} > fewer.csv",
+                hint=f"rename it: sed -i.bak '1s/{name}/{near}/' {quoted(table.where)}"
+                if near and re.fullmatch(r"\w+", name)
+                else f"take it out: cut -d, --complement -f{i + 1} {quoted(table.where)} > fewer.csv",
             )
     absent = [name for name in needed if name not in index]
     if absent:
         raise InputError(
             f"the column {absent[0]} is missing" + (f", and {len(absent) - 1} more" if absent[1:] else ""),
             where=where,
-            expected=", ".join(needed[:4]) + " ...",
-            received=shown(", ".join(table.names)),
-            hint=f"add it to the header and to every row: {', '.join(absent[:6])}",
+            expected=", ".join(absent[:8]),
+            received=clipped(", ".join(table.names)),
+            hint="add it to the header and to every row; docs/guides/import.md lists the columns",
         )
     lengths = [(j, index[name]) for j, name in enumerate(length) if name in index]
     return Columns(

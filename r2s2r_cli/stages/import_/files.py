@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import difflib
 import os
 import shlex
@@ -24,14 +25,25 @@ _SHOWN = 60
 
 def shown(value: object) -> str:
     """A value as it may stand in a message: printable, in quotes, at most 60 characters."""
-    text = repr(value) if isinstance(value, str) else str(value)
+    return clipped(repr(value) if isinstance(value, str) else str(value))
+
+
+def clipped(text: str) -> str:
+    """A printable text of at most 60 characters."""
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}... ({len(text)} characters)"
 
 
 def nearest(name: str, known: list[str]) -> str:
+    """The known name that a misspelt one is nearest to, whatever its case; empty where none is near."""
+    lower = {word.lower(): word for word in known}
+    close = difflib.get_close_matches(name.lower(), lower, n=1)
+    return lower[close[0]] if close else ""
+
+
+def did_you_mean(name: str, known: list[str]) -> str:
     """` (did you mean ...?)` for a misspelt name, else empty."""
-    close = difflib.get_close_matches(name, known, n=1)
-    return f" (did you mean {close[0]!r}?)" if close else ""
+    close = nearest(name, known)
+    return f" (did you mean {close!r}?)" if close else ""
 
 
 def file_size(path: Path, what: str, *, limit: int) -> int:
@@ -114,12 +126,13 @@ class FileBytes:
 def decode(data: bytes, what: str, where: str) -> str:
     """UTF-8 text, a byte-order mark taken off. Raises InputError with line and column of the first bad byte."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        encoding = "UTF-32" if data.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)) else "UTF-16"
         raise InputError(
-            f"{what} is UTF-16 text",
+            f"{what} is {encoding} text",
             where=where,
             expected="UTF-8",
-            received="a UTF-16 byte-order mark",
-            hint=f"iconv -f UTF-16 -t UTF-8 {quoted(where)} > utf8.csv",
+            received=f"a {encoding} byte-order mark",
+            hint=f"iconv -f {encoding} -t UTF-8 {quoted(where)} > utf8.txt",
         )
     zero = data.find(b"\0")
     if zero >= 0:
@@ -140,7 +153,7 @@ def decode(data: bytes, what: str, where: str) -> str:
             where=f"{where}:{line}:{column}",
             expected="UTF-8",
             received=f"byte 0x{data[error.start]:02x}",
-            hint=f"iconv -f LATIN1 -t UTF-8 {quoted(where)} > utf8.csv",
+            hint=f"iconv -f LATIN1 -t UTF-8 {quoted(where)} > utf8.txt",
         ) from error
 
 
@@ -159,7 +172,7 @@ def _status(path: Path, what: str) -> os.stat_result:
 
 def _sibling(path: Path) -> str:
     try:
-        return nearest(path.name, [entry.name for entry in path.parent.iterdir()])
+        return did_you_mean(path.name, [entry.name for entry in path.parent.iterdir()])
     except (OSError, ValueError):
         return ""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from pydantic import ValidationError
 
 from r2s2r_cli.artifact import Scalar
 from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.import_.files import MAX_TEXT_BYTES, decode, nearest, quoted, read_source, shown
+from r2s2r_cli.stages.import_.files import MAX_TEXT_BYTES, clipped, decode, did_you_mean, quoted, read_source, shown
 from schemas.robot import Robot
 from schemas.sidecar import MINIMAL_SIDECAR, Sidecar, SidecarPid
 
@@ -46,11 +47,16 @@ def parse_sidecar(data: bytes, where: str) -> Sidecar:
         tree = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         reason = "tables nested too deep" if isinstance(error, RecursionError) else str(error)
+        at = re.search(r" \(at line (\d+), column (\d+)\)", reason)
         raise InputError(
-            "the sidecar is not TOML", where=where, received=shown(reason).strip("'\""), hint=f"cat -n {quoted(where)}"
+            "the sidecar is not TOML",
+            where=f"{where}:{at[1]}:{at[2]}" if at else where,
+            expected="key = value lines and [pid]",
+            received=clipped(reason.replace(at[0], "") if at else reason),
+            hint=f"cat -n {quoted(where)}",
         ) from error
     try:
-        return Sidecar.model_validate(tree)
+        return Sidecar.model_validate(tree, strict=True)
     except ValidationError as error:
         raise _invalid(error, where) from error
     except RecursionError as error:
@@ -100,13 +106,16 @@ def pid_attributes(pid: SidecarPid) -> dict[str, Scalar]:
 
 
 def _invalid(error: ValidationError, where: str) -> InputError:
-    first = error.errors(include_url=False)[0]
+    errors = error.errors(include_url=False)
+    unknown = [entry for entry in errors if entry["type"] == "extra_forbidden"]
+    # A misspelt key is reported twice, as missing and as unknown; the second says how it is spelt.
+    first = next((e for e in unknown if did_you_mean(str(e["loc"][-1]), _known_keys(e["loc"][:-1]))), errors[0])
     place = first["loc"]
     key = ".".join(shown(str(part)).strip("'\"") for part in place)
     if first["type"] == "extra_forbidden":
         known = _known_keys(place[:-1])
         return InputError(
-            f"the sidecar has the unknown key {key}{nearest(str(place[-1]), known)}",
+            f"the sidecar has the unknown key {key}{did_you_mean(str(place[-1]), known)}",
             where=where,
             expected=", ".join(known),
             received=key,
@@ -122,7 +131,7 @@ def _invalid(error: ValidationError, where: str) -> InputError:
     return InputError(
         f"the sidecar's {key} is wrong",
         where=where,
-        expected=first["msg"],
+        expected="a table" if first["type"] == "model_type" else first["msg"].removeprefix("Input should be "),
         received=shown(first["input"]),
         hint=f"grep -n {quoted(str(place[-1])[:60] if place else '=')} {quoted(where)}",
     )

@@ -108,6 +108,22 @@ def _header(cells: list[str], text: str, where: str) -> tuple[str, ...]:
             hint=f"head -n 1 {quoted(where)} | cut -c1-300",
         )
     names = tuple(cell.strip() for cell in cells)
+    if names[0].startswith("#"):
+        raise InputError(
+            "the CSV begins with a comment",
+            where=f"{where}:1",
+            expected="the names of the columns",
+            received=shown(line),
+            hint=f"put it into the sidecar's source: grep -v '^#' {quoted(where)} > plain.csv",
+        )
+    if "" in names:
+        raise InputError(
+            "a column has no name",
+            where=f"{where}:1, column {names.index('') + 1}",
+            expected="a name",
+            received="nothing: a comma too many?",
+            hint=f"name it, or take it out: cut -d, --complement -f{names.index('') + 1} {quoted(where)} > fewer.csv",
+        )
     if all(_number(name) is not None for name in names):
         raise InputError(
             "the first line must name the columns",

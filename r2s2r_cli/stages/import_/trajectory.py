@@ -9,7 +9,7 @@ import numpy as np
 from r2s2r_cli.artifact import Group, Scalar
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages import frames
-from r2s2r_cli.stages.import_.checks import ROD_TOLERANCE, UNITS, check_rod_length, check_up_axis
+from r2s2r_cli.stages.import_.checks import ROD_TOLERANCE, UNITS, check_handedness, check_rod_length, check_up_axis
 from r2s2r_cli.stages.import_.columns import Columns, find_columns
 from r2s2r_cli.stages.import_.run import (
     NO_NATURE,
@@ -75,6 +75,7 @@ def import_trajectory(
         p_kept, robot, where=where, unit=columns.unit, tolerance=rod_length_tolerance, known_rods=known_rods
     )
     warnings += check_up_axis(p_kept, radius, where)
+    check_handedness(p_kept, robot, where)
 
     attributes = run_attributes(sidecar, robot, "trajectory_csv")
     intervals = target_intervals(
@@ -121,7 +122,7 @@ def import_trajectory(
             }
         )
     if noise is not None and noise.held:
-        warnings.append(f"quieter than a fifth of the typical noise, as if the source held them: {', '.join(noise.held)}")
+        warnings.append(f"far quieter than the rest, as if the source held them: {', '.join(noise.held)}")
     if facts.gap_median is not None and facts.gap_median > SLOW_GAP_S:
         warnings.append(f"the median gap between frames is {facts.gap_median:g} s: is t_s in milliseconds?")
     if sidecar.nature is None:

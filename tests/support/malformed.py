@@ -1,0 +1,327 @@
+"""Malformed inputs of `import`, in a fixed order: 200 and more CSV, TOML and JSON texts, each with a name.
+
+`accepted` marks the few that are unusual and yet say exactly what they mean; everything else must be refused.
+Base of all: `small_csv()`, `SIDECAR` and `frame_json()` of `tests.support.import_samples`.
+"""
+
+from __future__ import annotations
+
+import codecs
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from tests.support.import_samples import SIDECAR, frame_json, small_csv
+
+JUNK = (
+    "abc", "1.2.3", "0x1F", "1e999", "-1e999", "--1", "1 2", "\u0663", "1_000", "#REF!", "NULL", "None", "TRUE", "-",
+    ".", "1e", "inf", "-Infinity", "1;5", "0.1m", "\u22121", "1\u00a00", "'1'", "=1+1", "9" * 400 + "e999", "\x1b[31m1",
+)  # fmt: skip
+"""Cells that are no plain finite decimal number."""
+
+
+@dataclass(frozen=True)
+class Malformed:
+    """One input."""
+
+    name: str
+    data: bytes
+    accepted: bool = False
+
+
+Row = list[str]
+
+
+def _table(edit: Callable[[list[Row]], list[Row]]) -> bytes:
+    """The good CSV with its table edited; row 0 is the header."""
+    rows = edit([line.split(",") for line in small_csv().splitlines()])
+    return ("\n".join(",".join(row) for row in rows) + "\n").encode()
+
+
+def _each(edit: Callable[[Row], Row]) -> bytes:
+    """The good CSV with every data row edited."""
+    return _table(lambda rows: [rows[0], *(edit(row) for row in rows[1:])])
+
+
+def _put(row: Row, column: int | slice, value: str | Row) -> Row:
+    new = list(row)
+    new[column] = value  # type: ignore[call-overload]
+    return new
+
+
+def _set(row: int, column: int, value: str) -> bytes:
+    return _table(lambda rows: [_put(cells, column, value) if i == row else cells for i, cells in enumerate(rows)])
+
+
+def _without_columns(*columns: int) -> bytes:
+    return _table(lambda rows: [[cell for i, cell in enumerate(row) if i not in columns] for row in rows])
+
+
+def _with_column(name: str, value: str = "0") -> bytes:
+    return _table(lambda rows: [[*row, value if i else name] for i, row in enumerate(rows)])
+
+
+def _scaled(factor: float, columns: slice) -> bytes:
+    return _each(lambda row: _put(row, columns, [repr(factor * float(cell)) for cell in row[columns]]))
+
+
+def _turned(row: Row, axes: tuple[int, int, int], signs: tuple[float, float, float]) -> Row:
+    """A row with the axes of all caps exchanged and signed."""
+    caps = [row[i : i + 3] for i in range(1, 19, 3)]
+    return _put(row, _CAPS, [repr(sign * float(cap[k])) for cap in caps for k, sign in zip(axes, signs, strict=True)])
+
+
+_CAPS, _TARGETS, _CONTROLS = slice(1, 19), slice(19, 25), slice(25, 31)
+
+
+def csv_cases() -> list[Malformed]:
+    """Malformed trajectory CSVs."""
+    good = small_csv()
+    raw = good.encode()
+    lines = good.splitlines()
+    header = lines[0]
+    cases = [
+        Malformed("empty", b""),
+        Malformed("only_blanks", b" \n\n \n"),
+        Malformed("only_bom", codecs.BOM_UTF8),
+        Malformed("only_header", (header + "\n").encode()),
+        Malformed("no_header", "\n".join(lines[1:]).encode()),
+        Malformed("semicolons", good.replace(",", ";").encode()),
+        Malformed("semicolons_decimal_comma", good.replace(",", ";").replace(".", ",").encode()),
+        Malformed("tabs", good.replace(",", "\t").encode()),
+        Malformed("bars", good.replace(",", "|").encode()),
+        Malformed("blanks", good.replace(",", " ").encode()),
+        Malformed("comment_line", ("# a comment\n" + good).encode()),
+        Malformed("utf16", good.encode("utf-16")),
+        Malformed("utf16_without_bom", good.encode("utf-16-le")),
+        Malformed("utf32", good.encode("utf-32")),
+        Malformed("latin1", raw.replace(b"t_s", "t_s\u00e9".encode("latin-1"))),
+        Malformed("bad_utf8_in_cell", raw.replace(b"0.1,", b"0.1\xff,", 1)),
+        Malformed("nul_byte", raw[:200] + b"\0" + raw[200:]),
+        Malformed("nul_tail", raw + b"\0" * 4096),
+        Malformed("binary", bytes(range(256)) * 20),
+        Malformed("hdf5", b"\x89HDF\r\n\x1a\n" + raw),
+        Malformed("gzip", b"\x1f\x8b\x08\0" + raw),
+        Malformed("json", json.dumps(frame_json()).encode()),
+        Malformed("html", b"<!doctype html><html><body>Not found</body></html>"),
+        Malformed("open_quote", raw.replace(b"cap0_x_m", b'"cap0_x_m')),
+        Malformed("open_quote_at_end", raw + b'"0.5,'),
+        Malformed("text_after_quote", raw.replace(b"\n0.1,", b'\n"0.1"x,', 1)),
+        Malformed("huge_cell", _set(3, 5, "1" * 200_000)),
+        Malformed("huge_header_cell", raw.replace(b"cap0_x_m", b"c" * 200_000)),
+        Malformed("many_columns", (",".join(f"c{i}" for i in range(5000)) + "\n").encode() + raw),
+        Malformed("row_too_short", (good + "1.3,0.1\n").encode()),
+        Malformed("row_too_long", good.replace("\n0.1,", "\n0.1,7,", 1).encode()),
+        Malformed("trailing_comma", good.replace("\n", ",\n").encode()),
+        Malformed("cut_in_last_row", raw[: raw.rstrip().rfind(b",", 0, len(raw) - 40)]),
+        Malformed("duplicate_column", _set(0, 2, "cap0_x_m")),
+        Malformed("unnamed_column", _set(0, 2, "")),
+        Malformed("misspelt_column", _set(0, 1, "cap0_x_n")),
+        Malformed("capitals", header.upper().encode() + b"\n" + "\n".join(lines[1:]).encode()),
+        Malformed("misspelt_time", _set(0, 0, "time_s")),
+        Malformed("no_unit", _set(0, 1, "cap0_x")),
+        Malformed("mixed_units", _set(0, 1, "cap0_x_mm")),
+        Malformed("unknown_column", _with_column("temperature")),
+        Malformed("missing_time", _without_columns(0)),
+        Malformed("missing_cap_axis", _without_columns(7)),
+        Malformed("missing_target", _without_columns(21)),
+        Malformed("missing_targets", _without_columns(*range(19, 25))),
+        Malformed("missing_one_control", _without_columns(27)),
+        Malformed("four_caps", _without_columns(*range(13, 19))),
+        Malformed("eight_caps", _with_column("cap7_x_m")),
+        Malformed("seven_targets", _with_column("target6")),
+        Malformed("seven_controls", _with_column("control6")),
+        Malformed("ten_lengths", _with_column("length9_m", "0.1")),
+        Malformed("huge_cap_number", _with_column("cap99999999999999999999_x_m")),
+        Malformed("empty_cell", _set(4, 6, "")),
+        Malformed("blank_cell", _set(4, 6, "  ")),
+        Malformed("nan_stamp", _set(4, 0, "nan")),
+        Malformed("stamps_in_milliseconds_since_1970", _set(4, 0, "1676990000000000")),
+        Malformed("far_cap", _set(4, 6, "1e6")),
+        Malformed("overflowing_cap", _set(4, 6, "1e300")),
+        Malformed("target_in_percent", _scaled(100.0, _TARGETS)),
+        Malformed("target_below_zero", _set(5, 20, "-0.2")),
+        Malformed("control_in_host_speeds", _set(5, 26, "70")),
+        Malformed("decimetres", _scaled(10.0, _CAPS)),
+        Malformed("centimetres", _scaled(100.0, _CAPS)),
+        Malformed("millimetres", _scaled(1000.0, _CAPS)),
+        Malformed("feet", _scaled(3.28084, _CAPS)),
+        Malformed("other_robot", _scaled(0.295 / 0.325, _CAPS)),
+        Malformed("all_caps_zero", _scaled(0.0, _CAPS)),
+        Malformed("no_cap_observed", _each(lambda row: _put(row, 1, "nan"))),
+        Malformed("time_backwards", ("\n".join([header, *reversed(lines[1:])]) + "\n").encode()),
+        Malformed("y_up", _each(lambda row: _turned(row, (0, 2, 1), (1, 1, -1)))),
+        Malformed("y_up_mirrored", _each(lambda row: _turned(row, (0, 2, 1), (1, 1, 1)))),
+        Malformed("x_up", _each(lambda row: _turned(row, (2, 0, 1), (1, 1, 1)))),
+        Malformed("z_down", _each(lambda row: _turned(row, (0, 1, 2), (1, -1, -1)))),
+        Malformed("mirrored", _each(lambda row: _turned(row, (0, 1, 2), (1, -1, 1)))),
+        Malformed("exchanged_ends", _each(lambda row: _put(row, slice(1, 7), [*row[4:7], *row[1:4]]))),
+        Malformed("swapped_caps", _each(lambda row: _put(row, _CAPS, [*row[4:19], *row[1:4]]))),
+        Malformed("bom", codecs.BOM_UTF8 + raw, accepted=True),
+        Malformed("crlf", good.replace("\n", "\r\n").encode(), accepted=True),
+        Malformed("bom_and_crlf", codecs.BOM_UTF8 + good.replace("\n", "\r\n").encode(), accepted=True),
+        Malformed("no_final_newline", raw.rstrip(), accepted=True),
+        Malformed("blank_lines", good.replace("\n", "\n\n").encode(), accepted=True),
+        Malformed("quoted_cells", _set(2, 3, '"0.0175"'), accepted=True),
+        Malformed("blanks_round_cells", good.replace(",", ", ").encode(), accepted=True),
+        Malformed("nan_cap", _set(4, 6, "nan"), accepted=True),
+        Malformed("nan_control", _set(4, 26, "NaN"), accepted=True),
+        Malformed("without_control", _without_columns(*range(25, 31)), accepted=True),
+        Malformed("other_order", _table(lambda rows: [row[::-1] for row in rows]), accepted=True),
+        Malformed("one_row", "\n".join(lines[:2]).encode(), accepted=True),
+        Malformed("one_duplicate_stamp", _set(5, 0, "0.31"), accepted=True),
+    ]  # fmt: skip
+    for i, junk in enumerate(JUNK):
+        # Walk over time, cap, target and control columns, so that each kind meets much junk.
+        column = (0, 5, 20, 28)[i % 4]
+        cases.append(Malformed(f"junk_{i:02d}_in_column_{column}", _set(1 + i % 12, column, junk)))
+    return cases
+
+
+def _toml(**changes: str) -> bytes:
+    """The good sidecar with lines replaced by key."""
+    lines = [changes.pop(line.split(" = ")[0], line) for line in SIDECAR.splitlines()]
+    return "\n".join([*lines, *changes.values()]).encode() + b"\n"
+
+
+def sidecar_cases() -> list[Malformed]:
+    """Malformed TOML sidecars."""
+    raw = SIDECAR.encode()
+    cases = [
+        Malformed("empty", b""),
+        Malformed("only_comment", b"# nothing\n"),
+        Malformed("nul_byte", raw + b"\0"),
+        Malformed("utf16", SIDECAR.encode("utf-16")),
+        Malformed("latin1", raw + "# \u00e9".encode("latin-1")),
+        Malformed("binary", bytes(range(128, 256))),
+        Malformed("json", b'{"robot": "sample"}'),
+        Malformed("yaml", b"robot: sample\nsource: x\n"),
+        Malformed("ini_without_quotes", b"robot = sample\nsource = somewhere\n"),
+        Malformed("open_string", raw.replace(b'"sample"', b'"sample')),
+        Malformed("open_multiline_string", b'robot = """sample\n'),
+        Malformed("open_table", raw.replace(b"[pid]", b"[pid")),
+        Malformed("open_array", raw + b"x = [1, 2\n"),
+        Malformed("duplicate_key", b'robot = "sample"\n' + raw),
+        Malformed("duplicate_table", raw + b"[pid]\n"),
+        Malformed("bad_escape", raw.replace(b"sample", b"sam\\ple")),
+        Malformed("bad_number", _toml(tolerance="tolerance = 0,1")),
+        Malformed("leading_zeros", _toml(tolerance="tolerance = 00.1")),
+        Malformed("missing_value", _toml(tolerance="tolerance =")),
+        Malformed("missing_equals", _toml(tolerance="tolerance 0.1")),
+        Malformed("control_character", raw.replace(b"sample", b"sam\x01ple")),
+        Malformed("deep_array", b"x = " + b"[" * 5000 + b"]" * 5000 + b"\n" + raw),
+        Malformed("deep_keys", b"a" + b".a" * 5000 + b" = 1\n" + raw),
+        Malformed("huge_integer", _toml(tolerance="tolerance = " + "9" * 6000)),
+        Malformed("huge_exponent", _toml(tolerance="tolerance = 1e999")),
+        Malformed("no_robot", _toml(robot="")),
+        Malformed("no_source", _toml(source="")),
+        Malformed("empty_robot", _toml(robot='robot = ""')),
+        Malformed("empty_source", _toml(source='source = ""')),
+        Malformed("long_robot", _toml(robot='robot = "' + "x" * 5000 + '"')),
+        Malformed("other_robot", _toml(robot='robot = "sixbar"')),
+        Malformed("unknown_nature", _toml(nature='nature = "real"')),
+        Malformed("misspelt_key", _toml(source='sourc = "x"')),
+        Malformed("unknown_key", b'colour = "red"\n' + raw),
+        Malformed("misspelt_pid_key", _toml(tolerance="tolerence = 0.1")),
+        Malformed("unknown_table", raw + b"[camera]\nfx = 1.0\n"),
+        Malformed("robot_is_table", _toml(robot='robot.name = "sample"')),
+        Malformed("array_of_pid", raw.replace(b"[pid]", b"[[pid]]")),
+        Malformed("zero_start", b"start_unix_s = 0\n" + raw),
+        Malformed("start_as_date", b"start_unix_s = 2023-02-21T00:00:00Z\n" + raw),
+        Malformed("negative_noise", b"noise_sd_m = -0.001\n" + raw),
+        Malformed("noise_as_list", b"noise_sd_m = [0.001, 0.001, 0.001]\n" + raw),
+        Malformed("noise_nan", b"noise_sd_m = nan\n" + raw),
+        Malformed("speed_in_percent", _toml(motor_speed="motor_speed = 80")),
+        Malformed("speed_zero", _toml(motor_speed="motor_speed = 0")),
+        Malformed("bom", codecs.BOM_UTF8 + raw, accepted=True),
+        Malformed("crlf", SIDECAR.replace("\n", "\r\n").encode(), accepted=True),
+        Malformed("without_pid", b'robot = "sample"\nsource = "x"\nnature = "measured"\n', accepted=True),
+        Malformed("without_nature", b'robot = "sample"\nsource = "x"\n', accepted=True),
+        Malformed("integer_for_number", _toml(tolerance="tolerance = 1"), accepted=True),
+    ]  # fmt: skip
+    wrong = {"string": '"0.1"', "bool": "true", "nan": "nan", "inf": "inf", "negative": "-0.1", "list": "[0.1]"}
+    for key in ("min_length_m", "range_m", "tolerance"):
+        cases += [Malformed(f"{key}_is_{what}", _toml(**{key: f"{key} = {value}"})) for what, value in wrong.items()]
+    for key in ("robot", "source", "nature"):
+        cases += [Malformed(f"{key}_is_{what}", _toml(**{key: f"{key} = {value}"})) for what, value in
+                  {"number": "1", "list": '["a"]', "bool": "false"}.items()]  # fmt: skip
+    return cases
+
+
+def _frame(path: str, value: Any) -> bytes:
+    """The good frame with the value at a dotted path replaced."""
+    tree = frame_json()
+    *parents, last = path.split(".")
+    node = tree
+    for key in parents:
+        node = node[key]
+    node[last] = value
+    return json.dumps(tree).encode()
+
+
+def json_cases() -> list[Malformed]:
+    """Malformed frames of the authors' recorder."""
+    good = json.dumps(frame_json())
+    raw = good.encode()
+    cases = [
+        Malformed("empty", b""),
+        Malformed("blank", b"  \n"),
+        Malformed("null", b"null"),
+        Malformed("number", b"3"),
+        Malformed("list", b"[" + raw + b"]"),
+        Malformed("string", b'"frame"'),
+        Malformed("two_objects", raw + raw),
+        Malformed("trailing_text", raw + b" x"),
+        Malformed("trailing_comma", raw[:-1] + b",}"),
+        Malformed("single_quotes", good.replace('"', "'").encode()),
+        Malformed("comment", b"// frame\n" + raw),
+        Malformed("nul_byte", raw[:50] + b"\0" + raw[50:]),
+        Malformed("zeros_after_crash", b"\0" * 512),
+        Malformed("utf16", good.encode("utf-16")),
+        Malformed("bad_utf8", raw.replace(b"secs", b"s\xffcs")),
+        Malformed("binary", bytes(range(256))),
+        Malformed("deep", b"[" * 100_000),
+        Malformed("deep_object", b'{"a":' * 50_000 + b"1" + b"}" * 50_000),
+        Malformed("duplicate_key", b'{"header": {"secs": 1.0},' + raw[1:]),
+        Malformed("infinity", raw.replace(b"15.5", b"Infinity")),
+        Malformed("overflow", raw.replace(b"15.5", b"1e999")),
+        Malformed("long_integer", raw.replace(b"15.5", b"9" * 6000)),
+        Malformed("no_header", json.dumps({k: v for k, v in frame_json().items() if k != "header"}).encode()),
+        Malformed("header_list", _frame("header", [1.0])),
+        Malformed("no_secs", _frame("header", {"seq": 1})),
+        Malformed("secs_null", _frame("header.secs", None)),
+        Malformed("secs_nan", _frame("header.secs", float("nan"))),
+        Malformed("secs_object", _frame("header.secs", {"secs": 1, "nsecs": 2})),
+        Malformed("secs_in_nanoseconds", _frame("header.secs", 1676990000_000000000)),
+        Malformed("motors_list", _frame("motors", [])),
+        Malformed("motors_string", _frame("motors", "none")),
+        Malformed("motor_key", _frame("motors.a", {})),
+        Malformed("motor_key_negative", _frame("motors.-1", {})),
+        Malformed("motor_key_float", json.dumps(frame_json(motors={"0.0": {}})).encode()),
+        Malformed("motor_is_number", _frame("motors.0", 1.0)),
+        Malformed("motor_null", _frame("motors.0", None)),
+        Malformed("sensors_list", _frame("sensors", [1, 2])),
+        Malformed("sensor_key", _frame("sensors.left", {})),
+        Malformed("sensor_is_number", _frame("sensors.0", 15.5)),
+        Malformed("imu_list", _frame("imu", [0, 0, 1])),
+        Malformed("imu_is_number", _frame("imu.0", 1)),
+        Malformed("accelerometer_list", _frame("imu.0.acceleromter", [0, 0, 1])),
+        Malformed("gyroscope_number", _frame("imu.0.gyroscope", 5)),
+        Malformed("mocap_list", _frame("mocap", [[0, 0, 0]])),
+        Malformed("mocap_string", _frame("mocap", "off")),
+        Malformed("mocap_point_list", _frame("mocap.0", [1, 2, 3])),
+        Malformed("mocap_key", _frame("mocap.left", {"x": 0})),
+        Malformed("info_list", _frame("info", [1])),
+        Malformed("null_capacitance", _frame("sensors.0.capacitance", None), accepted=True),
+        Malformed("nan_length", _frame("sensors.0.length", float("nan")), accepted=True),
+        Malformed("unseen_marker", _frame("mocap.0", {"cond": False, "x": None, "y": None, "z": None}), accepted=True),
+        Malformed("no_mocap", _frame("mocap", None), accepted=True),
+        Malformed("done_as_number", _frame("motors.0.done", 1), accepted=True),
+        Malformed("more_keys", _frame("trajectory", {"0": {"x": 0, "y": 0}}), accepted=True),
+        Malformed("bom", codecs.BOM_UTF8 + raw, accepted=True),
+    ]  # fmt: skip
+    for path in ("header.secs", "motors.0.target", "motors.0.speed", "sensors.0.length", "mocap.0.x", "motors.0.done"):
+        for what, value in {"string": "1.0", "list": [1.0], "object": {}, "infinite": float("inf")}.items():
+            cases.append(Malformed(f"{path}_is_{what}", _frame(path, value)))
+    return cases

@@ -17,6 +17,9 @@ RECORD   := $(I)/10-record.h5
 ESTIMATE := $(I)/20-estimate.h5
 ARTIFACTS := $(RECORD) $(ESTIMATE)
 
+# What every stage depends on, besides its input. config.toml: settings of this iteration only, where there is one.
+SETTINGS := project.toml robot.toml $(wildcard $(I)/config.toml)
+
 # Raw runs cannot be made again: make must never delete them, whatever fails.
 .PRECIOUS: $(RECORD)
 
@@ -28,7 +31,7 @@ help:
 iterate: $(ARTIFACTS)
 
 ifneq ($(strip $(SOURCE)),)
-$(RECORD): $(SOURCE) robot.toml project.toml
+$(RECORD): $(SOURCE) $(SETTINGS)
 	"$(R2S2R)" import --iteration $(ITER) $(SOURCE)
 else
 $(RECORD):
@@ -37,7 +40,7 @@ $(RECORD):
 	@exit 2
 endif
 
-$(ESTIMATE): $(RECORD) robot.toml project.toml
+$(ESTIMATE): $(RECORD) $(SETTINGS)
 	"$(R2S2R)" estimate --iteration $(ITER)
 
 status:

@@ -48,8 +48,15 @@ def commands() -> dict[str, Any]:
     return found
 
 
+FENCED = re.compile(r"^```(?:sh|bash|console|shell)?\n(.*?)^```", flags=re.DOTALL | re.MULTILINE)
+
+
+def inline_code(markdown: str) -> list[str]:
+    """What stands between single backticks, outside the fenced blocks."""
+    return re.findall(r"`([^`]+)`", re.sub(r"^```.*?^```", "", markdown, flags=re.DOTALL | re.MULTILINE))
+
+
 def shell_lines(markdown: str) -> list[str]:
     """Command lines in the fenced code blocks of a page, without prompts, comments and continuation breaks."""
-    blocks = re.findall(r"^```(?:sh|bash|console|shell)?\n(.*?)^```", markdown, flags=re.DOTALL | re.MULTILINE)
-    lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
+    lines = "\n".join(FENCED.findall(markdown)).replace("\\\n", " ").splitlines()
     return [text for line in lines if (text := re.sub(r"(^|\s)#.*", "", line).strip().removeprefix("$ "))]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 
-from tests.guards.listing import ROOT, commands, shell_lines
+from tests.guards.listing import ROOT, commands, inline_code, shell_lines
 
 TEXT = (ROOT / "README.md").read_text()
 
@@ -17,7 +17,7 @@ def test_readme_is_short() -> None:
 
 def test_readme_mentions_every_command() -> None:
     """Every registered command stands in the README, as code."""
-    code = " ".join([*shell_lines(TEXT), *re.findall(r"`([^`]+)`", TEXT)])
+    code = " ".join([*shell_lines(TEXT), *inline_code(TEXT)])
     assert [command for command in commands() if not re.search(rf"\b{command}\b", code)] == []
 
 
@@ -35,7 +35,7 @@ def test_readme_names_only_commands_that_exist() -> None:
 
 def test_readme_names_only_make_targets_that_exist() -> None:
     """Every `make` target that the README names is one of the Makefile's, and the two main ones are named."""
-    code = [*shell_lines(TEXT), *re.findall(r"`([^`]+)`", TEXT)]
+    code = [*shell_lines(TEXT), *inline_code(TEXT)]
     named = {match for line in code for match in re.findall(r"^make ([a-z-]+)", line)}
     goals = re.search(r"^GOALS := (.*)$", (ROOT / "Makefile").read_text(), flags=re.MULTILINE)
     assert goals is not None

@@ -24,12 +24,12 @@ class InputRef(Frozen):
 
 
 class MigrationNote(Frozen):
-    """One step of `migrate`, kept for ever."""
+    """One `migrate`, kept for ever. It may have gone through several versions."""
 
     from_version: int
     to_version: int
     content_sha256: str = Field(pattern=SHA256)
-    """Of the artifact before the step."""
+    """Of the artifact before."""
 
 
 class Provenance(Frozen):
@@ -76,6 +76,8 @@ class Header(Frozen):
     """Over everything else that can be read: descriptions, header, provenance."""
     body_sha256: str = Field(pattern=SHA256)
     """Over the bytes of the HDF5 body, i.e. the file after the user block."""
+    body_offset: int = Field(ge=4096, le=1 << 22)
+    """Where the HDF5 body begins: the size of the user block [byte]."""
     body_bytes: int = Field(ge=0)
     datasets: dict[str, str]
     """Digest of each dataset by path: names the damaged one."""

@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import secrets
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from r2s2r_cli.errors import ArtifactError
 
 PARTIAL = ".partial"
 """Ending of unfinished files; nothing that bears it is ever read as an artifact."""
+_TEMP = re.compile(r"\..+\.\d+-[0-9a-f]{8}" + re.escape(PARTIAL))
 
 
 @contextlib.contextmanager
@@ -21,18 +24,88 @@ def replacing(target: Path) -> Iterator[Path]:
 
     The caller writes and closes the temp file. Raises ArtifactError (disk full, no permission).
     """
-    temp = target.with_name(f".{target.name}.{os.getpid()}-{secrets.token_hex(4)}{PARTIAL}")
+    temp = _temp(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         yield temp
         _fsync(temp)
         os.replace(temp, target)
-        _fsync(target.parent)
+    except OSError as error:
+        other = error.filename is not None and os.fspath(error.filename) not in map(str, (temp, target, target.parent))
+        raise _source_error(error) if other else disk_error(error, target) from error
+    finally:
+        with contextlib.suppress(OSError):
+            temp.unlink(missing_ok=True)
+    sync_directory(target.parent)
+
+
+@contextlib.contextmanager
+def creating(target: Path) -> Iterator[Path]:
+    """As `replacing`, for a file that must be new: FileExistsError where `target` exists, whoever was first."""
+    temp = _temp(target)
+    try:
+        yield temp
+        _fsync(temp)
+        _link_or_move(temp, target)
+    except FileExistsError:
+        raise
     except OSError as error:
         raise disk_error(error, target) from error
     finally:
         with contextlib.suppress(OSError):
             temp.unlink(missing_ok=True)
+    sync_directory(target.parent)
+
+
+def keep_beside(path: Path, suffix: str) -> Path:
+    """Give the present content of `path` a second name beside it, which nothing overwrites; return that name.
+
+    A hard link where the file system has them, else a copy: `path` itself is there all the time. Raises ArtifactError.
+    """
+    for number in range(1, 1000):
+        name = path.with_name(f"{path.name}{suffix}" + (f".{number}" if number > 1 else ""))
+        try:
+            if name.exists() and not name.samefile(path):
+                continue
+            if not name.exists():
+                _link_or_copy(path, name)
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise disk_error(error, name) from error
+        sync_directory(path.parent)
+        return name
+    raise ArtifactError("there are too many kept copies", where=str(path), expected="fewer than 1000",
+                        received="1000", hint=f"ls -la '{path.parent}'")  # fmt: skip
+
+
+def _temp(target: Path) -> Path:
+    return target.with_name(f".{target.name}.{os.getpid()}-{secrets.token_hex(4)}{PARTIAL}")
+
+
+def _link_or_move(temp: Path, target: Path) -> None:
+    """Give `temp` its name; FileExistsError where that is taken. The open file stays the same one."""
+    try:
+        os.link(temp, target)
+    except FileExistsError:
+        raise
+    except OSError:  # no hard links on this file system
+        if target.exists():
+            raise FileExistsError(target) from None
+        temp.rename(target)
+
+
+def _link_or_copy(path: Path, name: Path) -> None:
+    """A second name for `path`; FileExistsError where it is taken."""
+    try:
+        os.link(path, name)
+    except FileExistsError:
+        raise
+    except OSError:  # no hard links on this file system
+        with name.open("xb") as copy, path.open("rb") as original:
+            shutil.copyfileobj(original, copy)
+            copy.flush()
+            os.fsync(copy.fileno())
 
 
 def write_bytes(target: Path, content: bytes) -> None:
@@ -48,9 +121,17 @@ def write_text(target: Path, content: str) -> None:
 
 def disk_error(error: OSError, target: Path) -> ArtifactError:
     """Say in words what the operating system refused while writing `target`."""
+    if error.errno == errno.EFBIG:
+        return ArtifactError(
+            "the file would be larger than files may be here",
+            where=str(target),
+            expected="a limit above the size of the file",
+            received=os.strerror(error.errno),
+            hint="ulimit -f",
+        )
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return ArtifactError(
-            "the disk is full, nothing was written",
+            "the disk is full",
             where=str(target),
             expected="free space for the whole file",
             received=f"{_free(target.parent)} free",
@@ -65,7 +146,7 @@ def disk_error(error: OSError, target: Path) -> ArtifactError:
             hint=f"ls -ld '{target.parent}'",
         )
     return ArtifactError(
-        "the file could not be written, nothing was changed",
+        "the file could not be written",
         where=str(target),
         received=error.strerror or str(error),
         hint=f"ls -la '{target.parent}'",
@@ -78,11 +159,25 @@ def sweep(directory: Path) -> list[Path]:
     Call it only under the project's lock: a live writer's temp file looks the same.
     """
     removed = []
-    for path in directory.glob(f".*{PARTIAL}"):
+    for path in sorted(directory.glob(f".*{PARTIAL}")):
+        if not _TEMP.fullmatch(path.name):
+            continue
         with contextlib.suppress(OSError):
             path.unlink()
             removed.append(path)
     return removed
+
+
+def sync_directory(directory: Path) -> None:
+    """Make the names in `directory` survive a power cut, where its file system can."""
+    with contextlib.suppress(OSError):
+        _fsync(directory)
+
+
+def _source_error(error: OSError) -> ArtifactError:
+    """A file that is read while the artifact is written."""
+    return ArtifactError("a file that is being read in failed", where=str(error.filename), expected="a readable file",
+                         received=error.strerror or str(error), hint=f"ls -la '{error.filename}'")  # fmt: skip
 
 
 def _fsync(path: Path) -> None:

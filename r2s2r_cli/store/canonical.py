@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 from pathlib import Path
@@ -22,6 +23,8 @@ def json_sha256(value: Any) -> str:
 
 def file_sha256(path: Path) -> str:
     """Digest of the bytes of a file. Raises OSError."""
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, "not a regular file", str(path))  # a pipe would wait for ever
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while block := file.read(_READ):
@@ -33,7 +36,8 @@ def folder_sha256(path: Path) -> str:
     """Digest of the relative names and bytes of all files below `path`, in sorted order. Raises OSError."""
     digest = hashlib.sha256()
     for file in sorted(p for p in path.rglob("*") if p.is_file()):
-        digest.update(f"{file.relative_to(path).as_posix()}\0{file_sha256(file)}\n".encode())
+        name = file.relative_to(path).as_posix().encode("utf-8", "surrogateescape")
+        digest.update(name + f"\0{file_sha256(file)}\n".encode())
     return digest.hexdigest()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import h5py
 import numpy as np
@@ -36,9 +37,9 @@ def digest_file(file: h5py.File) -> Digests:
     groups: dict[str, object] = {}
     for path, node in sorted(walk(file)):
         if path == PROVENANCE or path.startswith(PROVENANCE + "/"):
-            rest[path] = _dataset_digest(node) if isinstance(node, h5py.Dataset) else attributes(node)
+            rest[path] = dataset_digest(node) if isinstance(node, h5py.Dataset) else attributes(node)
         elif isinstance(node, h5py.Dataset):
-            datasets[path] = _dataset_digest(node)
+            datasets[path] = dataset_digest(node)
             rest[path] = {k: v for k, v in attributes(node).items() if k not in _IDENTITY}
         else:
             groups[path] = attributes(node)
@@ -48,17 +49,34 @@ def digest_file(file: h5py.File) -> Digests:
     return Digests(datasets, content, json_sha256({"content": content, "root": root, "rest": rest}))
 
 
-def walk(file: h5py.File) -> Iterator[tuple[str, h5py.Dataset | h5py.Group]]:
-    """Every group and dataset below the root, by path; links are not followed out of the tree."""
+class ForeignContent(ValueError):
+    """Something that no artifact holds (a link, an object dtype, an array as attribute), in words."""
+
+
+def walk(file: h5py.File, *, strict: bool = True) -> Iterator[tuple[str, Any]]:
+    """Every group and dataset below the root, by path.
+
+    Raises ForeignContent for a link and for a node met twice. With `strict=False` these are yielded as text.
+    """
     stack: list[tuple[str, h5py.Group]] = [("", file)]
+    met = {_address(file)}
     while stack:
         prefix, group = stack.pop()
         for name in group:
             path = f"{prefix}/{name}" if prefix else name
             link = group.get(name, getlink=True)
             if not isinstance(link, h5py.HardLink):
-                raise ValueError(f"{path} is a link, artifacts have none")
+                if strict:
+                    raise ForeignContent(f"{path} is a link, artifacts have none")
+                yield path, f"link to {getattr(link, 'path', '?')}"
+                continue
             node = group[name]
+            if _address(node) in met:  # a ring of hard links would never end
+                if strict:
+                    raise ForeignContent(f"{path} is a second name of another node, artifacts have none")
+                yield path, f"another name of {node.name}"
+                continue
+            met.add(_address(node))
             yield path, node
             if isinstance(node, h5py.Group):
                 stack.append((path, node))
@@ -69,26 +87,42 @@ def attributes(node: h5py.Group | h5py.Dataset) -> dict[str, str | int | float |
     return {name: plain(value) for name, value in node.attrs.items()}
 
 
+def _address(node: h5py.Group | h5py.Dataset) -> int:
+    return int(h5py.h5o.get_info(node.id).addr)
+
+
 def plain(value: object) -> str | int | float | bool:
     """One HDF5 scalar as str, int, float or bool."""
     if isinstance(value, bytes | np.bytes_):
         return bytes(value).decode("utf-8")
     if isinstance(value, str):
         return str(value)
+    if isinstance(value, np.floating) and not np.isfinite(value):
+        raise ForeignContent(f"an attribute is {value}, artifacts have finite ones only")
     if isinstance(value, np.bool_ | np.integer | np.floating):
-        return value.item()  # type: ignore[no-any-return]
-    raise ValueError(f"not a scalar of a known type: {value!r}")
+        return value.item()
+    raise ForeignContent(f"an attribute is of the type {type(value).__name__}, artifacts have single values only")
 
 
-def _dataset_digest(dataset: h5py.Dataset) -> str:
-    if dataset.dtype.hasobject:
-        raise ValueError(f"{dataset.name} has the dtype {dataset.dtype}, artifacts have no object dtypes")
+def dataset_digest(dataset: h5py.Dataset) -> str:
+    """Digest of dtype, shape, unit, dims, frame and data. Raises what h5py raises on damage; ForeignContent."""
+    check_dataset(dataset)
     digest = hashlib.sha256()
     identity = {k: v for k, v in attributes(dataset).items() if k in _IDENTITY}
     digest.update(canonical_json([dataset.dtype.str, list(dataset.shape), identity]).encode())
     for block in blocks(dataset):
         digest.update(np.ascontiguousarray(block).data)
     return digest.hexdigest()
+
+
+def check_dataset(dataset: h5py.Dataset) -> None:
+    """Raises ForeignContent for a dataset of a form that no artifact has; reading it could run into anything."""
+    if dataset.dtype.hasobject:
+        raise ForeignContent(f"the dtype is {dataset.dtype}, artifacts have numbers and fixed-length text only")
+    if dataset.shape is None:
+        raise ForeignContent("the dataset is null, artifacts have none such")
+    if dataset.external or dataset.is_virtual:
+        raise ForeignContent("the data lie in other files, artifacts hold their own")
 
 
 def blocks(dataset: h5py.Dataset) -> Iterator[np.ndarray]:

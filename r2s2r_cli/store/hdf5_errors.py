@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.store.hashing import ForeignContent
 
 _MEANING: tuple[tuple[str, str], ...] = (
     ("filter returned failure", "a checksum does not match: the stored bytes have changed"),
@@ -15,15 +16,18 @@ _MEANING: tuple[tuple[str, str], ...] = (
     ("resource temporarily unavailable", "another program has the file open for writing"),
     ("bad object header", "the file's structure is damaged"),
     ("bad symbol table", "the file's structure is damaged"),
+    ("metadata checksum", "the file's structure is damaged"),
     ("can't allocate", "the file asks for an absurd amount of memory: its structure is damaged"),
     ("unable to allocate", "the file asks for an absurd amount of memory: its structure is damaged"),
-    ("object 'x' doesn't exist", "a dataset is missing"),
+    ("doesn't exist", "a group or dataset is missing"),
 )
 _DEFAULT = "the HDF5 library could not read the file: its structure is damaged"
 
 
 def meaning(error: BaseException) -> str:
     """What an exception of h5py or numpy says about the file, in words."""
+    if isinstance(error, ForeignContent):
+        return str(error)
     text = str(error).lower()
     return next((words for token, words in _MEANING if token in text), _DEFAULT)
 

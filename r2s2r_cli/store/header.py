@@ -11,10 +11,11 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.errors import ArtifactError, InputError
 from schemas.header import Header
 
-MAGIC = b"r2s2r-artifact 1 "
+NAME = b"r2s2r-artifact "
+MAGIC = NAME + b"1 "
 MIN_BLOCK = 4096
 MAX_BLOCK = 1 << 22
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -27,22 +28,38 @@ class NotAnArtifact(ArtifactError):
 
 
 def block_size(header: Header) -> int:
-    """Size of the user block for this header: a power of two of at least 4096 bytes."""
+    """Size of the user block for this header: a power of two of at least 4096 bytes.
+
+    Raises InputError where it would need more than 4 MB.
+    """
     size = MIN_BLOCK
     while size < _LINE + len(_encode(header)) + 1:
         size *= 2
+    if size > MAX_BLOCK:
+        raise InputError(
+            "the artifact has too many runs for one file",
+            where=header.kind,
+            expected="a header of at most 4 MB",
+            received=f"one of {size / 1e6:.0f} MB for {len(header.datasets)} datasets",
+            hint="use several iterations, each with a part of the runs",
+        )
     return size
 
 
-def write_block(path: Path, header: Header, size: int) -> None:
-    """Write the header into the reserved user block of `size` bytes at the start of `path`."""
+def write_block(path: Path, header: Header) -> None:
+    """Write the header into the user block that is reserved at the start of `path`."""
+    with path.open("r+b") as file:
+        file.write(block(header))
+
+
+def block(header: Header) -> bytes:
+    """The user block: first line, JSON, spaces, newline. Raises ValueError where it does not fit."""
     body = _encode(header)
     line = MAGIC + hashlib.sha256(body).hexdigest().encode() + b" %010d\n" % len(body)
-    block = (line + body).ljust(size - 1) + b"\n"
-    if len(block) != size:
-        raise ValueError(f"header of {len(body)} bytes does not fit into a block of {size}")
-    with path.open("r+b") as file:
-        file.write(block)
+    found = (line + body).ljust(header.body_offset - 1) + b"\n"
+    if len(found) != header.body_offset:
+        raise ValueError(f"header of {len(body)} bytes does not fit into a block of {header.body_offset}")
+    return found
 
 
 def read_header(path: Path) -> Header:
@@ -50,13 +67,10 @@ def read_header(path: Path) -> Header:
 
     Raises ArtifactError: no such file, not an artifact, or the head is damaged.
     """
-    header, _ = read_header_and_block(path)
-    return header
-
-
-def read_header_and_block(path: Path) -> tuple[Header, int]:
-    """The header, and the offset in bytes at which the HDF5 body begins."""
     try:
+        if path.exists() and not path.is_dir() and not path.is_file():
+            raise NotAnArtifact("this is no regular file", where=str(path), expected="an artifact",
+                                received="a pipe, socket or device", hint=f"ls -la '{path}'")  # fmt: skip
         with path.open("rb") as file:
             line = file.read(_LINE)
             if not line.startswith(MAGIC):
@@ -68,10 +82,9 @@ def read_header_and_block(path: Path) -> tuple[Header, int]:
     if hashlib.sha256(body).hexdigest() != digest:
         raise _damaged(path, "its digest does not match its text")
     try:
-        header = Header.model_validate_json(body)
+        return Header.model_validate_json(body)
     except ValidationError as error:
         raise _damaged(path, error.errors()[0]["msg"]) from error
-    return header, block_size(header)
 
 
 def body_sha256(path: Path, offset: int) -> tuple[str, int]:
@@ -87,6 +100,14 @@ def body_sha256(path: Path, offset: int) -> tuple[str, int]:
 
 def not_an_artifact(path: Path, head: bytes) -> NotAnArtifact:
     """Name what the file is instead, as far as its first bytes tell."""
+    if head.startswith(NAME):
+        return NotAnArtifact(
+            "the head of this artifact is damaged, or of a newer format",
+            where=str(path),
+            expected=MAGIC.decode(),
+            received=repr(head[: len(MAGIC)]),
+            hint=f"r2s2r recover '{path}'",
+        )
     if not head:
         received = "an empty file"
     elif head.startswith(HDF5_SIGNATURE):

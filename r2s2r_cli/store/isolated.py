@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import selectors
 import subprocess
 import sys
@@ -10,7 +11,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.store.header import unreadable
 from r2s2r_cli.store.worker import READY
+
+Call = Literal["verify", "tree", "facts", "save"]
 
 START_LIMIT_S = 60.0
 """Covers the imports of the child on a loaded machine."""
@@ -40,6 +44,14 @@ class IsolatedReader:
         """Report of `store.verify.tree`. Raises ArtifactError where the file crashes or hangs the HDF5 library."""
         return self._ask("tree", path)
 
+    def facts(self, path: Path) -> dict[str, Any]:
+        """Report of `store.salvage.facts`. Raises ArtifactError as `verify` does."""
+        return self._ask("facts", path)
+
+    def save(self, path: Path, dataset: str, target: Path) -> dict[str, Any]:
+        """Report of `store.salvage.save`: one dataset into a `.npy` file. Raises ArtifactError as `verify` does."""
+        return self._ask("save", path, dataset=dataset, target=str(target.absolute()))
+
     def close(self) -> None:
         """End the child."""
         child, self._child = self._child, None
@@ -51,16 +63,20 @@ class IsolatedReader:
             if stream is not None:
                 stream.close()
 
-    def _ask(self, call: Literal["verify", "tree"], path: Path) -> dict[str, Any]:
-        limit = BASE_LIMIT_S + path.stat().st_size / BYTES_PER_S
+    def _ask(self, call: Call, path: Path, **arguments: str) -> dict[str, Any]:
+        try:
+            limit = BASE_LIMIT_S + path.stat().st_size / BYTES_PER_S
+        except OSError as error:
+            raise unreadable(path, error) from error
         child = self._running()
         try:
-            print(json.dumps({"call": call, "path": str(path)}), file=child.stdin, flush=True)
+            request = {"call": call, "path": str(path.absolute()), **arguments}
+            print(json.dumps(request), file=child.stdin, flush=True)
             answer = _line(child, limit)
         except BrokenPipeError:
             answer = ""
-        if answer:
-            return json.loads(answer)  # type: ignore[no-any-return]
+        if answer and answer.endswith("\n"):
+            return json.loads(answer)
         self.close()
         slow = answer is None
         what = f"kept the HDF5 library busy for over {limit:.0f} s" if slow else "crashed the HDF5 library"
@@ -76,8 +92,8 @@ class IsolatedReader:
         if self._child is None or self._child.poll() is not None:
             self.close()
             self._child = subprocess.Popen(
-                [sys.executable, "-m", "r2s2r_cli.store.worker"],
-                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+                [sys.executable, "-P", "-m", "r2s2r_cli.store.worker"], env=_environment(), encoding="utf-8",
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
             )  # fmt: skip
             if _line(self._child, START_LIMIT_S) != f"{READY}\n":
                 self.close()
@@ -85,6 +101,13 @@ class IsolatedReader:
                     "the reader process did not start: run 'python -m r2s2r_cli.store.worker' to see why"
                 )
         return self._child
+
+
+def _environment() -> dict[str, str]:
+    """The child finds this package, and nothing in the user's directory; threads would eat its address space."""
+    home = str(Path(__file__).resolve().parents[2])
+    paths = [home, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
 def _line(child: subprocess.Popen[str], limit_s: float) -> str | None:

@@ -1,11 +1,14 @@
 """The append journal of a recording in progress: every row is in the kernel before the next one is taken.
 
 HDF5 that is being written does not survive a kill (docs/adr/0004). The journal is a header line of JSON and
-then records: stream number, length, CRC-32, payload. A torn last record is recognised and dropped.
+then records: mark, stream number, length, CRC-32 of the rest, payload. A torn last record is recognised and dropped.
+It comes into being with its head whole, and is locked while somebody writes it.
 """
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import json
 import os
 import struct
@@ -18,12 +21,14 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from r2s2r_cli.errors import ArtifactError
-from r2s2r_cli.store.atomic import disk_error
+from r2s2r_cli.errors import ArtifactError, UsageError
+from r2s2r_cli.store.atomic import creating, disk_error
+from r2s2r_cli.store.header import unreadable
 
 MAGIC = b"r2s2r-journal 1 "
 _RECORD = struct.Struct("<4sIII")
 _MARK = b"R2SJ"
+_NUMBERS = struct.Struct("<II")
 _BLOB_LENGTH = struct.Struct("<I")
 MAX_RECORD = 1 << 28
 SYNC_INTERVAL_S = 1.0
@@ -41,12 +46,19 @@ class Field:
 
 @dataclass(frozen=True)
 class Stream:
-    """One group of the artifact that grows row by row."""
+    """Datasets of one group of the artifact that grow together, row by row."""
 
     path: str
     """Group path in the artifact, `runs/<run>/sensors`."""
     fields: tuple[Field, ...]
     attributes: Mapping[str, Any]
+    name: str = ""
+    """Set where a group has several streams (`color` and `depth` of a camera)."""
+
+    @property
+    def key(self) -> str:
+        """What `append` calls it: the path, and the name where there is one."""
+        return f"{self.path}:{self.name}" if self.name else self.path
 
 
 @dataclass(frozen=True)
@@ -54,6 +66,7 @@ class JournalHead:
     """What the journal will become: the artifact kind, its streams and its provenance (as JSON)."""
 
     kind: str
+    schema_version: int
     streams: tuple[Stream, ...]
     groups: Mapping[str, Mapping[str, Any]]
     """Attributes of groups without rows (the run itself)."""
@@ -61,58 +74,85 @@ class JournalHead:
 
 
 class Journal:
-    """An open journal. `append` one row at a time; the file is sealed with `store.recover.seal`."""
+    """An open journal. `append` one row at a time; the closed file is sealed with `store.seal.seal`."""
 
     def __init__(self, path: Path, head: JournalHead) -> None:
         """Create the journal. Raises ArtifactError where it exists (an unsealed recording) or cannot be written."""
         self.path = path
         self.head = head
-        self._index = {stream.path: i for i, stream in enumerate(head.streams)}
+        self._index = {stream.key: i for i, stream in enumerate(head.streams)}
         self._synced = time.monotonic()
-        self._end = 0
+        body = json.dumps(_to_json(head), sort_keys=True).encode()
+        content = MAGIC + b"%d %d\n" % (len(body), zlib.crc32(body)) + body
+        self._end = len(content)
+        self._descriptor = -1
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
+            with creating(path) as temp:
+                temp.write_bytes(content)
+                self._descriptor = os.open(temp, os.O_WRONLY | os.O_APPEND)
+                fcntl.flock(self._descriptor, fcntl.LOCK_EX)
         except FileExistsError as error:
+            self.close()
             raise ArtifactError(
                 "an unsealed recording is in the way",
                 where=str(path),
                 expected="no journal",
-                received="the journal of a recording that was cut off",
+                received="the journal of a recording that was cut off, or is running",
                 hint=f"r2s2r recover '{path}'",
             ) from error
-        except OSError as error:
-            raise disk_error(error, path) from error
-        body = json.dumps(_to_json(head), sort_keys=True).encode()
-        self._write(MAGIC + b"%d %d\n" % (len(body), zlib.crc32(body)) + body)
-        os.fsync(self._descriptor)
+        except BaseException:
+            self.close()
+            raise
 
-    def append(self, path: str, row: Mapping[str, np.ndarray | bytes | float | int | bool]) -> None:
-        """Append one row to the stream of group `path`; it is in the kernel when this returns.
+    def __enter__(self) -> Journal:
+        return self
 
-        Raises ValueError for a row of another form; ArtifactError on a full disk (rows before stay whole).
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def append(self, stream: str, row: Mapping[str, np.ndarray | bytes | float | int | bool]) -> None:
+        """Append one row to the stream with this key; it is in the kernel when this returns.
+
+        Raises ValueError for a row of another form; ArtifactError on a full disk (the rows before stay whole, and
+        more can follow once there is space).
         """
-        number = self._index[path]
+        number = self._index[stream]
         payload = _encode(self.head.streams[number], row)
-        self._write(_RECORD.pack(_MARK, number, len(payload), zlib.crc32(payload)) + payload)
+        if len(payload) > MAX_RECORD:
+            raise ValueError(f"{stream}: a row of {len(payload)} bytes, at most {MAX_RECORD} are allowed")
+        self._write(_RECORD.pack(_MARK, number, len(payload), _crc(number, payload)) + payload)
         if time.monotonic() - self._synced > SYNC_INTERVAL_S:
             os.fdatasync(self._descriptor)
             self._synced = time.monotonic()
 
     def close(self) -> None:
-        """Sync and close; the journal stays until it is sealed."""
-        os.fsync(self._descriptor)
-        os.close(self._descriptor)
+        """Sync and close; the journal stays until it is sealed. Closing twice does no harm."""
+        descriptor, self._descriptor = self._descriptor, -1
+        if descriptor >= 0:
+            try:
+                os.fsync(descriptor)
+            except OSError as error:
+                raise disk_error(error, self.path) from error
+            finally:
+                os.close(descriptor)
 
     def _write(self, data: bytes) -> None:
         try:
             view = memoryview(data)
             while view:
                 view = view[os.write(self._descriptor, view) :]
-        except OSError as error:
-            os.ftruncate(self._descriptor, self._end)  # or the torn record would hide what comes after it
-            raise disk_error(error, self.path) from error
+        except BaseException as error:  # Ctrl-C as well: a torn record must not stand before a whole one
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._descriptor, self._end)
+            if isinstance(error, OSError):
+                raise disk_error(error, self.path) from error
+            raise
         self._end += len(data)
+
+
+def _crc(number: int, payload: bytes) -> int:
+    return zlib.crc32(payload, zlib.crc32(_NUMBERS.pack(number, len(payload))))
 
 
 def read_head(path: Path) -> tuple[JournalHead, int]:
@@ -131,15 +171,31 @@ def read_head(path: Path) -> tuple[JournalHead, int]:
                             hint=f"ls -la '{path.parent}'") from error  # fmt: skip
     except (ValueError, KeyError, TypeError) as error:
         raise ArtifactError(
-            "this is not a journal, or it was cut off before its first row",
+            "this is not a journal, or its head is damaged",
             where=str(path),
-            expected="a file that begins 'r2s2r-journal'",
+            expected="a file that begins 'r2s2r-journal' and the digest of its head",
             received=f"{path.stat().st_size} bytes that do not begin with an intact head",
-            hint=f"rm '{path}'   # nothing was recorded in it",
+            hint=f"head -c 200 '{path}'",
         ) from error
 
 
-@dataclass(frozen=True)
+@contextlib.contextmanager
+def unwatched(path: Path) -> Iterator[None]:
+    """Hold the journal's lock while it is sealed. Raises UsageError where it is still being written."""
+    try:
+        file = path.open("rb")
+    except OSError as error:
+        raise unreadable(path, error) from error
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise UsageError("this recording is running", where=str(path), expected="a journal that nobody has open",
+                             received="an open one", hint="stop the recording first") from error  # fmt: skip
+        yield
+
+
+@dataclass(frozen=True, slots=True)
 class Place:
     """Where a whole record lies in the journal."""
 
@@ -153,12 +209,12 @@ class Place:
 
 def records(path: Path) -> Iterator[Place]:
     """Every whole record, in order. Damaged stretches are skipped, a torn last record ends the search."""
-    _, position = read_head(path)
+    head, position = read_head(path)
     size = path.stat().st_size
     with path.open("rb") as file:
         while position < size:
             place = _record_at(file, position)
-            if place is None:
+            if place is None or place.stream >= len(head.streams):
                 position = _next_mark(file, position + 1, size)
                 continue
             yield place
@@ -174,7 +230,7 @@ def _record_at(file: BinaryIO, position: int) -> Place | None:
     if mark != _MARK or length > MAX_RECORD:
         return None
     payload = file.read(length)
-    if len(payload) != length or zlib.crc32(payload) != crc:
+    if len(payload) != length or _crc(number, payload) != crc:
         return None
     return Place(number, position, position + _RECORD.size, length)
 
@@ -230,18 +286,22 @@ def _to_json(head: JournalHead) -> dict[str, Any]:
     streams = [
         {
             "path": s.path,
+            "name": s.name,
             "attributes": dict(s.attributes),
             "fields": [[f.name, f.dtype, list(f.shape)] for f in s.fields],
         }
         for s in head.streams
     ]
     groups = {path: dict(attributes) for path, attributes in head.groups.items()}
-    return {"kind": head.kind, "streams": streams, "groups": groups, "provenance": dict(head.provenance)}
+    return {
+        "kind": head.kind, "schema_version": head.schema_version, "streams": streams, "groups": groups,
+        "provenance": dict(head.provenance),
+    }  # fmt: skip
 
 
 def _from_json(values: dict[str, Any]) -> JournalHead:
     streams = tuple(
-        Stream(s["path"], tuple(Field(n, d, tuple(shape)) for n, d, shape in s["fields"]), s["attributes"])
+        Stream(s["path"], tuple(Field(n, d, tuple(shape)) for n, d, shape in s["fields"]), s["attributes"], s["name"])
         for s in values["streams"]
     )
-    return JournalHead(values["kind"], streams, values["groups"], values["provenance"])
+    return JournalHead(values["kind"], values["schema_version"], streams, values["groups"], values["provenance"])

@@ -12,7 +12,11 @@ from schemas.base import DIM_SIZES, ArtifactSpec, DatasetSpec, GroupSpec
 
 BLOB_BYTES, BLOB_OFFSET = "bytes", "offset"
 _NUMPY_NAME = {"bool": "bool", "str": "S"}
-_PYTHON_TYPE: dict[str, tuple[type, ...]] = {"str": (str,), "int": (int,), "float": (float, int), "bool": (bool,)}
+_PYTHON_TYPE: dict[str, tuple[type, ...]] = {"str": (str,), "int": (int,), "float": (float,), "bool": (bool,)}
+
+
+Sizes = dict[tuple[str, str], tuple[int, str]]
+"""(scope, axis) -> its length and the dataset that it was first met in."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +69,9 @@ def is_container(path: str, spec: ArtifactSpec) -> bool:
     return any(GroupSpec(path=prefix, description="").matches(path) for prefix in prefixes)
 
 
-def scope(path: str) -> str:
-    """Axes have one length within this part of the file: a run, a set, a policy."""
-    return "/".join(path.split("/")[:2])
+def scope(path: str, group: GroupSpec) -> str:
+    """Axes have one length within this part of the file: a run, a policy, or else the group at this path."""
+    return "/".join(path.split("/")[:2]) if "{" in group.path else path
 
 
 def _unknown(
@@ -83,15 +87,23 @@ def _unknown(
 
 def _missing_groups(groups: dict[str, h5py.Group], spec: ArtifactSpec) -> Iterator[Mismatch]:
     for group in spec.groups:
-        if not group.required or any(group.matches(path) for path in groups):
+        if not group.required:
             continue
-        yield Mismatch(group.path, "a required group is missing", group.description, "nothing")
+        head, _, tail = group.path.partition("}/")
+        if not tail:
+            if not any(group.matches(path) for path in groups):
+                yield Mismatch(group.path, "a required group is missing", group.description, "nothing")
+            continue
+        each = GroupSpec(path=head + "}", description="")  # in every run
+        for path in sorted(p for p in groups if each.matches(p)):
+            if f"{path}/{tail}" not in groups:
+                yield Mismatch(f"{path}/{tail}", "a required group is missing", group.description, "nothing")
 
 
 def _check_groups(
     groups: dict[str, h5py.Group], datasets: dict[str, h5py.Dataset], spec: ArtifactSpec
 ) -> Iterator[Mismatch]:
-    sizes: dict[tuple[str, str], tuple[int, str]] = {}
+    sizes: Sizes = {}
     for path, node in sorted(groups.items()):
         group = spec.group(path)
         if group is None:
@@ -101,7 +113,7 @@ def _check_groups(
             for name, expected in on_disk(dataset):
                 full = f"{path}/{name}"
                 if full in datasets:
-                    yield from _check_dataset(full, datasets[full], expected, sizes)
+                    yield from _check_dataset(full, datasets[full], expected, scope(path, group), sizes)
                 elif dataset.required:
                     yield Mismatch(
                         full, "a required dataset is missing", f"{expected.dtype} {expected.dims}", "nothing"
@@ -136,9 +148,7 @@ def _check_attributes(path: str, node: h5py.Group, group: GroupSpec) -> Iterator
         yield Mismatch(f"{path}@{name}", "the schema knows no such attribute", "one of the schema", "an unknown one")
 
 
-def _check_dataset(
-    path: str, node: h5py.Dataset, spec: DatasetSpec, sizes: dict[tuple[str, str], tuple[int, str]]
-) -> Iterator[Mismatch]:
+def _check_dataset(path: str, node: h5py.Dataset, spec: DatasetSpec, scope: str, sizes: Sizes) -> Iterator[Mismatch]:
     received = "S" if node.dtype.kind == "S" else node.dtype.name
     if received != _NUMPY_NAME.get(spec.dtype, spec.dtype):
         yield Mismatch(path, "a dataset has the wrong dtype", spec.dtype, received)
@@ -146,7 +156,7 @@ def _check_dataset(
         yield Mismatch(path, "a dataset has the wrong number of axes", str(spec.dims), f"shape {node.shape}")
     else:
         for name, size in zip(spec.dims, node.shape, strict=True):
-            yield from _check_axis(path, name, size, sizes)
+            yield from _check_axis(path, name, size, scope, sizes)
     found = attributes(node)
     for name, expected in (("unit", spec.unit), ("dims", ",".join(spec.dims)), ("frame", spec.frame)):
         if found.get(name) != expected:
@@ -154,7 +164,7 @@ def _check_dataset(
             yield Mismatch(f"{path}@{name}", f"a dataset has the wrong {name}", expected or "none", text)
 
 
-def _check_axis(path: str, name: str, size: int, sizes: dict[tuple[str, str], tuple[int, str]]) -> Iterator[Mismatch]:
+def _check_axis(path: str, name: str, size: int, scope: str, sizes: Sizes) -> Iterator[Mismatch]:
     if name == "byte":
         return
     if name in DIM_SIZES:
@@ -162,6 +172,6 @@ def _check_axis(path: str, name: str, size: int, sizes: dict[tuple[str, str], tu
             yield Mismatch(path, f"axis {name} has the wrong length", str(DIM_SIZES[name]), str(size))
         return
     base, plus = (name[:-2], 1) if name.endswith("+1") else (name, 0)
-    first, where = sizes.setdefault((scope(path), base), (size - plus, path))
+    first, where = sizes.setdefault((scope, base), (size - plus, path))
     if size - plus != first:
         yield Mismatch(path, f"axis {base} has another length than in {where}", str(first), str(size - plus))

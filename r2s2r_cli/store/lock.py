@@ -9,7 +9,7 @@ import platform
 from collections.abc import Iterator
 from pathlib import Path
 
-from r2s2r_cli.errors import UsageError
+from r2s2r_cli.errors import ArtifactError, UsageError
 from r2s2r_cli.store.atomic import disk_error
 
 STATE_DIR = ".r2s2r"
@@ -33,6 +33,14 @@ def writing(root: Path, command: str) -> Iterator[None]:
             expected="one writer at a time",
             received=_describe(holder),
             hint="wait until it is done, then run the command again",
+        ) from error
+    except NotImplementedError as error:
+        raise ArtifactError(
+            "the file system of the project has no file locks",
+            where=str(directory),
+            expected="a local file system, or a network one with locks",
+            received=str(error),
+            hint=f"df -T '{root}'",
         ) from error
     except OSError as error:
         raise disk_error(error, directory) from error

@@ -135,6 +135,16 @@ class Project:
         return sorted((self.root / ITERATIONS).glob(f"*/*{JOURNAL_SUFFIX}"))
 
 
+def journal_of(artifact: Path) -> Path:
+    """Where the rows of an artifact are while it is recorded."""
+    return artifact.with_name(artifact.name + JOURNAL_SUFFIX)
+
+
+def artifact_of(journal: Path) -> Path:
+    """The artifact that a journal becomes."""
+    return journal.with_name(journal.name.removesuffix(JOURNAL_SUFFIX))
+
+
 def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
     result = dict(base)
     for key, value in over.items():
@@ -146,4 +156,4 @@ def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
 def _nest(key: str, value: Any) -> dict[str, Any]:
     for part in reversed(key.split(".")):
         value = {part: value}
-    return value  # type: ignore[no-any-return]
+    return value

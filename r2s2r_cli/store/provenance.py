@@ -39,7 +39,7 @@ def build_provenance(
     return Provenance(
         stage=stage,
         stage_version=stage_version,
-        argv=tuple(argv),
+        argv=tuple(text.encode("utf-8", "backslashreplace").decode() for text in argv),  # names need not be UTF-8
         settings=dict(settings),
         overrides=dict(overrides),
         robot=dict(robot),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -13,7 +15,7 @@ from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Value
 from r2s2r_cli.errors import ArtifactError
 from r2s2r_cli.store.hashing import PROVENANCE, attributes, walk
 from r2s2r_cli.store.hdf5_errors import translate
-from r2s2r_cli.store.header import body_sha256, read_header_and_block
+from r2s2r_cli.store.header import body_sha256, read_header, unreadable
 from r2s2r_cli.store.isolated import IsolatedReader
 from r2s2r_cli.store.layout import BLOB_BYTES, BLOB_OFFSET
 from schemas.header import Header
@@ -33,6 +35,11 @@ def read_artifact(path: Path, kind: str | None = None, *, blobs: bool = False) -
     Raises ArtifactError: missing, not an artifact, damaged, of another kind, or of a newer version.
     """
     header = checked_header(path, kind)
+    return header, load(path, header, blobs=blobs)
+
+
+def load(path: Path, header: Header, *, blobs: bool = False) -> ArtifactData:
+    """The values of an artifact that has been checked, in the layout of the current version. Raises ArtifactError."""
     try:
         with h5py.File(path, "r", locking=False) as file:
             groups = _load(file, path, blobs=blobs)
@@ -40,7 +47,7 @@ def read_artifact(path: Path, kind: str | None = None, *, blobs: bool = False) -
         raise translate(error, path) from error
     for _, step in chain(header.kind, header.schema_version):
         groups = dict(step(groups))
-    return header, ArtifactData(header.kind, groups)
+    return ArtifactData(header.kind, groups)
 
 
 def iter_blobs(path: Path, group: str, name: str) -> Iterator[bytes]:
@@ -48,8 +55,20 @@ def iter_blobs(path: Path, group: str, name: str) -> Iterator[bytes]:
     with h5py.File(path, "r", locking=False) as file:
         node = file[f"{group}/{name}"]
         offsets = node[BLOB_OFFSET][()]
-        for start, stop in zip(offsets[:-1], offsets[1:], strict=True):
+        for start, stop in itertools.pairwise(offsets):
             yield node[BLOB_BYTES][int(start) : int(stop)].tobytes()
+
+
+def length(path: Path, dataset: str) -> int | None:
+    """Length of the first axis of a dataset, or number of its encoded images; None where it is not there.
+
+    The file must have been checked before.
+    """
+    with h5py.File(path, "r", locking=False) as file:
+        node = file.get(dataset)
+        if isinstance(node, h5py.Group):
+            return len(node[BLOB_OFFSET]) - 1
+        return None if node is None else len(node)
 
 
 def checked_header(path: Path, kind: str | None = None) -> Header:
@@ -57,19 +76,27 @@ def checked_header(path: Path, kind: str | None = None) -> Header:
 
     Raises ArtifactError otherwise. Warns DamageWarning where bytes changed that nothing reads.
     """
-    header, offset = read_header_and_block(path)
-    _check_kind(path, header, kind)
-    _check_version(path, header)
-    check_body(path, header, offset)
+    header = read_header(path)
+    check_kind_and_version(path, header, kind)
+    check_body(path, header)
     return header
 
 
-def check_body(path: Path, header: Header, offset: int) -> None:
+def check_kind_and_version(path: Path, header: Header, kind: str | None = None) -> None:
+    """Raises ArtifactError: of another kind, or of a version that no chain of migrations reads."""
+    _check_kind(path, header, kind)
+    _check_version(path, header)
+
+
+def check_body(path: Path, header: Header) -> None:
     """Compare the bytes of the body with the seal, before any HDF5 code sees them.
 
     Raises ArtifactError with the damaged dataset; warns DamageWarning where only unread bytes changed.
     """
-    digest, length = body_sha256(path, offset)
+    try:
+        digest, length = body_sha256(path, header.body_offset)
+    except OSError as error:
+        raise unreadable(path, error) from error
     if digest == header.body_sha256:
         return
     if length < header.body_bytes:
@@ -147,7 +174,9 @@ def describe(path: Path) -> list[NodeInfo]:
                     continue
                 found = attributes(node)
                 if isinstance(node, h5py.Dataset):
-                    words = {key: str(found.get(key, "")) for key in ("unit", "dims", "frame", "description")}
+                    words: dict[str, Any] = {
+                        key: str(found.get(key, "")) for key in ("unit", "dims", "frame", "description")
+                    }
                     nodes.append(NodeInfo(path=name, dtype=str(node.dtype), shape=node.shape, **words))
                 else:
                     nodes.append(NodeInfo(path=name, attributes=found))

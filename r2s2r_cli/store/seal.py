@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterator
-from dataclasses import dataclass
+from array import array
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from pydantic import ValidationError
 
 from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Rows, Value
 from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.store.atomic import keep_beside
 from r2s2r_cli.store.header import read_header
-from r2s2r_cli.store.journal import Field, JournalHead, Place, Stream, decode, read_head, records
-from r2s2r_cli.store.read import checked_header
+from r2s2r_cli.store.journal import Field, JournalHead, Stream, decode, read_head, records, unwatched
+from r2s2r_cli.store.read import checked_header, length
 from r2s2r_cli.store.write import write_artifact
 from schemas.header import Header, Provenance
+from schemas.versions import KINDS, NoMigration, chain
 
 _ROWS_A_BLOCK = 256
 
@@ -24,85 +27,133 @@ _ROWS_A_BLOCK = 256
 class Sealed:
     """What became of a journal."""
 
-    header: Header
+    header: Header | None
+    """None: the journal held no row, and is gone."""
     rows: dict[str, int]
     """Rows by stream."""
     torn_bytes: int
-    """Bytes of a torn last row that were left out."""
+    """Length of the torn last record [byte], 0 after a clean end."""
     lost_bytes: int
-    """Bytes of damaged rows in the middle; where there are any, the journal is kept beside the artifact."""
+    """Damaged stretches before the last whole record [byte]; the journal is then kept as `.journal-damaged`."""
+
+
+@dataclass(frozen=True)
+class Rowset:
+    """Where the whole rows of one stream lie in the journal; 16 bytes a row, runs can be long."""
+
+    offsets: array[int] = field(default_factory=lambda: array("Q"))
+    sizes: array[int] = field(default_factory=lambda: array("Q"))
+
+    def __len__(self) -> int:
+        return len(self.offsets)
 
 
 def seal(journal: Path, target: Path, *, recovered: bool = False) -> Sealed:
     """Write the artifact of a closed journal, then remove the journal.
 
-    Nothing is lost on failure: the journal stays until the artifact is verified under its name.
-    Raises ArtifactError: damaged head, no rows, target exists, disk full.
+    Nothing is lost on failure: the journal stays until the artifact is verified under its name. A journal without a
+    single whole row leaves no artifact.
+
+    Raises ArtifactError: damaged head, target exists, disk full; UsageError: the recording is running.
     """
-    head, end = read_head(journal)
-    if target.exists():
-        if read_header(target).provenance == Provenance.model_validate(head.provenance):
-            return _finish(journal, checked_header(target), {}, 0)  # killed between sealing and tidying up
-        raise ArtifactError(
-            "an artifact of that name exists already",
-            where=str(target),
-            expected="no artifact, so that nothing is overwritten",
-            received="one",
-            hint=f"mv '{target}' '{target.with_suffix('.old.h5')}' && r2s2r recover '{journal}'",
-        )
-    places: dict[int, list[Place]] = defaultdict(list)
-    lost = 0
+    with unwatched(journal):
+        head, start = read_head(journal)
+        provenance = _provenance(journal, head)
+        rows, end, lost = _survey(journal, head, start)
+        torn = journal.stat().st_size - end
+        counts = {head.streams[n].key: len(r) for n, r in sorted(rows.items())}
+        if not rows:
+            _remove(journal, keep=torn > 0)
+            return Sealed(None, counts, torn, lost)
+        if target.exists():
+            header = _sealed_before(target, provenance, head, rows)  # killed between sealing and tidying up
+            if header is None:
+                raise ArtifactError(
+                    "an artifact of that name exists already",
+                    where=str(target),
+                    expected="no artifact, so that nothing is overwritten",
+                    received="one",
+                    hint=f"mv -n '{target}' '{target}.old' && r2s2r recover '{journal}'",
+                )
+        else:
+            header = write_artifact(target, _current(journal, head, rows, recovered), provenance)
+        _remove(journal, keep=lost > 0)
+        return Sealed(header, counts, torn, lost)
+
+
+def _survey(journal: Path, head: JournalHead, start: int) -> tuple[dict[int, Rowset], int, int]:
+    """The whole rows by stream, where the last one ends, and how many bytes between them are damaged."""
+    rows: dict[int, Rowset] = {}
+    end, lost = start, 0
     for place in records(journal):
         lost += place.start - end
         end = place.offset + place.length
-        places[place.stream].append(place)
-    if not places:
+        found = rows.setdefault(place.stream, Rowset())
+        found.offsets.append(place.offset)
+        found.sizes.append(place.length)
+    return rows, end, lost
+
+
+def _provenance(journal: Path, head: JournalHead) -> Provenance:
+    try:
+        if head.kind not in KINDS:
+            raise NoMigration(f"kind {head.kind} is not known")
+        chain(head.kind, head.schema_version)
+        return Provenance.model_validate(head.provenance)
+    except (NoMigration, ValidationError) as error:
         raise ArtifactError(
-            "the journal holds no rows, there is nothing to keep",
+            "this journal was written by another version of r2s2r",
             where=str(journal),
-            expected="at least one recorded row",
-            received="none",
-            hint=f"rm '{journal}'",
-        )
-    torn = journal.stat().st_size - end
-    header = write_artifact(target, _data(journal, head, places, recovered), Provenance.model_validate(head.provenance))
-    rows = {head.streams[n].path: len(p) for n, p in sorted(places.items())}
-    return _finish(journal, header, rows, torn, lost)
+            expected="a kind, version and provenance that this r2s2r knows",
+            received=" ".join(str(error).split())[:200],
+            hint="pip install --upgrade r2s2r",
+        ) from error
 
 
-def _finish(journal: Path, header: Header, rows: dict[str, int], torn: int, lost: int = 0) -> Sealed:
-    if lost:  # damage in the middle: keep the bytes, somebody may want to look at them
-        journal.rename(journal.with_suffix(".journal-damaged"))
-    else:
-        journal.unlink()
-    return Sealed(header, rows, torn, lost)
+def _sealed_before(
+    target: Path, provenance: Provenance, head: JournalHead, rows: Mapping[int, Rowset]
+) -> Header | None:
+    """The header of the artifact that an earlier, killed attempt made of the same journal; None for another one."""
+    if read_header(target).provenance != provenance:
+        return None
+    header = checked_header(target)
+    expected = {f"{head.streams[n].path}/{f.name}": len(r) for n, r in rows.items() for f in head.streams[n].fields}
+    return header if all(length(target, path) == count for path, count in expected.items()) else None
 
 
-def _data(journal: Path, head: JournalHead, places: dict[int, list[Place]], recovered: bool) -> ArtifactData:
+def _remove(journal: Path, *, keep: bool) -> None:
+    if keep:  # bytes that no row was made of: somebody may want to look at them
+        keep_beside(journal, "-damaged")
+    journal.unlink()
+
+
+def _current(journal: Path, head: JournalHead, rows: Mapping[int, Rowset], recovered: bool) -> ArtifactData:
     groups: dict[str, Group] = {}
     for path, attributes in head.groups.items():
         extra = {"recovered": True} if recovered and path.count("/") == 1 else {}
         groups[path] = Group({}, {**attributes, **extra})
     for number, stream in enumerate(head.streams):
-        rows = places.get(number, [])
-        if rows:
-            values = {field.name: _value(journal, stream, field, rows) for field in stream.fields}
-            groups[stream.path] = Group(values, stream.attributes)
+        if number in rows:
+            values = {column.name: _value(journal, stream, column, rows[number]) for column in stream.fields}
+            before = groups.get(stream.path, Group())
+            groups[stream.path] = Group({**before.datasets, **values}, {**before.attributes, **stream.attributes})
+    for _, step in chain(head.kind, head.schema_version):
+        groups = dict(step(groups))
     return ArtifactData(head.kind, groups)
 
 
-def _value(journal: Path, stream: Stream, field: Field, places: list[Place]) -> Value:
-    if field.dtype == "blobs":
-        return Blobs((bytes(row) for row in _column(journal, stream, field, places)), len(places))
-    blocks = _stacked(_column(journal, stream, field, places))
-    return Rows(blocks, (len(places), *field.shape), np.dtype(field.dtype))
+def _value(journal: Path, stream: Stream, column: Field, rows: Rowset) -> Value:
+    if column.dtype == "blobs":
+        return Blobs((bytes(row) for row in _column(journal, stream, column, rows)), len(rows))
+    blocks = _stacked(_column(journal, stream, column, rows))
+    return Rows(blocks, (len(rows), *column.shape), np.dtype(column.dtype))
 
 
-def _column(journal: Path, stream: Stream, field: Field, places: list[Place]) -> Iterator[np.ndarray | bytes]:
+def _column(journal: Path, stream: Stream, column: Field, rows: Rowset) -> Iterator[np.ndarray | bytes]:
     with journal.open("rb") as file:
-        for place in places:
-            file.seek(place.offset)
-            yield decode(stream, file.read(place.length))[field.name]
+        for offset, size in zip(rows.offsets, rows.sizes, strict=True):
+            file.seek(offset)
+            yield decode(stream, file.read(size))[column.name]
 
 
 def _stacked(rows: Iterator[np.ndarray | bytes]) -> Iterator[np.ndarray]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from r2s2r_cli.errors import R2S2RError
+from r2s2r_cli.errors import InputError, R2S2RError
 from r2s2r_cli.store.canonical import source_sha256
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
@@ -41,14 +41,18 @@ def reasons(project: Project, header: Header, wanted: Wanted) -> list[str]:
 
 
 def input_reasons(project: Project, ref: InputRef) -> list[str]:
-    """Why one recorded input no longer matches. A source outside the project may be gone: that is not stale."""
+    """Why one recorded input no longer matches.
+
+    A migration of an input changes its form, not what it says. A source file may be gone: what was made of it stays.
+    """
     path = project.root / ref.path
     if ref.kind in KINDS:
         try:
-            now = read_header(path).content_sha256
+            header = read_header(path)
         except R2S2RError as error:
             return [f"input {ref.path}: {error.what}"]
-        return [] if now == ref.sha256 else [f"input {ref.path} changed: its content hash is another"]
+        forms = {header.content_sha256, *(note.content_sha256 for note in header.provenance.migrations)}
+        return [] if ref.sha256 in forms else [f"input {ref.path} changed: its content hash is another"]
     try:
         changed = path.exists() and source_sha256(path) != ref.sha256
     except OSError as error:
@@ -80,7 +84,12 @@ def artifact_ref(project: Project, path: Path, header: Header) -> InputRef:
 
 
 def source_ref(project: Project, path: Path) -> InputRef:
-    """The reference to a file or folder from outside. Raises OSError."""
+    """The reference to a file or folder from outside. Raises OSError; InputError where its name is not text."""
+    try:
+        str(path).encode()
+    except UnicodeEncodeError as error:
+        raise InputError("the name of the file is not UTF-8 text", where=ascii(str(path)), expected="a UTF-8 name",
+                         received="other bytes", hint="rename it, then run the command again") from error  # fmt: skip
     kind = "folder" if path.is_dir() else "file"
     return InputRef(path=project.relative(path), kind=kind, sha256=source_sha256(path))
 

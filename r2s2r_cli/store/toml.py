@@ -24,6 +24,10 @@ def read_toml(path: Path) -> dict[str, Any]:
 def read_text(path: Path) -> str:
     """A small UTF-8 text file. Raises InputError."""
     try:
+        if path.exists() and not path.is_file():
+            raise InputError("this is not a file", where=str(path), expected="a TOML file",
+                             received="a directory" if path.is_dir() else "a pipe, socket or device",
+                             hint=f"ls -la '{path}'")  # fmt: skip
         if path.stat().st_size > MAX_BYTES:
             raise InputError("the file is too large for a TOML file", where=str(path), expected="at most 4 MB",
                              received=f"{path.stat().st_size} bytes", hint=f"ls -la '{path}'")  # fmt: skip

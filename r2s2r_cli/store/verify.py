@@ -8,7 +8,7 @@ from typing import Any
 import h5py
 
 from r2s2r_cli.errors import ArtifactError
-from r2s2r_cli.store.hashing import attributes, blocks, digest_file, plain, walk
+from r2s2r_cli.store.hashing import attributes, blocks, check_dataset, digest_file, plain, walk
 from r2s2r_cli.store.hdf5_errors import meaning
 from r2s2r_cli.store.header import HDF5_SIGNATURE, MAX_BLOCK, MIN_BLOCK, read_header
 from r2s2r_cli.store.layout import check_layout
@@ -19,10 +19,9 @@ Report = dict[str, Any]
 """JSON: `readable`, `content_ok`, `seal_ok` (bool) and `problems` (list of where, what, expected, received)."""
 
 
-def verify(path_text: str) -> Report:
+def verify(path: str) -> Report:
     """Read everything in a file and compare it with its digests and its schema. Never raises for damage."""
-    path = Path(path_text)
-    header, problems = _header(path)
+    header, problems = _header(Path(path))
     try:
         with h5py.File(path, "r", locking=False) as file:
             return _verify_open(file, header, problems)
@@ -31,13 +30,15 @@ def verify(path_text: str) -> Report:
         return {"readable": False, "content_ok": False, "seal_ok": False, "problems": problems}
 
 
-def tree(path_text: str) -> Report:
+def tree(path: str) -> Report:
     """What a foreign HDF5 file holds: nodes with shape, dtype and scalar attributes."""
     nodes: list[dict[str, Any]] = []
     try:
-        with h5py.File(path_text, "r", locking=False) as file:
-            for path, node in walk(file):
-                entry: dict[str, Any] = {"path": path, "attributes": _safe_attributes(node)}
+        with h5py.File(path, "r", locking=False) as file:
+            for path, node in walk(file, strict=False):
+                entry: dict[str, Any] = {"path": path, "attributes": {"link": str(node)}}
+                if isinstance(node, h5py.Dataset | h5py.Group):
+                    entry["attributes"] = _safe_attributes(node)
                 if isinstance(node, h5py.Dataset):
                     entry |= {"shape": list(node.shape or ()), "dtype": str(node.dtype)}
                 nodes.append(entry)
@@ -110,10 +111,7 @@ def _read_through(path: str, node: h5py.Dataset | h5py.Group) -> dict[str, str] 
     try:
         attributes(node)
         if isinstance(node, h5py.Dataset):
-            if node.dtype.hasobject:
-                return _problem(
-                    path, "artifacts have no object dtypes", "numbers or fixed-length text", str(node.dtype)
-                )
+            check_dataset(node)
             for _ in blocks(node):
                 pass
     except Exception as error:

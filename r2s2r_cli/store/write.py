@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import h5py
@@ -13,14 +13,18 @@ from r2s2r_cli import __version__
 from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Rows, Scalar, Value
 from r2s2r_cli.store.atomic import replacing
 from r2s2r_cli.store.hashing import PROVENANCE, digest_file
-from r2s2r_cli.store.header import block_size, body_sha256, write_block
+from r2s2r_cli.store.hdf5_file import writable
+from r2s2r_cli.store.header import MAX_BLOCK, block_size, body_sha256, read_header, write_block
 from r2s2r_cli.store.layout import BLOB_BYTES, BLOB_OFFSET, check_layout, on_disk
 from schemas.base import ArtifactSpec, DatasetSpec
 from schemas.header import Header, Provenance
 from schemas.versions import KINDS
 
 CREATED_BY = f"r2s2r {__version__}"
+Check = Callable[[], None]
+"""Raises what stopped the writing: a full disk, Ctrl-C."""
 _CHUNK_BYTES = 1 << 18
+_BLOCK_BYTES = 1 << 22
 _BLOB_BUFFER = 1 << 20
 _ZEROS = "0" * 64
 
@@ -36,66 +40,93 @@ def write_artifact(path: Path, data: ArtifactData, provenance: Provenance, *, ti
     title = title or spec.title
     draft = Header(
         kind=spec.kind, schema_version=spec.version, title=title, created_by=CREATED_BY, content_sha256=_ZEROS,
-        seal_sha256=_ZEROS, body_sha256=_ZEROS, body_bytes=10**15, provenance=provenance,
+        seal_sha256=_ZEROS, body_sha256=_ZEROS, body_offset=MAX_BLOCK, body_bytes=10**15, provenance=provenance,
         datasets=dict.fromkeys(_dataset_paths(data, spec), _ZEROS),
     )  # fmt: skip
-    size = block_size(draft)
+    draft = draft.model_copy(update={"body_offset": block_size(draft)})
     with replacing(path) as temp:
-        _write_body(temp, data, spec, draft, size)
-        header = _seal(temp, spec, draft, size)
-        write_block(temp, header, size)
+        _write_body(temp, data, spec, draft)
+        header = _seal(temp, spec, draft)
+        write_block(temp, header)
+        if read_header(temp).model_dump_json() != header.model_dump_json():
+            raise ValueError(f"the header of {path.name} does not read back as it was written")
     return header
 
 
-def _write_body(temp: Path, data: ArtifactData, spec: ArtifactSpec, header: Header, size: int) -> None:
-    with h5py.File(temp, "w", userblock_size=size, libver="v110") as file:
+def _write_body(temp: Path, data: ArtifactData, spec: ArtifactSpec, header: Header) -> None:
+    with writable(temp, "w", userblock_size=header.body_offset, libver="v110") as (file, check):
         for name, value in (
             ("kind", header.kind), ("schema_version", header.schema_version), ("title", header.title),
             ("created_by", header.created_by), ("content_sha256", _ZEROS), ("seal_sha256", _ZEROS),
         ):  # fmt: skip
             _set_attribute(file, name, value)
         for path, group in sorted(data.groups.items()):
-            _write_group(file, path, group, spec)
+            _write_group(file, path, group, spec, check)
+            check()
         record = file.create_group(PROVENANCE)
         for name, value in header.provenance.model_dump(mode="json").items():
             text = json.dumps(value, sort_keys=True, ensure_ascii=False).encode()
             record.create_dataset(name, data=np.array(text, dtype=f"S{len(text)}"))
-        file.flush()
 
 
-def _write_group(file: h5py.File, path: str, group: Group, spec: ArtifactSpec) -> None:
+def _write_group(file: h5py.File, path: str, group: Group, spec: ArtifactSpec, check: Check) -> None:
     layout = spec.group(path)
     if layout is None:
         raise ValueError(f"{spec.kind} has no group {path}")
     node = file.require_group(path)
+    types = {attribute.name: attribute.type for attribute in layout.attributes}
     for name, scalar in sorted(group.attributes.items()):
-        _set_attribute(node, name, scalar)
+        whole = types.get(name) == "float" and not isinstance(scalar, str | bool)
+        _set_attribute(node, name, float(scalar) if whole else scalar)  # 1 and 1.0 are one content
     for name, value in sorted(group.datasets.items()):
         dataset = layout.dataset(name)
         if dataset is None:
             raise ValueError(f"{spec.kind} has no dataset {path}/{name}")
-        _write_value(node, dataset, value)
+        _write_value(node, dataset, value, check)
 
 
-def _write_value(node: h5py.Group, spec: DatasetSpec, value: Value) -> None:
+def _write_value(node: h5py.Group, spec: DatasetSpec, value: Value, check: Check) -> None:
     if isinstance(value, Blobs):
         (_, data_spec), (_, offset_spec) = on_disk(spec)
-        _write_blobs(node.require_group(spec.path), data_spec, offset_spec, value)
+        _write_blobs(node.require_group(spec.path), data_spec, offset_spec, value, check)
         return
     if isinstance(value, Rows):
-        _write_rows(node, spec.path, spec, value)
+        _write_rows(node, spec.path, spec, value, check)
         return
-    array = np.asarray(value)
-    dtype = array.dtype if spec.dtype == "str" else np.dtype(spec.dtype)
-    if array.dtype != dtype:
-        raise ValueError(f"{spec.path}: dtype {array.dtype}, the schema says {dtype}")
-    _write_rows(node, spec.path, spec, Rows(iter([array]), array.shape, dtype))
+    array = _text(np.asarray(value)) if spec.dtype == "str" else np.asarray(value)
+    _write_rows(node, spec.path, spec, Rows(_pieces(array), array.shape, array.dtype), check)
 
 
-def _write_rows(node: h5py.Group, name: str, spec: DatasetSpec, rows: Rows) -> None:
+def _text(array: np.ndarray) -> np.ndarray:
+    """Text as UTF-8 bytes of the smallest width: equal words are one content, whatever they were padded to."""
+    encoded = np.char.encode(array, "utf-8") if array.dtype.kind == "U" else array
+    if encoded.dtype.kind != "S":
+        raise ValueError(f"dtype {array.dtype}, the schema says text")
+    width = max((len(item) for item in encoded.ravel().tolist()), default=0)
+    return encoded.astype(f"S{max(1, width)}")
+
+
+def _pieces(array: np.ndarray) -> Iterator[np.ndarray]:
+    """An array in blocks of about 4 MB, so that a full disk is noticed between two of them."""
+    if array.ndim == 0:
+        yield array
+        return
+    step = max(1, _BLOCK_BYTES // max(1, array[:1].nbytes))
+    for start in range(0, len(array), step):
+        yield array[start : start + step]
+
+
+def _write_rows(node: h5py.Group, name: str, spec: DatasetSpec, rows: Rows, check: Check) -> None:
+    if spec.dtype != "str" and rows.dtype != np.dtype(spec.dtype):
+        raise ValueError(f"{spec.path}: dtype {rows.dtype}, the schema says {spec.dtype}")
     target = _create(node, name, rows.shape, rows.dtype, spec)
     start = 0
     for block in rows.blocks:
+        if block.dtype != rows.dtype or block.shape[1:] != rows.shape[1:]:
+            raise ValueError(
+                f"{spec.path}: a block of {block.dtype} {block.shape} in rows of {rows.dtype} {rows.shape}"
+            )
+        check()
         if block.ndim == 0:
             target[()] = block
             return
@@ -105,17 +136,20 @@ def _write_rows(node: h5py.Group, name: str, spec: DatasetSpec, rows: Rows) -> N
         raise ValueError(f"{spec.path}: {start} rows came, {rows.shape[0]} were promised")
 
 
-def _write_blobs(node: h5py.Group, data_spec: DatasetSpec, offset_spec: DatasetSpec, blobs: Blobs) -> None:
+def _write_blobs(
+    node: h5py.Group, data_spec: DatasetSpec, offset_spec: DatasetSpec, blobs: Blobs, check: Check
+) -> None:
     target = _create(node, BLOB_BYTES, (0,), np.dtype(np.uint8), data_spec, growing=True)
     offsets = [0]
     for piece in _buffered(blobs, offsets):
+        check()
         start = target.shape[0]
         target.resize(start + len(piece), axis=0)
         target[start:] = np.frombuffer(piece, dtype=np.uint8)
     if len(offsets) != blobs.count + 1:
         raise ValueError(f"{data_spec.path}: {len(offsets) - 1} frames came, {blobs.count} were promised")
     array = np.array(offsets, dtype=np.uint64)
-    _write_rows(node, BLOB_OFFSET, offset_spec, Rows(iter([array]), array.shape, array.dtype))
+    _write_rows(node, BLOB_OFFSET, offset_spec, Rows(iter([array]), array.shape, array.dtype), check)
 
 
 def _buffered(blobs: Blobs, offsets: list[int]) -> Iterator[bytes]:
@@ -153,7 +187,10 @@ def _create(
 
 
 def _set_attribute(node: h5py.Group | h5py.Dataset, name: str, value: Scalar) -> None:
+    value = value.item() if isinstance(value, np.generic) else value
     if isinstance(value, str):
+        if "\0" in value:
+            raise ValueError(f"attribute {name} holds a NUL character, which HDF5 cuts text at")
         encoded = value.encode()  # fixed length: no object types in an artifact
         node.attrs.create(name, np.array(encoded, dtype=h5py.string_dtype("utf-8", max(1, len(encoded)))))
     elif isinstance(value, bool):
@@ -166,16 +203,16 @@ def _set_attribute(node: h5py.Group | h5py.Dataset, name: str, value: Scalar) ->
         node.attrs.create(name, np.float64(value))
 
 
-def _seal(temp: Path, spec: ArtifactSpec, draft: Header, size: int) -> Header:
+def _seal(temp: Path, spec: ArtifactSpec, draft: Header) -> Header:
     """Reopen, check the layout, and write the digests of what can be read back."""
-    with h5py.File(temp, "r+") as file:
+    with writable(temp, "r+") as (file, _):
         mismatches = check_layout(file, spec)
         if mismatches:
             raise ValueError(f"not the layout of {spec.kind}: {mismatches[0]}")
         digests = digest_file(file)
-        file.attrs.modify("content_sha256", np.array(digests.content.encode(), dtype=h5py.string_dtype("utf-8", 64)))
-        file.attrs.modify("seal_sha256", np.array(digests.seal.encode(), dtype=h5py.string_dtype("utf-8", 64)))
-    body, length = body_sha256(temp, size)
+        for name, digest in (("content_sha256", digests.content), ("seal_sha256", digests.seal)):
+            file.attrs.modify(name, np.array(digest.encode(), dtype=h5py.string_dtype("utf-8", 64)))
+    body, length = body_sha256(temp, draft.body_offset)
     return draft.model_copy(
         update={
             "content_sha256": digests.content, "seal_sha256": digests.seal, "datasets": digests.datasets,

@@ -121,8 +121,11 @@ class ValidateResult(Frozen):
     checks: tuple[str, ...]
     """Names of the checks that ran."""
     findings: tuple[Finding, ...]
+    unreadable: tuple[str, ...]
+    """Files that cannot be read at all; where there are any, the exit code is 4."""
     errors: int
     warnings: int
+    advice: int
 
 
 class MigrateResult(Frozen):

@@ -12,18 +12,22 @@ import typer
 from r2s2r_cli.commands.bench import bench_app
 from r2s2r_cli.commands.calibrate import calibrate
 from r2s2r_cli.commands.doctor import doctor
+from r2s2r_cli.commands.estimate import estimate
 from r2s2r_cli.commands.export import export
 from r2s2r_cli.commands.import_ import import_
 from r2s2r_cli.commands.init import init
 from r2s2r_cli.commands.inspect import inspect
 from r2s2r_cli.commands.status import status
+from r2s2r_cli.commands.validate import validate
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "init": init,
     "calibrate": calibrate,
     "import": import_,
+    "estimate": estimate,
     "status": status,
     "inspect": inspect,
+    "validate": validate,
     "doctor": doctor,
     "export": export,
 }

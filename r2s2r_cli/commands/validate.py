@@ -1,0 +1,208 @@
+"""`r2s2r validate`: is what is stored right, in itself, against its schema, and against the rest of the project?"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from r2s2r_cli.console import Console, print_error
+from r2s2r_cli.errors import ArtifactError, GateError, R2S2RError, UsageError
+from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
+from schemas.results import Finding, ValidateResult
+
+if TYPE_CHECKING:
+    from r2s2r_cli.checks.base import Check
+    from r2s2r_cli.commands.validation import Place, Places
+
+
+def validate(
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Artifacts, robot.toml, project.toml, config.toml, policies; default: the whole project."),
+    ] = None,
+    select: Annotated[
+        str | None, typer.Option("--select", metavar="NAMES", help="Only these checks, separated by commas.")
+    ] = None,
+    ignore: Annotated[
+        str | None, typer.Option("--ignore", metavar="NAMES", help="All checks but these, separated by commas.")
+    ] = None,
+    iteration: Annotated[
+        int | None, typer.Option("--iteration", metavar="N", help="Only the files of iteration N.")
+    ] = None,
+    project: ProjectOption = None,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Check files: can they be read, have they the form of their schema, do their numbers make this robot.
+
+    Leaves with 3 where a check found an error, 4 where a file cannot be read. docs/reference/checks.md has the checks.
+
+    Example: r2s2r validate iterations/001/10-record.h5
+    """
+    from r2s2r_cli.commands.validation import Places, files_of, journals_of, shown
+
+    console = Console(json=json, quiet=quiet)
+    chosen = choose(select, ignore)
+    places = Places()
+    if files:
+        if iteration is not None:
+            raise UsageError("--iteration and files exclude each other", where="--iteration", expected="one of the two",
+                             received="both", hint="r2s2r validate --iteration N")  # fmt: skip
+        found = _check(files, chosen, project, places, console)
+        paths = list(files)
+    else:
+        place = _here(project, places)
+        paths = files_of(place, iteration)
+        found = _check(paths, chosen, place.root, places, console)
+        from r2s2r_cli.checks.base import run_checks
+
+        found += run_checks(chosen, journals_of(place), shown(place.root))
+    result = _result([shown(path) for path in paths] if not files else [str(p) for p in paths], chosen, found)
+    console.document(result)
+    _show(result, console)
+    _leave(result, console)
+
+
+def choose(select: str | None, ignore: str | None) -> list[Check]:
+    """The checks to run, in the order of the registry. Raises UsageError for unknown names."""
+    from r2s2r_cli.checks import CHECKS
+    from r2s2r_cli.checks.files import ALWAYS
+
+    wanted, unwanted = _names(select, "--select"), _names(ignore, "--ignore")
+    required = {entry.name for entry in ALWAYS if entry.importance == "error"}
+    for name in sorted(required & unwanted):
+        raise UsageError(f"{name} cannot be ignored: a file that cannot be read has not passed", where="--ignore",
+                         expected="another check", received=name, hint="leave the file out of the command")  # fmt: skip
+    return [entry for entry in CHECKS if (not wanted or entry.name in wanted) and entry.name not in unwanted]
+
+
+def _names(text: str | None, option: str) -> set[str]:
+    from r2s2r_cli.checks import CHECKS
+
+    known = [entry.name for entry in CHECKS]
+    names = {name.strip() for name in (text or "").split(",") if name.strip()}
+    if text is not None and not names:
+        raise UsageError("no check is named", where=option, expected="names separated by commas", received=repr(text),
+                         hint=f"r2s2r validate {option} {known[0]}")  # fmt: skip
+    for name in sorted(names - set(known)):
+        near = difflib.get_close_matches(name, known, n=1, cutoff=0.4)
+        hint = f"r2s2r validate {option} {near[0]}" if near else "docs/reference/checks.md lists the checks"
+        raise UsageError(f"there is no check {name}", where=option, expected=near[0] if near else "a name of a check",
+                         received=name, hint=hint)  # fmt: skip
+    return names
+
+
+def _here(project: Path | None, places: Places) -> Place:
+    """The project that is meant. One whose project.toml is wrong counts: that is a finding."""
+    from r2s2r_cli.store.project import Project
+
+    place = places.of(project or Path.cwd())
+    if place is None or (project is not None and place.root != project.absolute()):
+        Project.find(project)  # says what is missing
+        raise ArtifactError("there is no project here", where=str(project or Path.cwd()), expected="project.toml",
+                            received="none", hint="r2s2r init myrobot")  # fmt: skip
+    return place
+
+
+def _check(
+    paths: Sequence[Path], chosen: Sequence[Check], project: Path | None, places: Places, console: Console
+) -> list[Finding]:
+    from r2s2r_cli.commands.validation import findings_of, gather, shown
+    from r2s2r_cli.store.isolated import IsolatedReader
+
+    found: list[Finding] = []
+    told: set[str] = set()
+    with IsolatedReader() as reader, console.progress("files", len(paths)) as advance:
+        for path in paths:
+            place = places.of(project or path)
+            for remark in _remarks(place):
+                if remark not in told:
+                    told.add(remark)
+                    console.say(remark)
+            name = shown(path) if path.is_absolute() else str(path)
+            found += findings_of(gather(path, place, reader), name, chosen)
+            advance(1)
+    return found
+
+
+def _remarks(place: Place | None) -> Iterator[str]:
+    if place is None:
+        yield "no project above these files: checks against the robot and the inputs are left out"
+    elif place.robot is None and place.problem is not None:
+        yield f"checks against the robot are left out: {place.problem.what} ({place.problem.where})"
+
+
+def _result(files: Sequence[str], chosen: Sequence[Check], found: Sequence[Finding]) -> ValidateResult:
+    from r2s2r_cli.checks.files import ALWAYS
+
+    fatal = {entry.name for entry in ALWAYS if entry.importance == "error"}
+    count = {name: sum(finding.importance == name for finding in found) for name in ("error", "warning", "advice")}
+    return ValidateResult(
+        files=tuple(files), checks=tuple(entry.name for entry in chosen), findings=tuple(found),
+        unreadable=tuple(dict.fromkeys(f.file for f in found if f.check in fatal)),
+        errors=count["error"], warnings=count["warning"], advice=count["advice"],
+    )  # fmt: skip
+
+
+def _show(result: ValidateResult, console: Console) -> None:
+    for importance in ("error", "warning", "advice"):
+        blocks: dict[tuple[str, ...], list[Finding]] = {}
+        for finding in result.findings:
+            if finding.importance == importance:
+                key = (finding.check, finding.file, finding.what, finding.expected, finding.hint)
+                blocks.setdefault(key, []).append(finding)
+        for group in blocks.values():
+            _show_block(group, console)
+    console.data(_summary(result))
+
+
+def _show_block(group: Sequence[Finding], console: Console) -> None:
+    first = group[0]
+    console.data(f"{first.importance}: {first.what}  [{first.check}]")
+    more = f" (and {len(group) - 1} more places)" if len(group) > 1 else ""
+    console.data(f"  where:    {_where(first)}{more}")
+    if first.expected:
+        console.data(f"  expected: {first.expected}")
+    if first.received:
+        console.data(f"  received: {first.received}")
+    console.data(f"  hint:     {first.hint}\n")
+
+
+def _where(finding: Finding) -> str:
+    """`file:/runs/crawl/caps/p_WE`, `robot.toml, key rods.0`, or the file alone."""
+    if not finding.location or finding.location.startswith(finding.file):
+        return finding.location or finding.file
+    return f"{finding.file}: {finding.location}"
+
+
+def _summary(result: ValidateResult) -> str:
+    def counted(count: int, one: str, many: str) -> str:
+        return f"{count} {one if count == 1 else many}"
+
+    parts = [counted(result.errors, "error", "errors"), counted(result.warnings, "warning", "warnings"),
+             f"{result.advice} advice"]  # fmt: skip
+    checked = f"{counted(len(result.files), 'file', 'files')}, {counted(len(result.checks), 'check', 'checks')}"
+    return f"{checked}: {', '.join(parts)}"
+
+
+def _leave(result: ValidateResult, console: Console) -> None:
+    """Raise what gives the exit code; with --json the document has been printed, so the error goes to stderr only."""
+    first = next((finding for finding in result.findings if finding.importance == "error"), None)
+    if first is None:
+        return
+    kind: type[R2S2RError] = GateError
+    files = {finding.file for finding in result.findings if finding.importance == "error"}
+    errors = "1 error" if result.errors == 1 else f"{result.errors} errors"
+    what = f"{errors} in {len(files)} of {len(result.files)} files"
+    if result.unreadable:
+        kind, what = ArtifactError, f"{len(result.unreadable)} of {len(result.files)} files cannot be read"
+        first = next(finding for finding in result.findings if finding.file == result.unreadable[0])
+    error = kind(what, where=_where(first), expected=first.expected, received=first.received, hint=first.hint)
+    if not console.json:
+        raise error
+    print_error(error, as_json=False)
+    raise typer.Exit(int(error.exit_code))

@@ -1,0 +1,284 @@
+"""What `validate` gathers about each file, as values for the checks, and the order in which they are run."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from r2s2r_cli.checks import CHECKS
+from r2s2r_cli.checks.base import Check, run_checks
+from r2s2r_cli.checks.files import ALWAYS
+from r2s2r_cli.checks.schema import FORM
+from r2s2r_cli.checks.subjects import (
+    Content,
+    Difference,
+    InputState,
+    Journals,
+    Links,
+    Policy,
+    Reading,
+    policies_of,
+    runs_of,
+)
+from r2s2r_cli.errors import ArtifactError, InputError, R2S2RError, UsageError
+from r2s2r_cli.store.canonical import source_sha256
+from r2s2r_cli.store.examine import Examined, examine
+from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.isolated import IsolatedReader
+from r2s2r_cli.store.layout import Mismatch
+from r2s2r_cli.store.project import CONFIG_FILE, ITERATIONS, JOURNAL_SUFFIX, PROJECT_FILE, Project
+from r2s2r_cli.store.toml import check_model, read_toml
+from schemas.base import Frozen
+from schemas.config import ProjectFile, RunConfig
+from schemas.header import InputRef
+from schemas.policy import PolicyFile
+from schemas.results import Finding
+from schemas.robot import Robot
+from schemas.sidecar import Sidecar
+from schemas.versions import KINDS, STAGE_VERSIONS
+
+ROBOT_FILE = "robot.toml"
+_TOML: dict[str, type[Frozen]] = {
+    "policy": PolicyFile,
+    "robot description": Robot,
+    "project file": ProjectFile,
+    "settings of an iteration": RunConfig,
+    "sidecar": Sidecar,
+}
+"""What a TOML file can be, in the order in which a tie is decided."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """The project that a file belongs to, as far as it can be read."""
+
+    root: Path
+    project: Project | None = None
+    robot: Robot | None = None
+    problem: R2S2RError | None = None
+    """Why `project` or `robot` is None."""
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """One file as the checks see it."""
+
+    reading: Reading
+    links: Links | None = None
+    content: Content | None = None
+    subjects: tuple[object, ...] = ()
+    """Runs, policies, the robot: looked at where the form of `content` is right."""
+
+    @property
+    def unreadable(self) -> bool:
+        """Whether nothing but `reading` could be checked."""
+        return self.reading.refused is not None or bool(self.reading.damage)
+
+
+@dataclass
+class Places:
+    """The projects of the files of one command; each is loaded once."""
+
+    known: dict[Path, Place] = field(default_factory=dict)
+
+    def of(self, path: Path) -> Place | None:
+        """The project of the nearest parent of `path` (or `path` itself) that has a project.toml; None: of none."""
+        start = path.absolute()
+        root = next((p for p in (start, *start.parents) if (p / PROJECT_FILE).is_file()), None)
+        if root is None:
+            return None
+        if root not in self.known:
+            self.known[root] = _load(root)
+        return self.known[root]
+
+
+def _load(root: Path) -> Place:
+    try:
+        project = Project.find(root)
+    except R2S2RError as error:
+        return Place(root, problem=error)
+    try:
+        return Place(root, project, project.robot())
+    except R2S2RError as error:
+        return Place(root, project, problem=error)
+
+
+def files_of(place: Place, iteration: int | None = None) -> list[Path]:
+    """Every file of a project that can be checked, in the order of the data; or those of one iteration."""
+    folder = place.root / ITERATIONS
+    if iteration is not None:
+        if place.project is None:
+            raise place.problem or UsageError("there is no project", hint="r2s2r init myrobot")
+        own = place.project.iteration(iteration).path
+        return [p for p in (own / CONFIG_FILE, *_artifacts(own)) if p.is_file()]
+    robot = place.project.robot_path if place.project else place.root / ROBOT_FILE
+    found = [place.root / PROJECT_FILE, robot, *_policies(place.root), *_artifacts(place.root)]
+    for path in sorted(folder.glob("*/")):
+        found += [p for p in (path / CONFIG_FILE,) if p.is_file()] + _artifacts(path)
+    return list(dict.fromkeys(found))
+
+
+def journals_of(place: Place) -> Journals:
+    """The recordings of a project that were not sealed."""
+    return Journals(tuple(shown(p) for p in sorted((place.root / ITERATIONS).glob(f"*/*{JOURNAL_SUFFIX}"))))
+
+
+def _artifacts(folder: Path) -> list[Path]:
+    return sorted(p for p in folder.glob("*.h5") if not p.name.startswith("."))
+
+
+def _policies(root: Path) -> list[Path]:
+    """TOML files of the project directory that have steps: policies, whether right or wrong."""
+    named = {PROJECT_FILE, ROBOT_FILE}
+    candidates = [p for p in (*root.glob("*.toml"), *root.glob("policies/*.toml")) if p.name not in named]
+    return sorted(p for p in candidates if p.is_file() and b"steps" in p.read_bytes())
+
+
+def shown(path: Path) -> str:
+    """A path as it can be pasted where the command runs: relative below the working directory, else absolute."""
+    absolute = path.absolute()
+    return os.path.relpath(absolute) if absolute.is_relative_to(Path.cwd()) else str(absolute)
+
+
+def gather(path: Path, place: Place | None, reader: IsolatedReader) -> Gathered:
+    """Read one file, whatever it is. Never raises for what is in it."""
+    try:
+        if _is_toml(path):
+            return _gather_toml(path, place)
+        _refuse_others(path)
+    except R2S2RError as error:
+        return Gathered(Reading(refused=error))
+    return _gather_artifact(path, examine(path, reader), place)
+
+
+def findings_of(gathered: Gathered, file: str, selected: Collection[Check]) -> list[Finding]:
+    """All findings of one file: can it be read, its links, its form, and where that is right, its values."""
+    found = run_checks(ALWAYS, gathered.reading, file)
+    if gathered.unreadable:
+        return found
+    chosen = [entry for entry in CHECKS if entry in selected]
+    found = [finding for finding in found if any(finding.check == entry.name for entry in chosen)]
+    if gathered.links is not None:
+        found += run_checks(chosen, gathered.links, file)
+    if gathered.content is not None:
+        wrong = run_checks(FORM, gathered.content, file)
+        if wrong:
+            names = {entry.name for entry in chosen}
+            return found + [finding for finding in wrong if finding.check in names]
+        found += run_checks([entry for entry in chosen if entry not in FORM], gathered.content, file)
+    for subject in gathered.subjects:
+        found += run_checks(chosen, subject, file)
+    return found
+
+
+def _is_toml(path: Path) -> bool:
+    return path.suffix.lower() == ".toml" and not path.is_dir()
+
+
+def _refuse_others(path: Path) -> None:
+    """Raises InputError for files that are neither artifacts nor TOML, with the command that takes them."""
+    hints = {
+        ".csv": f"r2s2r import '{path}'",
+        JOURNAL_SUFFIX: f"r2s2r recover '{path}'",
+        ".json": "r2s2r import --help",
+    }
+    hint = hints.get(path.suffix.lower())
+    if hint is not None and path.is_file():
+        raise InputError("validate does not read files of this kind", where=str(path),
+                         expected="an artifact (.h5) or a TOML file", received=f"a {path.suffix} file",
+                         hint=hint)  # fmt: skip
+
+
+def _gather_artifact(path: Path, found: Examined, place: Place | None) -> Gathered:
+    reading = Reading(found.refused, found.newer, _differences(found.damage), found.unread_bytes)
+    if found.header is None or found.data is None:
+        return Gathered(reading)
+    robot = place.robot if place is not None else None
+    data = found.data
+    content = Content(data, _differences(found.layout))
+    robots = {
+        group: str(values.attributes["robot"])
+        for group, values in data.groups.items()
+        if isinstance(values.attributes.get("robot"), str)
+    }
+    links = Links(
+        header=found.header, body=found.body, robots=robots, project_robot=robot.name if robot else None,
+        inputs=tuple(_inputs(found.header.provenance.inputs, place)), stage_versions=STAGE_VERSIONS,
+        filename=path.name if place is not None else "",
+    )  # fmt: skip
+    if found.layout:
+        return Gathered(reading, links, content)
+    subjects = (*(runs_of(data, robot) if "runs" in _roots(data.groups) else ()), *policies_of(data, robot))
+    return Gathered(reading, links, content, subjects)
+
+
+def _differences(places: tuple[Mismatch, ...]) -> tuple[Difference, ...]:
+    return tuple(Difference(p.where, p.what, p.expected, p.received) for p in places)
+
+
+def _roots(groups: Mapping[str, object]) -> set[str]:
+    return {path.partition("/")[0] for path in groups}
+
+
+def _inputs(refs: tuple[InputRef, ...], place: Place | None) -> Iterator[InputState]:
+    """What became of the recorded inputs. Outside a project their paths lead nowhere: nothing is said."""
+    for ref in refs if place is not None else ():
+        path = place.root / ref.path  # type: ignore[union-attr]
+        try:
+            if ref.kind in KINDS:
+                yield InputState(ref, read_header(path).content_sha256)
+            elif path.exists():
+                yield InputState(ref, source_sha256(path))
+            else:
+                yield InputState(ref, None, "it is gone")
+        except ArtifactError as error:
+            yield InputState(ref, None, error.what)
+        except OSError as error:
+            yield InputState(ref, None, error.strerror or str(error))
+
+
+def _gather_toml(path: Path, place: Place | None) -> Gathered:
+    if path.exists() and not path.is_file():
+        raise InputError("this is no regular file", where=str(path), expected="a TOML file", hint=f"ls -la '{path}'")
+    values = read_toml(path)
+    model = check_model(values, _model_of(path, values, place), str(path))
+    if isinstance(model, Robot):
+        return Gathered(Reading(), subjects=(model,))
+    if isinstance(model, PolicyFile):
+        return Gathered(Reading(), subjects=(_policy(model, place),))
+    return Gathered(Reading())
+
+
+def _model_of(path: Path, values: Mapping[str, object], place: Place | None) -> type[Frozen]:
+    """What a TOML file is: by its place in the project, else by its keys. Raises InputError."""
+    if place is not None and place.project is not None and path.absolute() == place.project.robot_path.absolute():
+        return Robot
+    named: dict[str, type[Frozen]] = {PROJECT_FILE: ProjectFile, CONFIG_FILE: RunConfig, ROBOT_FILE: Robot}
+    if path.name in named:
+        return named[path.name]
+    scores = {}
+    for words, model in _TOML.items():
+        known = {entry.alias or name for name, entry in model.model_fields.items()}
+        scores[words] = len(known & set(values)) - len(set(values) - known)
+    best = max(scores, key=lambda words: scores[words])
+    if scores[best] < 1:
+        raise InputError("this is none of the TOML files that r2s2r reads", where=str(path), expected=", ".join(_TOML),
+                         received=f"a file with the keys {', '.join(sorted(values)[:5]) or '(none)'}",
+                         hint="see docs/reference/checks.md for what validate looks at")  # fmt: skip
+    return _TOML[best]
+
+
+def _policy(file: PolicyFile, place: Place | None) -> Policy:
+    return Policy(
+        root="",
+        robot_name=file.robot,
+        target=np.array([step.target for step in file.steps]),
+        hold=np.array([step.hold_s for step in file.steps]),
+        timeout=np.array([np.nan if step.timeout_s is None else step.timeout_s for step in file.steps]),
+        repeat=file.repeat,
+        project_robot=place.robot if place is not None else None,
+    )

@@ -24,6 +24,9 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Override one setting, e.g. estimate.key=0.1; repeatable."),
 ]
+DrawOption = Annotated[
+    bool, typer.Option("--draw/--no-draw", help="Pictures and an HTML page beside the artifact, or none.")
+]
 ShowConfigOption = Annotated[bool, typer.Option("--show-config", help="Print the effective settings as TOML and stop.")]
 
 

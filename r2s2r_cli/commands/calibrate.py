@@ -10,6 +10,7 @@ import typer
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import InputError, R2S2RError
 from r2s2r_cli.options import (
+    DrawOption,
     DryRunOption,
     ForceOption,
     JsonOption,
@@ -46,7 +47,9 @@ def calibrate(
     points: Annotated[
         _File, typer.Option("--points", metavar="CSV", help="Length and capacitance of the sensors, one or more sets.")
     ] = None,
-    history: Annotated[_File, typer.Option("--history", metavar="JSON", help="Dated calibrations: their drift.")] = None,
+    history: Annotated[
+        _File, typer.Option("--history", metavar="JSON", help="Dated calibrations: their drift.")
+    ] = None,
     tendons: Annotated[
         list[Path] | None, typer.Option("--tendons", metavar="CSV", help="Force-displacement curves; repeatable.")
     ] = None,
@@ -59,6 +62,7 @@ def calibrate(
     project: ProjectOption = None,
     json: JsonOption = False,
     quiet: QuietOption = False,
+    draw: DrawOption = True,
     dry_run: DryRunOption = False,
     force: ForceOption = False,
     set_: SetOption = None,
@@ -93,7 +97,7 @@ def calibrate(
         outcome.append(report)
         return data, report
 
-    result = run.run(compute, lambda data, _: _draw(data, outcome[0], here.robot()))
+    result = run.run(compute, (lambda data: _draw(data, outcome[0], here.robot())) if draw else None)
     show_outcome(result, console)
     for report in outcome:
         _show(report, console)

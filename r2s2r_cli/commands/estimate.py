@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from r2s2r_cli.console import Console
 from r2s2r_cli.options import (
+    DrawOption,
     DryRunOption,
     ForceOption,
     IterationOption,
@@ -31,6 +32,7 @@ def estimate(
     iteration: IterationOption = None,
     json: JsonOption = False,
     quiet: QuietOption = False,
+    draw: DrawOption = True,
     dry_run: DryRunOption = False,
     force: ForceOption = False,
     set_: SetOption = None,
@@ -70,7 +72,7 @@ def estimate(
         outcome.append(report)
         return data, report
 
-    result = run.run(compute, lambda data, _: _draw(data, here.robot(), outcome[0]))
+    result = run.run(compute, (lambda data: _draw(data, here.robot(), outcome[0])) if draw else None)
     show_outcome(result, console)
     for report in outcome:
         _show(report, console)

@@ -11,6 +11,7 @@ import typer
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.options import (
+    DrawOption,
     DryRunOption,
     ForceOption,
     IterationOption,
@@ -56,6 +57,7 @@ def import_(
     iteration: IterationOption = None,
     json: JsonOption = False,
     quiet: QuietOption = False,
+    draw: DrawOption = True,
     dry_run: DryRunOption = False,
     force: ForceOption = False,
     set_: SetOption = None,
@@ -90,7 +92,7 @@ def import_(
         outcome.append(reports)
         return data, reports
 
-    result = run.run(compute, lambda data, _: _draw(here, data, outcome[0]))
+    result = run.run(compute, (lambda data: _draw(here, data, outcome[0])) if draw else None)
     show_outcome(result, console)
     for report in outcome[0].runs if outcome else ():
         _show(report, console)

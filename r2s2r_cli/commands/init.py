@@ -30,7 +30,8 @@ def init(
         str, typer.Option("--robot", help="threebar | threebar-330 | sixbar (illustrative).")
     ] = "threebar",
     attachment: Annotated[
-        Attachment, typer.Option("--attachment", help="Where cables attach: surface as in the paper, rod_end as in NTRT.")
+        Attachment,
+        typer.Option("--attachment", help="Where cables attach: surface as in the paper, rod_end as in NTRT."),
     ] = Attachment.SURFACE,
     name: Annotated[str | None, typer.Option("--name", help="Project name; default: that of the directory.")] = None,
     sample: Annotated[

@@ -85,9 +85,9 @@ class StageRun:
     def run(
         self,
         compute: Callable[[], tuple[ArtifactData, BaseModel]],
-        draw: Callable[[ArtifactData, BaseModel], Iterable[tuple[str, bytes]]],
+        draw: Callable[[ArtifactData], Iterable[tuple[str, bytes]]] | None,
     ) -> StageResult:
-        """Compute, write and draw where the artifact is not fresh. `draw` yields (suffix, bytes): `.png`, `.html`."""
+        """Compute and write where the artifact is not fresh; `draw` yields (suffix, bytes): `-run.png`, `.html`."""
         present, why = self.why()
         if not why and not self.force:
             os.utime(self.target)  # make decides by file time; it must see that this is up to date
@@ -119,7 +119,7 @@ class StageRun:
     def _run_locked(
         self,
         compute: Callable[[], tuple[ArtifactData, BaseModel]],
-        draw: Callable[[ArtifactData, BaseModel], Iterable[tuple[str, bytes]]],
+        draw: Callable[[ArtifactData], Iterable[tuple[str, bytes]]] | None,
         why: Sequence[str],
     ) -> StageResult:
         from r2s2r_cli.store.provenance import build_provenance
@@ -135,7 +135,7 @@ class StageRun:
         )  # fmt: skip
         header = write_artifact(self.target, data, provenance)
         drawings = []
-        for suffix, content in draw(data, report):
+        for suffix, content in draw(data) if draw else ():
             path = self.target.with_name(self.target.stem + suffix)
             write_bytes(path, content)
             drawings.append(self.project.relative(path))

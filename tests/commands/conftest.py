@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,22 +21,36 @@ def invoke(*arguments: str) -> Any:
     return CliRunner().invoke(app, list(arguments))
 
 
-@pytest.fixture
-def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A project with the kinematic sample, as the working directory."""
-    root = tmp_path / "robot"
-    assert invoke("init", str(root), "--sample").exit_code == 0
-    monkeypatch.chdir(root)
+@pytest.fixture(scope="session")
+def templates(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two projects with the kinematic sample: `new`, and `done` with it imported, estimated and drawn."""
+    root = tmp_path_factory.mktemp("templates")
+    assert invoke("init", str(root / "new"), "--sample").exit_code == 0
+    shutil.copytree(root / "new", root / "done")
+    where = ("--project", str(root / "done"))
+    for arguments in (("import", str(root / "done" / "sample.csv"), *where), ("estimate", *where)):
+        result = invoke(*arguments)
+        assert result.exit_code == 0, result.stderr
     return root
 
 
 @pytest.fixture
-def estimated(project: Path) -> Path:
+def project(templates: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A project with the kinematic sample, as the working directory."""
+    return _copy(templates / "new", tmp_path, monkeypatch)
+
+
+@pytest.fixture
+def estimated(templates: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The same with the sample imported and estimated."""
-    for arguments in (("import", "sample.csv"), ("estimate",)):
-        result = invoke(*arguments, "--quiet")
-        assert result.exit_code == 0, result.stderr
-    return project
+    return _copy(templates / "done", tmp_path, monkeypatch)
+
+
+def _copy(template: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    root = tmp_path / "robot"
+    shutil.copytree(template, root)
+    monkeypatch.chdir(root)
+    return root
 
 
 def document(*arguments: str) -> dict[str, Any]:

@@ -44,7 +44,7 @@ def sensor_zero() -> dict[str, float]:
 def test_of_several_sets_none_is_chosen(points: Path) -> None:
     """Without --use robot.toml stays as it is, byte for byte, and the hint names the sets."""
     before = Path("robot.toml").read_bytes()
-    result = invoke("calibrate", "--points", "points.csv")
+    result = invoke("calibrate", "--points", "points.csv", "--no-draw")
     assert result.exit_code == 0
     assert "monday" in result.stderr.splitlines()[-1]
     assert Path("robot.toml").read_bytes() == before
@@ -53,7 +53,7 @@ def test_of_several_sets_none_is_chosen(points: Path) -> None:
 def test_the_chosen_set_goes_into_robot_toml(points: Path) -> None:
     """--use writes the planted line in SI, and every comment and other line survives."""
     before = Path("robot.toml").read_text().splitlines()
-    assert invoke("calibrate", "--points", "points.csv", "--use", "friday").exit_code == 0
+    assert invoke("calibrate", "--points", "points.csv", "--use", "friday", "--no-draw").exit_code == 0
     assert sensor_zero()["slope_f_per_m"] == pytest.approx(SLOPE_PF_PER_MM * 1e-9, rel=1e-3)
     assert sensor_zero()["offset_f"] == pytest.approx((OFFSET_PF + 1) * 1e-12, rel=1e-3)
     assert set(before) - set(Path("robot.toml").read_text().splitlines()) == set()
@@ -61,9 +61,9 @@ def test_the_chosen_set_goes_into_robot_toml(points: Path) -> None:
 
 def test_a_later_part_keeps_the_earlier_one(points: Path) -> None:
     """Masses given later join the sensor lines in calibration.h5; both sources are its inputs."""
-    assert invoke("calibrate", "--points", "points.csv").exit_code == 0
+    assert invoke("calibrate", "--points", "points.csv", "--no-draw").exit_code == 0
     Path("masses.toml").write_text(MASSES)
-    answer = document("calibrate", "--masses", "masses.toml")
+    answer = document("calibrate", "--masses", "masses.toml", "--no-draw")
     assert set(answer["inputs"]) == {"points.csv", "masses.toml"}
     _, data = read_artifact(Path("calibration.h5"), "calibration")
     assert {"lines", "masses"} <= set(data.groups)
@@ -72,7 +72,7 @@ def test_a_later_part_keeps_the_earlier_one(points: Path) -> None:
 
 def test_a_changed_source_makes_it_stale(points: Path) -> None:
     """status names the file whose bytes are others."""
-    assert invoke("calibrate", "--points", "points.csv").exit_code == 0
+    assert invoke("calibrate", "--points", "points.csv", "--no-draw").exit_code == 0
     points.write_text(points.read_text() + "\n")
     result = invoke("status", "--check")
     assert result.exit_code == 3

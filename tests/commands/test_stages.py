@@ -37,7 +37,7 @@ def test_init_knows_every_robot(tmp_path: Path, robot: str, attachment: str) -> 
 def test_import_keeps_every_row_of_the_source(project: Path) -> None:
     """Rows that are left out later are still in the recording, with their reason."""
     rows = len((project / "sample.csv").read_text().splitlines()) - 1
-    report = document("import", "sample.csv")["report"]["runs"][0]
+    report = document("import", "sample.csv", "--no-draw")["report"]["runs"][0]
     _, data = read_artifact(project / RECORD, "recording")
     caps = data.groups["runs/sample/caps"]
     assert len(caps["t"]) == rows == report["rows"]
@@ -58,8 +58,8 @@ def test_the_same_inputs_give_the_same_content(estimated: Path, tmp_path: Path) 
     """Another project, the same sample and settings: the content hashes are equal, and inspect --same-as says so."""
     other = tmp_path / "other"
     assert invoke("init", str(other), "--sample").exit_code == 0
-    assert invoke("import", "--project", str(other), str(other / "sample.csv")).exit_code == 0
-    assert invoke("estimate", "--project", str(other)).exit_code == 0
+    assert invoke("import", "--project", str(other), str(other / "sample.csv"), "--no-draw").exit_code == 0
+    assert invoke("estimate", "--project", str(other), "--no-draw").exit_code == 0
     for name in (RECORD, ESTIMATE):
         assert read_header(estimated / name).content_sha256 == read_header(other / name).content_sha256
         assert document("inspect", str(estimated / name), "--same-as", str(other / name))["same"]
@@ -68,7 +68,7 @@ def test_the_same_inputs_give_the_same_content(estimated: Path, tmp_path: Path) 
 def test_force_gives_the_same_content_again(estimated: Path) -> None:
     """--force computes again; nothing but times differs."""
     before = read_header(estimated / ESTIMATE)
-    assert document("estimate", "--force")["state"] == "done"
+    assert document("estimate", "--force", "--no-draw")["state"] == "done"
     after = read_header(estimated / ESTIMATE)
     assert after.content_sha256 == before.content_sha256
 
@@ -88,15 +88,15 @@ def test_another_log_does_not_replace_a_recording(estimated: Path) -> None:
     result = invoke("import", "second.csv")
     assert result.exit_code == 2
     assert result.stderr.splitlines()[-1] == "hint: r2s2r import second.csv --iteration 2"
-    assert invoke("import", "second.csv", "--iteration", "2").exit_code == 0
+    assert invoke("import", "second.csv", "--iteration", "2", "--no-draw").exit_code == 0
 
 
 def test_several_logs_become_several_runs(project: Path) -> None:
     """`import a.csv b.csv` makes one run a file, named by its stem, and estimate takes them all."""
     shutil.copy("sample.csv", "second.csv")
     shutil.copy("sample.toml", "second.toml")
-    assert invoke("import", "sample.csv", "second.csv").exit_code == 0
-    assert invoke("estimate").exit_code == 0
+    assert invoke("import", "sample.csv", "second.csv", "--no-draw").exit_code == 0
+    assert invoke("estimate", "--no-draw").exit_code == 0
     _, data = read_artifact(project / ESTIMATE, "estimate")
     assert data.runs() == ["sample", "second"]
 
@@ -140,21 +140,21 @@ def test_a_wrong_override_names_the_right_one(estimated: Path, override: str, wo
 
 def test_an_override_is_remembered(estimated: Path) -> None:
     """What was made with --set is not stale for it, and is made again without it."""
-    assert document("estimate", "--set", "estimate.contact_clearance_m=0.004")["state"] == "done"
+    assert document("estimate", "--set", "estimate.contact_clearance_m=0.004", "--no-draw")["state"] == "done"
     assert invoke("status", "--check").exit_code == 0
-    answer = document("estimate")
+    answer = document("estimate", "--no-draw")
     assert answer["state"] == "done"
     assert answer["reasons"] == ["setting estimate.contact_clearance_m was 0.004, is 0.003"]
 
 
 def test_json_of_a_stage_is_one_document(project: Path) -> None:
     """stdout holds one JSON document and nothing else; the talk is on stderr."""
-    result = invoke("import", "sample.csv", "--json")
+    result = invoke("import", "sample.csv", "--json", "--no-draw")
     answer = json.loads(result.stdout)
     assert answer["schema"] == "r2s2r.stage/1"
     assert answer["artifact"] == RECORD
     assert "wrote" in result.stderr
-    assert invoke("import", "sample.csv", "--json", "--quiet", "--force").stderr == ""
+    assert invoke("import", "sample.csv", "--json", "--quiet", "--force", "--no-draw").stderr == ""
 
 
 def test_pages_are_self_contained(estimated: Path) -> None:

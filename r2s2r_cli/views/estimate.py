@@ -116,6 +116,7 @@ def _heights(axes: Axes, frames: Group, robot: Robot) -> None:
     axes.plot([], [], "x", ms=7, color=_BROKEN, mew=1.4, label="outlier or jump")
     axes.axhline(1e3 * robot.rods[0].cap_radius_m, color="black", lw=0.8, ls=":")
     axes.set_ylabel("height of cap centre [mm]\n(dotted: on the ground)\nbelow 0: contacts by cap")
+    axes.set_yticks([tick for tick in axes.get_yticks() if 0 <= tick <= top])
     axes.set_ylim(-step * (z.shape[1] + 1), 1.3 * top)
     axes.legend(ncol=4, fontsize=7, loc="upper right")
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-PRIOR_SD = (10.0, 100.0, 1000.0)
-"""Vague start: m, m/s, m/s^2. So wide that it moves no smoothed state by more than 1e-6 of itself, and narrow
+PRIOR_SD = (10.0, 10.0, 100.0)
+"""Vague start: m, m/s, m/s^2. So wide that it moves no smoothed state by more than 1e-5 of itself, and narrow
 enough that rounding (1e-16 of the square) stays below every variance that is wanted."""
 
 

@@ -21,8 +21,8 @@ Motion = Literal["acceleration", "jerk"]
 
 MIN_FRAMES = 5
 """Fewer frames leave no innovations to fit the process noise to (two go into the start)."""
-MIN_NOISE = 1e-6
-"""[m] 1 um, the resolution of the trajectory CSV: noise below it is rounding."""
+MIN_NOISE = 1e-5
+"""[m] Far below every tracker. Exact (simulated) tracks count as that good, no better: beyond, rounding decides."""
 JUMP_SD = 1.0
 """[m] A tracker that lost a cap may find it anywhere: wide compared with the robot, so the size of a jump is free."""
 GRID = {"acceleration": (-8.0, 2.0), "jerk": (-6.0, 6.0)}

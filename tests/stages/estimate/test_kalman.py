@@ -1,0 +1,124 @@
+"""The smoother against closed forms: it is a least-squares problem that small matrices solve directly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.stages.estimate import kalman
+from r2s2r_cli.stages.estimate.kalman import Disturbances, backward, forward, process, transition
+from r2s2r_cli.stages.estimate.smooth import MIN_NOISE
+
+N = 9
+NARROW = (0.1, 1.0, 10.0)
+"""A prior with which one big matrix can still be inverted exactly."""
+
+
+def problem(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, Disturbances]:
+    """A short random track of two series with a gap, a kick and a jump."""
+    rng = np.random.default_rng(seed)
+    t = np.cumsum(rng.uniform(0.03, 0.2, N))
+    y = np.cumsum(rng.normal(0, 0.02, (N, 2)), axis=0)
+    y[4, 1] = np.nan
+    var = rng.uniform(1e-6, 1e-5, (N, 2))
+    kick, jump = np.zeros(N - 1), np.zeros((N - 1, 2))
+    kick[2], jump[5, 0] = 0.04, 0.01
+    return t, y, var, np.array([[1e-3, 1e-2]]), Disturbances(kick, jump)
+
+
+def dense(
+    t: np.ndarray, y: np.ndarray, var: np.ndarray, density: float, kick: np.ndarray, jump: np.ndarray, order: int
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Mean and covariance of all states of one series, and the log density of its observations, by one big matrix."""
+    n = len(t)
+    cov = np.zeros((n * order, n * order))
+    cov[:order, :order] = np.diag(np.square(NARROW[:order]))
+    for k in range(n - 1):
+        dt = t[k + 1] - t[k]
+        step, noise = transition(dt, order), density * process(dt, order)
+        noise[:2, :2] += kick[k] / dt * process(dt, 2)
+        noise[0, 0] += jump[k]
+        now, nxt = slice(k * order, (k + 1) * order), slice((k + 1) * order, (k + 2) * order)
+        past = slice(0, (k + 1) * order)
+        cov[nxt, past] = step @ cov[now, past]
+        cov[past, nxt] = cov[nxt, past].T
+        cov[nxt, nxt] = step @ cov[now, now] @ step.T + noise
+    seen = np.flatnonzero(np.isfinite(y))
+    mean0 = np.zeros(n * order)
+    mean0[::order] = y[seen[0]]
+    select = np.eye(n * order)[seen * order]
+    spread = select @ cov @ select.T + np.diag(var[seen])
+    gain = cov @ select.T @ np.linalg.inv(spread)
+    rest = y[seen] - select @ mean0
+    loglik = -0.5 * (rest @ np.linalg.solve(spread, rest) + np.linalg.slogdet(2 * np.pi * spread)[1])
+    left = np.eye(n * order) - gain @ select
+    posterior = left @ cov @ left.T + gain @ np.diag(var[seen]) @ gain.T
+    return (mean0 + gain @ rest).reshape(n, order), posterior, float(loglik)
+
+
+@pytest.mark.parametrize("order", [2, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_states_and_covariance_are_those_of_least_squares(
+    seed: int, order: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Filter and smoother give the conditional mean, covariance and likelihood that one big Gaussian gives."""
+    monkeypatch.setattr(kalman, "PRIOR_SD", NARROW)
+    t, y, var, density, free = problem(seed)
+    run = forward(t, y, var, density, free, order)
+    state = backward(t, y, var, free, run)
+    for s in range(2):
+        mean, cov, loglik = dense(t, y[:, s], var[:, s], density[0, s], free.kick, free.jump[:, s], order)
+        assert state.mean[:, s] == pytest.approx(mean, rel=1e-6, abs=1e-8)
+        for k in range(N):
+            block = slice(k * order, (k + 1) * order)
+            assert state.cov[k, s] == pytest.approx(cov[block, block], rel=1e-3, abs=1e-9)
+        assert run.loglik[0, s] == pytest.approx(loglik, rel=1e-6)
+
+
+def test_outlier_score_is_the_left_out_residual() -> None:
+    """The score of a frame equals its distance from the track smoothed without it, over the standard deviation."""
+    t, y, var, density, free = problem(1)
+    state = backward(t, y, var, free, forward(t, y, var, density, free, 2))
+    for k in (1, 4, 7):
+        rest = y.copy()
+        rest[k] = np.nan
+        left = backward(t, rest, var, free, forward(t, rest, var, density, free, 2))
+        expected = (y[k] - left.mean[k, :, 0]) / np.sqrt(left.cov[k, :, 0, 0] + var[k])
+        assert state.outlier[k] == pytest.approx(np.nan_to_num(expected), abs=1e-6)
+
+
+def test_jump_score_is_the_likelihood_ratio_of_a_free_jump() -> None:
+    """Half the squared score is what a jump of free size in that gap adds to the log likelihood."""
+    t, y, var, density, free = problem(2)
+
+    def loglik(size: float) -> float:
+        moved = y.copy()
+        moved[6:, 0] -= size
+        return float(forward(t, moved, var, density, still, 2).loglik[0, 0])
+
+    still = Disturbances(free.kick, np.zeros_like(free.jump))
+    state = backward(t, y, var, still, forward(t, y, var, density, still, 2))
+    sizes = np.array([-0.01, 0.0, 0.01])
+    parabola = np.polyfit(sizes, [loglik(size) for size in sizes], 2)
+    gain = parabola[2] - parabola[1] ** 2 / (4 * parabola[0]) - loglik(0.0)
+    assert 0.5 * state.jump[6, 0] ** 2 == pytest.approx(gain, rel=1e-4)
+
+
+def test_a_straight_line_without_noise_is_recovered() -> None:
+    """Constant velocity, no noise, irregular stamps: position and velocity come out to a millionth."""
+    rng = np.random.default_rng(0)
+    t = np.cumsum(rng.uniform(0.02, 0.3, 40))
+    y = (0.3 + 0.07 * t)[:, None]
+    var = np.full(y.shape, MIN_NOISE**2)
+    free = Disturbances(np.zeros(39), np.zeros((39, 1)))
+    state = backward(t, y, var, free, forward(t, y, var, np.array([[1e-8]]), free, 2))
+    assert state.mean[:, 0, 0] == pytest.approx(y[:, 0], abs=1e-9)
+    assert state.mean[:, 0, 1] == pytest.approx(0.07, abs=1e-6)
+
+
+def test_process_noise_adds_up_over_time() -> None:
+    """Two gaps one after the other give the covariance of the whole gap: the model does not depend on the stamps."""
+    for order in (2, 3):
+        a, b = 0.07, 0.11
+        both = transition(b, order) @ process(a, order) @ transition(b, order).T + process(b, order)
+        assert both == pytest.approx(process(a + b, order), rel=1e-12)

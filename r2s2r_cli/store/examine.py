@@ -91,9 +91,8 @@ def _headless(path: Path, error: ArtifactError, reader: IsolatedReader) -> Exami
         return Examined(refused=unreadable(path, problem))
     report = _ask(path, reader)
     if report["content_ok"] and report["seal_ok"]:
-        error.received = (
-            f"{error.received}; the data behind it are intact" if error.received else "damage before the data"
-        )
+        error.received = f"{error.received}; the data behind it are intact"
+        error.hint = f"r2s2r recover '{path}'"
         return Examined(refused=error)
     return Examined(refused=error, damage=tuple(p for p in report["problems"] if p.where != HEAD))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -139,9 +140,11 @@ def _write_rows(node: h5py.Group, name: str, spec: DatasetSpec, rows: Rows, chec
 def _write_blobs(
     node: h5py.Group, data_spec: DatasetSpec, offset_spec: DatasetSpec, blobs: Blobs, check: Check
 ) -> None:
-    target = _create(node, BLOB_BYTES, (0,), np.dtype(np.uint8), data_spec, growing=True)
     offsets = [0]
-    for piece in _buffered(blobs, offsets):
+    pieces = _buffered(blobs, offsets)
+    first = next(pieces, b"")
+    target = _create(node, BLOB_BYTES, (0,), np.dtype(np.uint8), data_spec, chunk=len(first))
+    for piece in itertools.chain([first], pieces):
         check()
         start = target.shape[0]
         target.resize(start + len(piece), axis=0)
@@ -166,18 +169,17 @@ def _buffered(blobs: Blobs, offsets: list[int]) -> Iterator[bytes]:
 
 
 def _create(
-    node: h5py.Group, name: str, shape: tuple[int, ...], dtype: np.dtype, spec: DatasetSpec, *, growing: bool = False
+    node: h5py.Group, name: str, shape: tuple[int, ...], dtype: np.dtype, spec: DatasetSpec, *, chunk: int | None = None
 ) -> h5py.Dataset:
+    """A new dataset with its unit. `chunk`: it will grow, and its first piece has that length."""
     options: dict[str, object] = {}
-    if shape and (growing or 0 not in shape):
-        row = max(1, int(np.prod(shape[1:], dtype=np.int64)) * dtype.itemsize)
-        length = max(1, _CHUNK_BYTES // row)
-        chunk = (length if growing else min(shape[0], length), *shape[1:])
-        options = {"chunks": chunk, "fletcher32": True}
-        if not growing:  # encoded images do not compress further
-            options |= {"compression": "gzip", "compression_opts": 4, "shuffle": True}
-        else:
-            options["maxshape"] = (None, *shape[1:])
+    row = max(1, int(np.prod(shape[1:], dtype=np.int64)) * dtype.itemsize)
+    length = max(1, _CHUNK_BYTES // row)
+    if chunk is not None:  # encoded images do not compress further
+        options = {"chunks": (min(max(1, chunk), length),), "maxshape": (None,), "fletcher32": True}
+    elif shape and 0 not in shape:
+        options = {"chunks": (min(shape[0], length), *shape[1:]), "fletcher32": True,
+                   "compression": "gzip", "compression_opts": 4, "shuffle": True}  # fmt: skip
     target = node.create_dataset(name, shape=shape, dtype=dtype, **options)
     _set_attribute(target, "unit", spec.unit)
     _set_attribute(target, "dims", ",".join(spec.dims))

@@ -1,0 +1,267 @@
+"""Small artifacts of every kind, as values: a closed-form motion of the 3-bar robot, and random layouts."""
+
+from __future__ import annotations
+
+import struct
+import tomllib
+import zlib
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Scalar, Value
+from r2s2r_cli.stages.init.robots import robot_toml
+from schemas.base import DIM_SIZES, ArtifactSpec, DatasetSpec, GroupSpec
+from schemas.header import InputRef, Provenance
+from schemas.robot import Robot
+from tests.support.motion import Motion, motion
+
+STARTED = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+_TARGETS = np.array([[1.0, 1, 1, 1, 1, 1], [0.1, 1, 1, 0.1, 1, 1]])
+
+
+@cache
+def robot() -> Robot:
+    """The 3-bar robot of the paper, as `init` writes it."""
+    return Robot.model_validate(tomllib.loads(robot_toml("threebar")))
+
+
+def provenance(**changes: Any) -> Provenance:
+    """A provenance that is the same on every machine and at every time."""
+    values: dict[str, Any] = {
+        "stage": "import", "stage_version": 1, "argv": ("r2s2r", "import", "walk.csv"),
+        "settings": {"rod_length_tolerance": 0.05, "flags": {}}, "robot": {"name": "threebar"},
+        "config_sha256": "0" * 64, "inputs": (InputRef(path="walk.csv", kind="file", sha256="1" * 64),),
+        "versions": {"r2s2r": "0", "python": "3"}, "platform": "nowhere", "started": STARTED.isoformat(),
+        "wall_s": 0.25,
+    }  # fmt: skip
+    return Provenance(**{**values, **changes})
+
+
+def png(gray: int, size: int = 4) -> bytes:
+    """A whole PNG file: `size` x `size` pixels of one 8-bit gray."""
+    rows = b"".join(b"\0" + bytes([gray]) * size for _ in range(size))
+    head = struct.pack(">IIBBBBB", size, size, 8, 0, 0, 0, 0)
+    chunks = ((b"IHDR", head), (b"IDAT", zlib.compress(rows)), (b"IEND", b""))
+    body = (struct.pack(">I", len(d)) + n + d + struct.pack(">I", zlib.crc32(n + d)) for n, d in chunks)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(body)
+
+
+def recording(frames: int = 24, *, images: bool = True) -> ArtifactData:
+    """A recording of one run `walk` with every stream that a recording can have."""
+    m = motion(robot(), frames)
+    walk: dict[str, Group] = {
+        "": Group({}, {"origin": "robot", "nature": "kinematic sample", "source": "closed form, not a measurement",
+                       "robot": "threebar", "start_unix": 1.7e9, "pid_min_length": 0.1, "pid_range": 0.1}),
+        "caps": _caps(m),
+        "commands": _commands(m.t),
+        "sensors": _sensors(m),
+        "motors": Group({"t": m.t, "position": np.repeat(_targets(m.t)[:, :1], 6, axis=1),
+                         "speed": np.zeros((frames, 6)), "voltage": np.full(frames, 11.1)}),
+        "imu": Group({"t": m.t, "board": np.zeros(frames, np.uint8), "a_B": np.tile([0.0, 0.0, 9.81], (frames, 1))}),
+        "camera_pose": Group({"t": m.t, "p_WC": np.tile([0.0, 0.0, 1.5], (frames, 1)),
+                              "q_WC": np.tile([1.0, 0.0, 0.0, 0.0], (frames, 1))}),
+        "mocap": Group({"t": m.t, "p_ME": m.p_WE.copy()}),
+        **_spans(m.t), "policy": _policy(),
+    }  # fmt: skip
+    if images:
+        walk["camera"] = _camera(m)
+    return ArtifactData("recording", {_join("runs/walk", name): group for name, group in walk.items()})
+
+
+def estimate(frames: int = 24) -> ArtifactData:
+    """The exact states of the same motion, with made-up uncertainties."""
+    m = motion(robot(), frames)
+    caps, cables = 6, len(robot().cables)
+    attributes: dict[str, Scalar] = {"origin": "robot", "nature": "kinematic sample", "source": "closed form",
+                                     "robot": "threebar"}  # fmt: skip
+    low = m.p_WE[..., 2] < 0.03
+    states = {
+        "t": m.t, "source_frame": np.arange(frames), "p_WE": m.p_WE, "v_WE": m.v_WE, "p_WR": m.p_WR, "q_WR": m.q_WR,
+        "v_WR": m.v_WR, "w_WR": m.w_WR, "length": m.length, "contact": low,
+        "cov_p_WE": np.tile(1e-6 * np.eye(3), (frames, caps, 1, 1)), "sd_v_WE": np.full((frames, caps, 3), 0.01),
+        "quality": np.zeros((frames, caps), np.uint8), "score": np.full((frames, caps), 1.0),
+        "contact_probability": np.where(low, 0.9, 0.0), "length_sd": np.full((frames, cables), 1e-3),
+    }  # fmt: skip
+    ground = Group(
+        {"normal": np.array([0.0, 0.0, 1.0]), "slope": np.full(2, np.nan), "slope_sd": np.full(2, np.nan)},
+        {"offset": 0.004, "offset_sd": 0.001, "shift": -0.004, "tilt_known": False},
+    )
+    tracks = Group(
+        {
+            "noise_sd": np.full((caps, 3), 0.002), "held": np.zeros((caps, 3), bool), "white": np.ones(caps, bool),
+            "speed_change": np.full(caps, 0.1), "innovation_variance": np.ones(caps), "innovation_lag1": np.zeros(caps),
+        }
+    )  # fmt: skip
+    walk = {"": Group({}, attributes), "ground": ground, "tracks": tracks, "commands": _commands(m.t),
+            "frames": Group(states, {"source_rigid": True, "roll_observable": False}), **_spans(m.t),
+            "policy": _policy()}  # fmt: skip
+    return ArtifactData("estimate", {_join("runs/walk", name): group for name, group in walk.items()})
+
+
+def simulation(frames: int = 24) -> ArtifactData:
+    """The same motion as a simulated run."""
+    m = motion(robot(), frames)
+    states = {"t": m.t, "p_WR": m.p_WR, "q_WR": m.q_WR, "v_WR": m.v_WR, "w_WR": m.w_WR, "p_WE": m.p_WE,
+              "length": m.length, "rest_length": m.length - 0.01, "tension": np.full(m.length.shape, 0.5),
+              "contact": m.p_WE[..., 2] < 0.03}  # fmt: skip
+    attributes: dict[str, Scalar] = {"policy": "walk", "robot": "threebar", "engine": "closed form 1", "step": 0.001,
+                                     "control": "closed loop"}  # fmt: skip
+    walk = {"": Group({}, attributes), "frames": Group(states), "commands": _commands(m.t), **_spans(m.t),
+            "policy": _policy()}  # fmt: skip
+    return ArtifactData("simulation", {_join("runs/walk", name): group for name, group in walk.items()})
+
+
+def policy() -> ArtifactData:
+    """Two policies."""
+    return ArtifactData("policy", {"policies/walk": _policy(), "policies/rest": _policy(steps=1)})
+
+
+def calibration() -> ArtifactData:
+    """Exact lines of two sensors from four points each, one dated history, two tendon curves, one weighed rod."""
+    from tests.support.bench import bench_groups
+
+    return ArtifactData("calibration", bench_groups())
+
+
+BUILDERS: dict[str, Callable[[], ArtifactData]] = {
+    "calibration": calibration, "recording": recording, "estimate": estimate, "policy": policy,
+    "simulation": simulation,
+}  # fmt: skip
+"""One builder a kind."""
+
+
+def materialised(data: ArtifactData) -> dict[str, dict[str, Any]]:
+    """Everything an artifact holds, as comparable values: streamed frames as lists of bytes, arrays as arrays."""
+    return {
+        path: {
+            "attributes": dict(group.attributes),
+            **{n: list(v.items) if isinstance(v, Blobs) else v for n, v in group.datasets.items()},
+        }
+        for path, group in data.groups.items()
+    }
+
+
+def same(one: ArtifactData, two: ArtifactData) -> bool:
+    """Whether two artifacts hold the same, bit by bit (NaN equals NaN, dtypes count)."""
+    a, b = materialised(one), materialised(two)
+    if one.kind != two.kind or a.keys() != b.keys() or any(a[p].keys() != b[p].keys() for p in a):
+        return False
+    return all(_equal(a[path][name], b[path][name]) for path in a for name in a[path])
+
+
+def filled(
+    spec: ArtifactSpec, sizes: Callable[[str], int], rng: np.random.Generator, *, keep: Callable[[str], bool]
+) -> ArtifactData:
+    """Random values in the layout of `spec`, one run (or policy) called `x`.
+
+    sizes: length of an axis by name; the same for one name. keep: whether an optional dataset, attribute or group of
+    this path is there. NaN stands wherever the layout gives it a meaning, in a tenth of the places.
+    """
+    groups: dict[str, Group] = {}
+    for group in spec.groups:
+        path = "/".join("x" if part.startswith("{") else part for part in group.path.split("/"))
+        if group.required or keep(path):
+            groups[path] = _fill(group, path, sizes, rng, keep)
+    return ArtifactData(spec.kind, groups)
+
+
+def _fill(
+    group: GroupSpec, path: str, sizes: Callable[[str], int], rng: np.random.Generator, keep: Callable[[str], bool]
+) -> Group:
+    datasets = {d.path: _random(d, sizes, rng) for d in group.datasets if d.required or keep(f"{path}/{d.path}")}
+    attributes: dict[str, Scalar] = {}
+    for a in group.attributes:
+        if a.required or keep(f"{path}@{a.name}"):
+            values: Mapping[str, Scalar] = {"str": "worte ü", "int": int(rng.integers(-9, 9)),
+                                            "float": float(rng.normal()), "bool": bool(rng.integers(2))}  # fmt: skip
+            attributes[a.name] = a.choices[0] if a.choices else values[a.type]
+    return Group(datasets, attributes)
+
+
+def _random(spec: DatasetSpec, sizes: Callable[[str], int], rng: np.random.Generator) -> Value:
+    shape = tuple(DIM_SIZES[d] if d in DIM_SIZES else sizes(d) for d in spec.dims)
+    if spec.dtype == "blobs":
+        return Blobs([rng.bytes(int(rng.integers(0, 40))) for _ in range(shape[0])], shape[0])
+    if spec.dtype == "str":
+        words = np.array(["", "a", "größer", "日本"], dtype="U")
+        return np.char.encode(rng.choice(words, shape), "utf-8")
+    if spec.dtype.startswith("float"):
+        array = rng.normal(size=shape).astype(spec.dtype)
+        if spec.nan_means:
+            array[rng.random(shape) < 0.1] = np.nan
+        return array
+    if spec.dtype == "bool":
+        return rng.integers(0, 2, shape).astype(bool)
+    codes = list(spec.codes) or [0, 1, 2, 100]
+    return rng.choice(np.array(codes), shape).astype(spec.dtype)
+
+
+def _equal(one: Any, two: Any) -> bool:
+    if isinstance(one, np.ndarray) and isinstance(two, np.ndarray):
+        if one.dtype.kind == "S" == two.dtype.kind:  # the width of text is not content
+            return one.shape == two.shape and one.tolist() == two.tolist()
+        return one.dtype == two.dtype and np.array_equal(one, two, equal_nan=one.dtype.kind == "f")
+    return type(one) is type(two) and bool(one == two)
+
+
+def _join(root: str, name: str) -> str:
+    return f"{root}/{name}" if name else root
+
+
+def _targets(t: np.ndarray) -> np.ndarray:
+    return _TARGETS[(np.arange(len(t)) >= len(t) // 2).astype(int)]
+
+
+def _caps(m: Motion) -> Group:
+    """The motion with one frame logged twice, 5 ms apart, as the authors' trackers do."""
+    twice = len(m.t) // 3
+    t = np.insert(m.t, twice + 1, m.t[twice] + 0.005)
+    reason = np.zeros(len(t), np.uint8)
+    reason[twice + 1] = 1
+    datasets = {"t": t, "p_WE": np.insert(m.p_WE, twice + 1, m.p_WE[twice], axis=0), "drop_reason": reason,
+                "source_row": np.arange(2, len(t) + 2), "noise_sd": np.full((6, 3), 0.002),
+                "rod_length": m.rod_length, "rod_length_sd": np.zeros(3)}  # fmt: skip
+    return Group(datasets, {"ground_offset": 0.004, "stamp_jitter": 0.0, "noise_sd_stated": 0.002})
+
+
+def _commands(t: np.ndarray) -> Group:
+    control = np.where(_targets(t) < 0.5, 1.0, 0.0)
+    return Group({"t": t, "target": _targets(t), "control": control, "done": control == 0})
+
+
+def _sensors(m: Motion) -> Group:
+    length = m.length + 0.002 * np.sin(3 * m.t)[:, None]
+    capacitance = 40e-12 + 2e-10 * length
+    return Group({"t": m.t, "capacitance": capacitance, "length": length, "cable": np.arange(length.shape[1])})
+
+
+def _camera(m: Motion) -> Group:
+    frames = len(m.t) // 2
+    pictures = [png(10 * (i % 20) + 5) for i in range(frames)]
+    datasets: dict[str, Value] = {
+        "t": m.t[:frames], "color": Blobs(pictures, frames), "source_frame": np.arange(frames),
+        "t_depth": m.t[:frames] + 0.002, "depth": Blobs(pictures[::-1], frames), "pair": np.arange(frames),
+        "X_WC": np.diag([1.0, -1.0, -1.0, 1.0]),
+    }  # fmt: skip
+    return Group(datasets, {"width": 640, "height": 480, "fx": 600.0, "fy": 600.0, "cx": 320.0, "cy": 240.0,
+                            "depth_scale": 0.001})  # fmt: skip
+
+
+def _spans(t: np.ndarray) -> dict[str, Group]:
+    half = len(t) // 2
+    first, last = np.array([0, half]), np.array([half - 1, len(t) - 1])
+    common = {"first": first, "last": last, "t_first": t[first], "t_last": t[last], "complete": np.array([True, False])}
+    direction = np.where(_TARGETS < 0.5, 1, 0).astype(np.int32)
+    return {
+        "intervals": Group({**common, "target": _TARGETS.copy()}),
+        "segments": Group({**common, "interval": np.array([1, 2]), "direction": direction}),
+    }
+
+
+def _policy(steps: int = 2) -> Group:
+    return Group({"target": _TARGETS[:steps].copy(), "hold": np.zeros(steps), "timeout": np.full(steps, np.nan)},
+                 {"robot": "threebar", "description": "rest, then a step", "repeat": 1})  # fmt: skip

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import codecs
 import json
+import random
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -28,6 +29,30 @@ class Malformed:
     name: str
     data: bytes
     accepted: bool = False
+
+
+_INSERTS = (b"nan", b"-", b"1e300", b'"', b",", b"\n", b"\r", b"{", b"[", b"null", b"0", b"\0", b"\xff")
+
+
+def mutated(data: bytes, seed: int) -> bytes:
+    """One to five random changes: a flipped bit, a cut, a piece lost or doubled, a foreign token. Repeatable."""
+    rng = random.Random(seed)
+    text = bytearray(data)
+    for _ in range(rng.choice((1, 1, 2, 5))):
+        at = rng.randrange(max(1, len(text)))
+        end = min(len(text), at + rng.randrange(1, 200))
+        change = rng.randrange(5)
+        if change == 0 and text:
+            text[at] ^= 1 << rng.randrange(8)
+        elif change == 1:
+            del text[at:]
+        elif change == 2:
+            del text[at:end]
+        elif change == 3:
+            text[at:at] = text[at:end]
+        else:
+            text[at : at + 1] = rng.choice(_INSERTS)
+    return bytes(text)
 
 
 Row = list[str]

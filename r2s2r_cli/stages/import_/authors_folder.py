@@ -72,7 +72,7 @@ def import_authors_folder(
     if stamps[rows[0]] > UNIX_SINCE:
         attributes["start_unix"] = float(stamps[rows[0]])
     groups = {"": Group(attributes=attributes), **streams.groups}
-    if color or depth:
+    if any(number in color or number in depth for number in numbers[rows].tolist()):
         groups["camera"] = _camera(folder, numbers[rows].tolist(), t, color, depth, depth_scale)
     found = _intervals(groups, t, kept, float(attributes.get("pid_tolerance", 0.0)))
     if found is not None:
@@ -147,14 +147,16 @@ def _camera(
         config, str(path), size=size, depth_scale=depth_scale, has_depth=bool(depth_files)
     )
     partner = {row: i for i, row in enumerate(with_depth)}
-    datasets: dict[str, Value] = {
-        "t": t[with_color],
-        "color": frame_blobs(color_files, "the colour frame"),
-        "source_frame": np.array([numbers[row] for row in with_color], dtype=np.int64),
-        "pair": np.array([partner.get(row, -1) for row in with_color], dtype=np.int64),
-        "t_depth": t[with_depth],
-        "depth": frame_blobs(depth_files, "the depth frame"),
-    }
+    datasets: dict[str, Value] = {}
+    if with_color:
+        datasets |= {
+            "t": t[with_color],
+            "color": frame_blobs(color_files, "the colour frame"),
+            "source_frame": np.array([numbers[row] for row in with_color], dtype=np.int64),
+            "pair": np.array([partner.get(row, -1) for row in with_color], dtype=np.int64),
+        }
+    if with_depth:
+        datasets |= {"t_depth": t[with_depth], "depth": frame_blobs(depth_files, "the depth frame")}
     if X_WC is not None:
         datasets["X_WC"] = X_WC
     return Group(datasets=datasets, attributes=attributes)

@@ -141,11 +141,11 @@ def _images(folder: Path, list_name: str) -> tuple[np.ndarray, list[Path], int]:
     paths = []
     for line, (file,) in zip(lines.line, lines.words, strict=True):
         relative = PurePosixPath(file)
-        if relative.is_absolute() or ".." in relative.parts:
+        if relative.is_absolute() or ".." in relative.parts or not file.isprintable():
             raise InputError(
-                "a list names a file outside its folder",
+                "a list names a file outside its folder, or with unprintable characters",
                 where=f"{folder / list_name}:{line}",
-                expected="a path below the folder",
+                expected="a plain path below the folder",
                 received=shown(file),
                 hint="copy the images into the folder, and correct the list",
             )

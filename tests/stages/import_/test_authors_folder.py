@@ -15,6 +15,7 @@ from r2s2r_cli.artifact import Blobs
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.import_ import ImportedRun, import_source
 from tests.support.import_samples import CONFIG, frame_json, sample_robot, write_authors_folder, write_image
+from tests.support.run_layout import assert_run_layout
 
 ROBOT = sample_robot()
 START = 1676990000.0
@@ -64,6 +65,14 @@ def test_units_become_si(folder: Path) -> None:
     assert groups["commands"]["t"] == pytest.approx(0.1 * np.arange(6), abs=1e-6)
 
 
+def test_groups_and_datasets_are_those_of_the_layout(folder: Path) -> None:
+    """Every stream of the folder is in the schema with its type and shape, the camera's pose included."""
+    (folder / "config.json").write_text(json.dumps(CONFIG | {"cam_extr": np.eye(4).tolist()}))
+    groups = load(folder).groups
+    assert_run_layout(groups)
+    assert set(groups) == {"", "commands", "motors", "sensors", "imu", "mocap", "camera", "intervals", "segments"}
+
+
 def test_camera_frames_are_the_bytes_on_disk(folder: Path) -> None:
     """Images are handed on unread and unchanged, can be gone through twice, and are paired by number."""
     camera = load(folder).groups["camera"]
@@ -89,6 +98,23 @@ def test_missing_parts_are_counted_and_pairs_say_none(folder: Path) -> None:
     assert camera["source_frame"].tolist() == [0, 1, 2, 3, 5]
     assert camera["pair"].tolist() == [0, 1, -1, 2, 3]
     assert len(camera["t_depth"]) == 4
+
+
+def test_a_folder_without_depth_or_without_images_is_a_recording_too(folder: Path) -> None:
+    """What is absent is left out, not stored empty; no depth scale is asked for, and the frames are counted as missing."""
+    shutil.rmtree(folder / "depth")
+    (folder / "config.json").unlink()
+    run = load(folder)
+    assert "depth" not in run.groups["camera"]
+    assert run.groups["camera"]["pair"].tolist() == [-1] * 6
+    assert run.report.missing["depth"] == 6
+    shutil.rmtree(folder / "color")
+    assert "camera" not in load(folder).groups
+    # Images without any JSON of their number have no time.
+    write_image(folder / "color" / "0099.png", depth=False)
+    run = load(folder)
+    assert "camera" not in run.groups
+    assert run.report.missing["data"] == 1
 
 
 def test_intervals_come_from_the_motor_targets(tmp_path: Path) -> None:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from r2s2r_cli.errors import ExitCode, InputError
 from r2s2r_cli.stages.import_.authors_json import parse_frame
 from r2s2r_cli.stages.import_.sidecar import check_robot_name, parse_sidecar
 from r2s2r_cli.stages.import_.trajectory import import_trajectory
-from tests.support.import_samples import SIDECAR, sample_robot
-from tests.support.malformed import Malformed, csv_cases, json_cases, sidecar_cases
+from tests.support.import_samples import SIDECAR, frame_json, sample_robot, small_csv
+from tests.support.malformed import Malformed, csv_cases, json_cases, mutated, sidecar_cases
 
 ROBOT = sample_robot()
+GOOD_JSON = json.dumps(frame_json()).encode()
 
 
 def read_csv(data: bytes) -> None:
@@ -55,6 +58,28 @@ def test_malformed_input_is_refused_with_place_and_hint(read, case: Malformed) -
     assert not error.what.endswith(".")
     assert str(error).replace("\n", "").isprintable()
     assert len(str(error)) < 2000
+
+
+@pytest.mark.parametrize("block", range(4))
+@pytest.mark.parametrize(
+    ("read", "good"),
+    [
+        (read_csv, small_csv().encode()),
+        (read_sidecar, SIDECAR.encode()),
+        (read_json, json.dumps(frame_json()).encode()),
+    ],
+    ids=["csv", "toml", "json"],
+)
+def test_random_damage_never_ends_in_a_traceback(read, good: bytes, block: int) -> None:  # type: ignore[no-untyped-def]
+    """100 randomly damaged inputs a block are read, or refused with a printable message; nothing else happens."""
+    refused = 0
+    for seed in range(100 * block, 100 * block + 100):
+        try:
+            read(mutated(good, seed))
+        except InputError as error:
+            refused += 1
+            assert error.hint and str(error).replace("\n", "").isprintable()
+    assert refused > 50
 
 
 def test_there_are_two_hundred_cases_and_no_two_alike() -> None:

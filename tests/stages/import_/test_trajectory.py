@@ -12,9 +12,9 @@ from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.import_ import import_source
 from r2s2r_cli.stages.import_.sidecar import parse_sidecar
 from r2s2r_cli.stages.import_.trajectory import import_trajectory
-from schemas.recording import RECORDING
 from schemas.results_import import ImportReport
 from tests.support.import_samples import ROD_M, SIDECAR, csv_text, glide, sample_robot, small_csv, steps
+from tests.support.run_layout import assert_run_layout
 
 ROBOT = sample_robot()
 CYCLE = [[0.1, 0, 0.1, 0, 0, 0], [1, 0.1, 1, 0, 0, 0], [1, 1, 0.1, 0, 0, 0]]
@@ -239,20 +239,7 @@ def test_groups_and_datasets_are_those_of_the_layout() -> None:
     """Every group, dataset and attribute is in the schema with its type, and nothing required is missing."""
     groups, _ = read(csv_text(np.arange(9) * 0.1, glide(np.arange(9) * 0.1), steps(9, CYCLE), np.zeros((9, 6)),
                               length=np.ones((9, 9))))  # fmt: skip
-    for stream, group in groups.items():
-        spec = RECORDING.group(f"runs/log/{stream}".rstrip("/"))
-        assert spec is not None
-        for name in group.datasets:
-            dataset = spec.dataset(name)
-            assert dataset is not None and str(group[name].dtype) == dataset.dtype
-            assert group[name].ndim == len(dataset.dims)
-            assert dataset.nan_means or np.isfinite(group[name]).all()
-        assert {d.path for d in spec.datasets if d.required} <= set(group.datasets)
-        assert (
-            {a.name for a in spec.attributes if a.required}
-            <= set(group.attributes)
-            <= {a.name for a in spec.attributes}
-        )
+    assert_run_layout(groups)
 
 
 def test_import_is_repeatable() -> None:

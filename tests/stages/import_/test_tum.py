@@ -12,6 +12,7 @@ from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.import_ import import_source
 from r2s2r_cli.stages.import_.tum import associate
 from tests.support.import_samples import sample_robot, write_tum_folder
+from tests.support.run_layout import assert_run_layout
 
 ROBOT = sample_robot()
 START = 1305031102.0
@@ -71,6 +72,7 @@ def test_poses_of_the_camera_are_kept_as_unit_quaternions(tmp_path: Path) -> Non
     """groundtruth.txt becomes position and xyzw quaternion of length exactly 1; it may be absent."""
     poses = "# comment\n" + "\n".join(f"{START + i} 1 2 {i} 0 0 0.6 0.80001" for i in range(3))
     run = import_source(write_tum_folder(tmp_path / "desk", stamps(0, 1), stamps(0, 1), poses=poses), robot=ROBOT)
+    assert_run_layout(run.groups)
     pose = run.groups["camera_pose"]
     assert pose["p_WC"].tolist() == [[1, 2, 0], [1, 2, 1], [1, 2, 2]]
     assert np.linalg.norm(pose["q_WC"], axis=1) == pytest.approx(np.ones(3), abs=1e-15)

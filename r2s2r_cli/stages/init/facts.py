@@ -1,4 +1,8 @@
-"""The robots' numbers, each with its source. `toml.py` writes them down, sites and rest pose are derived."""
+"""The robots' numbers, each with its source. `robots.py` writes them down, sites and rest pose are derived.
+
+docs/concepts/robots.md says the same at length: which file or section a source is, why an assumption was made, how to
+measure yours. A test keeps its tables equal to these numbers.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +23,13 @@ class Fact(NamedTuple):
 
 
 LEGEND = (
-    "[R1] the authors' public simulator, nchen9191/tensegrity_diff_physics_public: its controller and bodies",
-    "[R2] its configurations 3_bar_tensegrity*.json and identified contact sets (r2s2r reference robot.md, section 2)",
-    "[R3] the robot's host and firmware, ChemStud24/tensegrity (robot.md, section 3)",
-    "[P]  the seed paper, section named   [C] the published crawl of the 360 mm robot, 2023-02-21",
-    "[V]  the authors' tracker, shiyoung77/tensegrity_perception (perception.md, section 1)",
-    "[E]  own measurements of step size and stiffness (contact.md, engines.md)",
+    "[S] the authors' public simulator, nchen9191/tensegrity_diff_physics_public: configurations v1 to v3",
+    "[H] the robot's public host and firmware, ChemStud24/tensegrity",
+    "[T] the authors' public tracker, shiyoung77/tensegrity_perception",
+    "[P] the paper: Real2Sim2Real Transfer for Control of Cable-driven Robots via a Differentiable Physics Engine",
+    "[C] the crawl of the 360 mm robot of 2023-02-21, published with [S]",
+    "derived: computed from the other numbers.  assumption: nobody has published it.",
+    "Files and sections, reasons, how to measure yours: docs/concepts/robots.md",
 )
 
 
@@ -125,67 +130,66 @@ class RobotFacts:
 
 
 _RODS = (
-    ("red", "end caps 0, 1 [R2]"),
-    ("green", "end caps 2, 3 [R2]"),
-    ("blue", "end caps 4, 5 [R2]"),
+    ("red", "end caps 0, 1"),
+    ("green", "end caps 2, 3"),
+    ("blue", "end caps 4, 5"),
 )
-_ROD_RADIUS = Fact(0.0016, "[R2] 1.6 mm")
-_CAP_RADIUS = Fact(0.0175, "[R2] 17.5 mm")
+_ROD_RADIUS = Fact(0.0016, "[S]")
+_CAP_RADIUS = Fact(0.0175, "[S]")
 _HUES = (HsvFact("red", (165, 180)), HsvFact("green", (60, 78)), HsvFact("blue", (103, 120)))
-HSV_SOURCE = "[V] hue range in 8-bit OpenCV units (0..180)"
-SATURATION_MIN = Fact(100, "[V] S >= 100")
-VALUE_MIN = Fact(25, "[V] V >= 25-30, the lower one keeps more of a shaded cap")
+HSV_SOURCE = "[T] 8-bit OpenCV hue, 0..180"
+SATURATION_MIN = Fact(100, "[T]")
+VALUE_MIN = Fact(25, "[T] 25 to 30; the lower keeps shaded caps")
 
 THREEBAR = RobotFacts(
     name="threebar",
     title="untethered 3-bar prismatic tensegrity, 36 cm rods: the robot of the paper",
-    about=("The robot of the paper. Its configuration is v1 (Yale) of the authors' simulator where they differ.",),
+    about=("Where the authors' configurations differ, v1 (Yale) holds.",),
     illustrative=False,
     rods=_RODS,
-    rod_length=Fact(0.325, "[R2] cap centre to cap centre; 0.360 tip to tip, as in [P]"),
+    rod_length=Fact(0.325, "[S] cap centre to cap centre; 0.360 tip to tip [P]"),
     rod_radius=_ROD_RADIUS,
     cap_radius=_CAP_RADIUS,
     parts=(
-        Part("cap", True, "sphere", Fact(0.0105, "[R2] 10.5 g each"),
+        Part("cap", True, "sphere", Fact(0.0105, "[S]"),
              Fact(0.1625, "derived: half the rod length"), _CAP_RADIUS),
-        Part("motor", True, "tube", Fact(0.0353, "[R2] 35.3 g each"),
-             Fact(0.1175, "[R2] 117.5 mm (v1; 102.5 mm on v2)"), Fact(0.0175, "[R2] 17.5 mm"),
-             Fact(0.045, "[R2] 45 mm"), Fact(0.0016, "assumption: hollow [R1], the rod (1.6 mm) runs through it")),
-        Part("rod", False, "cylinder", Fact(0.0418, "[R2] 41.8 g with electronics (bare rod 3.8 g)"),
-             Fact(0.0, "assumption: centred"), Fact(0.0016, "[R2] 1.6 mm"),
-             Fact(0.325, "assumption, as in the authors' model: electronics spread along the rod")),
+        Part("motor", True, "tube", Fact(0.0353, "[S]"),
+             Fact(0.1175, "[S] v1; 0.1025 on v2"), Fact(0.0175, "[S]"),
+             Fact(0.045, "[S]"), Fact(0.0016, "assumption: the rod runs through it")),
+        Part("rod", False, "cylinder", Fact(0.0418, "[S] with electronics; the bare rod weighs 0.0038"),
+             Fact(0.0, "assumption: centred"), Fact(0.0016, "[S]"),
+             Fact(0.325, "assumption, as in [S]: electronics spread along the rod")),
     ),
-    rod_mass=Fact(0.1334, "[R2] 133.4 g"),
+    rod_mass=Fact(0.1334, "[S]"),
     actuated=PRISM_CABLES[:6],
     passive=PRISM_CABLES[6:],
     support=PRISM_SUPPORT,
-    cables_source="[R2] cable numbers, the same everywhere",
-    actuated_stiffness=Fact(2000.0, "assumption: inelastic [P Offline Robot Measurements]; [R2] 1000 N/m rescaled "
-                                    "to true g, doubled: 4 N stretch it 2 mm [E]"),
-    actuated_damping=Fact(4.0, "assumption, with that stiffness [E]; [R2] 1 N s/m as written"),
-    passive_stiffness=Fact(100.0, "[R2] 10000 g/s^2 in the file, 100 N/m rescaled to true g"),
-    passive_damping=Fact(1.0, "[R2] 1000 g/s in the file, as written"),
-    passive_rest_length=Fact(0.165, "[R2] 165 mm (v1; 170 mm on v2)"),
+    cables_source="[S] and [H], the same numbers",
+    actuated_stiffness=Fact(2000.0, "assumption: nearly inelastic, 4 N stretch it 2 mm"),
+    actuated_damping=Fact(4.0, "assumption, chosen with that stiffness"),
+    passive_stiffness=Fact(100.0, "[S] 10 as written, times 10 for the true g"),
+    passive_damping=Fact(1.0, "[S] as written"),
+    passive_rest_length=Fact(0.165, "[S] v1; 0.170 on v2"),
     motors=tuple(MotorFact("central", 1) for _ in range(6)),
-    board_source="[R3] one BLE central takes `d <1..6> <speed>`",
-    sign_source="assumption: [R3] positive speed shortens, no sign vector is published for this robot",
-    no_load=Fact(23.038, "[R2] 220 rpm, no load (2 pi 220 / 60)"),
-    speed=Fact(0.8, "[C] 0.8; [R2] 0.7-0.8"),
-    winch_radius=Fact(0.0035, "[R2] and [C] 3.5 mm"),
+    board_source="[H] one BLE central drives all six",
+    sign_source="assumption: positive shortens [H]; check it before the robot moves",
+    no_load=Fact(23.038, "[S] 220 rpm"),
+    speed=Fact(0.8, "[C]; 0.7 to 0.8 in [S]"),
+    winch_radius=Fact(0.0035, "[S] and [C]"),
     sensors=True,
-    p=Fact(6.0, "[R3] max_speed 99 robot: P 6"),
-    i=Fact(0.01, "[R3] I .01"),
-    d=Fact(0.5, "[R3] D .5"),
-    tolerance=Fact(0.12, "[R3] tol .12 (the crawl ran with 0.1 [C])"),
-    min_length=Fact(0.095, "[C] 95 mm, between cap centres"),
-    range=Fact(0.1, "[C] 100 mm"),
-    rate=Fact(50.0, "[R3] control runs at the sensor rate, about 50 Hz"),
-    step_timeout=Fact(6.0, "assumption: three times the longest target interval of [C], 2.0 s"),
-    cable_length_min=Fact(0.05, "derived: shortest cap distance in [C] 61 mm, less 3 x 4 mm noise"),
-    cable_length_max=Fact(0.35, "derived: longest cap distance in [C] 332 mm, plus 3 x 4 mm noise, rounded up"),
-    cap_height_max=Fact(0.3425, "derived: a rod upright on the ground, rod length + cap radius"),
-    friction=Fact(0.76, "[R2] identified by the authors for the Yale robot (set `Will`: .759); .41-1.17 elsewhere"),
-    restitution=Fact(0.0, "assumption: [R2] identified -.164, below 0 is unphysical"),
+    p=Fact(6.0, "[H]"),
+    i=Fact(0.01, "[H]"),
+    d=Fact(0.5, "[H]"),
+    tolerance=Fact(0.12, "[H]; 0.1 in [C]"),
+    min_length=Fact(0.095, "[C] between cap centres"),
+    range=Fact(0.1, "[C]"),
+    rate=Fact(50.0, "[H] about that, the rate of the sensors"),
+    step_timeout=Fact(6.0, "assumption: three times the longest target interval of [C]"),
+    cable_length_min=Fact(0.05, "derived: shortest in [C] 0.061, less 3 sd of noise"),
+    cable_length_max=Fact(0.35, "derived: longest in [C] 0.332, plus 3 sd of noise, rounded up"),
+    cap_height_max=Fact(0.3425, "derived: a rod upright on the ground"),
+    friction=Fact(0.76, "[S] identified for v1; 0.41 to 1.17 elsewhere"),
+    restitution=Fact(0.0, "assumption: [S] identified -0.16, which is unphysical"),
     colors=_HUES,
 )  # fmt: skip
 
@@ -193,42 +197,42 @@ THREEBAR_330 = replace(
     THREEBAR,
     name="threebar-330",
     title="3-bar prismatic tensegrity, 33 cm rods: the newer open-source platform",
-    about=("The newer open-source platform: configuration v3 of the authors' simulator, three WiFi boards.",),
-    rod_length=Fact(0.295, "[R2] cap centre to cap centre; 0.330 tip to tip"),
+    about=("Configuration v3 of the authors' simulator, three WiFi boards.",),
+    rod_length=Fact(0.295, "[S] cap centre to cap centre; 0.330 tip to tip"),
     parts=(
-        Part("cap", True, "sphere", Fact(0.0151, "[R2] 15.1 g each"),
+        Part("cap", True, "sphere", Fact(0.0151, "[S]"),
              Fact(0.1475, "derived: half the rod length"), _CAP_RADIUS),
-        Part("motor", True, "tube", Fact(0.0581, "[R2] 58.1 g each"),
-             Fact(0.1039, "[R2] 103.9 mm"), Fact(0.02, "[R2] 20 mm"), Fact(0.055, "[R2] 55 mm"),
-             Fact(0.0016, "assumption: hollow [R1], the rod (1.6 mm) runs through it")),
-        Part("housing", False, "tube", Fact(0.09, "[R2] 90 g"), Fact(0.0, "assumption: centred"),
-             Fact(0.02, "assumption: as wide as the motors"), Fact(0.143, "[R2] 143 mm"),
-             Fact(0.0016, "assumption: the rod (1.6 mm) runs through it")),
-        Part("rod", False, "cylinder", Fact(0.0065, "[R2] 6.5 g"), Fact(0.0, "assumption: centred"),
-             Fact(0.0016, "[R2] 1.6 mm"), Fact(0.295, "assumption: uniform, cap to cap")),
+        Part("motor", True, "tube", Fact(0.0581, "[S]"),
+             Fact(0.1039, "[S]"), Fact(0.02, "[S]"), Fact(0.055, "[S]"),
+             Fact(0.0016, "assumption: the rod runs through it")),
+        Part("housing", False, "tube", Fact(0.09, "[S]"), Fact(0.0, "assumption: centred"),
+             Fact(0.02, "assumption: as wide as the motors"), Fact(0.143, "[S]"),
+             Fact(0.0016, "assumption: the rod runs through it")),
+        Part("rod", False, "cylinder", Fact(0.0065, "[S]"), Fact(0.0, "assumption: centred"),
+             Fact(0.0016, "[S]"), Fact(0.295, "assumption: uniform, cap to cap")),
     ),
-    rod_mass=Fact(0.2429, "[R2] 242.9 g"),
-    passive_rest_length=Fact(0.14, "[R2] 140 mm (130 mm in the model of 2026)"),
+    rod_mass=Fact(0.2429, "[S]"),
+    passive_rest_length=Fact(0.14, "[S]; 0.130 in the authors' model of 2026"),
     motors=tuple(
         MotorFact(board, sign)
         for board, sign in zip(("blue", "green", "red", "green", "red", "blue"), (1, -1, 1, 1, -1, -1), strict=True)
     ),
-    board_source="[R3] boards 0 red: motors 2, 4; 1 green: 1, 3; 2 blue: 0, 5",
-    sign_source="[R3] `flip`, one robot's example: check it on yours before it moves",
-    speed=Fact(0.7, "[R3] max_speed 70 of 99"),
-    winch_radius=Fact(0.003175, "[R3] host: winch diameter 6.35 mm"),
-    p=Fact(10.0, "[R1] P 10 on the new robot"),
-    i=Fact(0.01, "[R1] I .01"),
-    d=Fact(0.5, "[R1] D .5"),
-    tolerance=Fact(0.15, "[R3] tol .15"),
-    min_length=Fact(0.1, "[R3] 100 mm, between cap centres"),
-    range=Fact(0.1, "assumption: as on the 360 mm robot; [R3] RANGE is 70-170 mm, set per behaviour"),
+    board_source="[H] red: motors 2, 4; green: 1, 3; blue: 0, 5",
+    sign_source="[H] one robot's `flip`: check yours before it moves",
+    speed=Fact(0.7, "[H] 70 of 99"),
+    winch_radius=Fact(0.003175, "[H]"),
+    p=Fact(10.0, "[S]"),
+    i=Fact(0.01, "[S]"),
+    d=Fact(0.5, "[S]"),
+    tolerance=Fact(0.15, "[H]"),
+    min_length=Fact(0.1, "[H] between cap centres"),
+    range=Fact(0.1, "assumption: as on the 360 mm robot; 0.07 to 0.17 in [H]"),
     step_timeout=Fact(6.0, "assumption: as on the 360 mm robot"),
-    cable_length_min=Fact(0.045, "assumption: that of the 360 mm robot, scaled by the rod length"),
-    cable_length_max=Fact(0.32, "assumption: that of the 360 mm robot, scaled by the rod length, rounded up"),
-    cap_height_max=Fact(0.3125, "derived: a rod upright on the ground, rod length + cap radius"),
-    friction=Fact(1.17, "[R2] identified by the authors for the new robot: 1.172"),
-    restitution=Fact(0.0, "assumption: [R2] identified -.240, below 0 is unphysical"),
+    cable_length_min=Fact(0.045, "assumption: the 360 mm robot's, scaled by rod length"),
+    cable_length_max=Fact(0.32, "assumption: the 360 mm robot's, scaled, rounded up"),
+    cap_height_max=Fact(0.3125, "derived: a rod upright on the ground"),
+    friction=Fact(1.17, "[S] identified for this robot"),
+    restitution=Fact(0.0, "assumption: [S] identified -0.24, which is unphysical"),
 )  # fmt: skip
 
 _SIX_ACTUATED, _SIX_PASSIVE = sixbar_cables()

@@ -48,159 +48,175 @@ def robot_toml(name: str, attachment: Mode = "surface") -> str:
     Raises UsageError for an unknown robot or attachment.
     """
     facts = robot_facts(name)
-    return "\n".join([*_head(facts, attachment), *_rods(facts), *_cables(facts, attachment), *_drives(facts)]) + "\n"
+    # What people edit most comes first; TOML wants the keys without a table before all tables.
+    lines = [*_head(facts, attachment), *_controller(facts), *_rods(facts), *_cables(facts, attachment)]
+    lines += _motors(facts)
+    if facts.sensors:
+        lines += _sensors(facts)
+    if facts.colors:
+        lines += _colors(facts)
+    return "\n".join(lines) + "\n"
 
 
 def _line(key: str, value: object, source: str = "") -> str:
-    if isinstance(value, Fact):
-        source, value = source or value.source, value.value
     text = f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else f"{value}"
     return f"{key} = {text}" + (f"  # {source}" if source else "")
 
 
+def _fact(key: str, fact: Fact, first: bool = True) -> str:
+    """A number; its source only in the first table of a kind, as the head of the file says."""
+    return _line(key, fact.value, fact.source if first else "")
+
+
 def _point(p: np.ndarray) -> str:
     rounded = np.round(p, _DECIMALS) + 0.0  # + 0.0 turns -0.0 into 0.0
-    return "[" + ", ".join(f"{x:.{_DECIMALS}f}" for x in rounded) + "]"
+    return "[" + ", ".join(f"{x: .{_DECIMALS}f}" for x in rounded) + "]"
 
 
 def _head(facts: RobotFacts, attachment: str) -> Iterator[str]:
     yield f"# robot.toml: {facts.title}."
     for about in facts.about:
         yield f"# {about}"
-    yield "# SI units throughout. Edit it by hand; `r2s2r calibrate` changes single values and keeps the comments."
+    yield "# SI units. Edit it by hand; `r2s2r calibrate` changes single values and keeps the comments."
+    yield "# A number without a comment has the source that stands in the first table of its kind."
     yield "#"
-    yield "# Sources:"
     for legend in LEGEND:
         yield f"# {legend}"
-    yield "# derived: computed by `r2s2r init` from the other numbers;  assumption: nobody has published it."
     yield ""
     yield "schema_version = 1"
     yield _line("name", facts.name)
     yield _line("title", facts.title)
     yield _line("illustrative", facts.illustrative)
-    yield _line("attachment", attachment, "`surface` of the caps [P System Identification], or `rod_end` (NTRT)")
-    edge = f"its actuated edges {facts.rest_edge * 1e3:g} mm (min_length_m + range_m)"
-    shape = "prism of 150 degrees twist" if len(facts.rods) == 3 else "icosahedron-like shape"
+    yield _line("attachment", attachment, 'of the sites below: "surface" of the caps [P], or "rod_end"')
+    edge = f"actuated cables at {facts.rest_edge:g} m (min_length_m + range_m)"
+    shape = "the prism twisted by 150 degrees" if len(facts.rods) == 3 else "the icosahedron-like shape"
     yield ""
-    yield f"# Rest pose, world frame W, z up, lying on caps {list(facts.support)}: derived, the {shape},"
-    yield f"# {edge}."
-    yield "# The sites below refer to the rod frames of this pose: x most upwards, z towards the odd cap."
+    yield f"# Caps at rest in the world, z up. Derived: {shape},"
+    yield f"# {edge}, lying on caps {', '.join(map(str, facts.support))}."
     yield "rest_caps_m = ["
     for cap, p in enumerate(facts.rest_caps()):
-        yield f"  {_point(p)},  # derived: cap {cap}"
+        yield f"  {_point(p)},  # cap {cap}"
     yield "]"
 
 
-def _rods(facts: RobotFacts) -> Iterator[str]:
-    for i, (rod, source) in enumerate(facts.rods):
-        as_first = f"as rod {facts.rods[0][0]}" if i else ""
-        yield ""
-        yield "[[rods]]"
-        yield _line("name", rod, source)
-        yield _line("length_m", facts.rod_length, as_first)
-        yield _line("radius_m", facts.rod_radius, as_first)
-        yield _line("cap_radius_m", facts.cap_radius, as_first)
-        for part in facts.parts:
-            for side in (-1, 1) if part.pair else (0,):
-                yield from _part(part, side, as_first)
-        if not i:
-            yield f"# together {facts.rod_mass.value * 1e3:.1f} g a rod: {facts.rod_mass.source}"
-
-
-def _part(part: Part, side: int, as_first: str) -> Iterator[str]:
-    yield "  [[rods.parts]]"
-    yield "  " + _line("name", part.name + {-1: "_even", 0: "", 1: "_odd"}[side])
-    yield "  " + _line("shape", part.shape)
-    yield "  " + _line("mass_kg", part.mass, as_first)
-    yield "  " + _line("offset_m", part.offset.value * (side or 1), as_first or part.offset.source)
-    yield "  " + _line("radius_m", part.radius, as_first)
-    if part.length is not None:
-        yield "  " + _line("length_m", part.length, as_first)
-    if part.inner_radius is not None:
-        yield "  " + _line("inner_radius_m", part.inner_radius, as_first)
-
-
-def _cables(facts: RobotFacts, attachment: Mode) -> Iterator[str]:
-    sites = attach(facts.rest_caps(), facts.cables, facts.cap_radius.value, attachment, guides=facts.guides).sites
-    how = "points A..H of [P System Identification]" if attachment == "surface" else "cap centres, NTRT's rod end nodes"
-    n = len(facts.actuated)
+def _controller(facts: RobotFacts) -> Iterator[str]:
     yield ""
-    yield f"# Cables, in the order of their numbers: 0..{n - 1} winched, the others passive. Sites: derived, {how}."
-    for k, (a, b) in enumerate(facts.cables):
-        winched = k < n
-        as_first = "" if k in (0, n) else f"as cable {0 if winched else n}"
-        yield ""
-        yield f"[[cables]]  # cable {k}"
-        yield f"caps = [{a}, {b}]  # {facts.cables_source}"
-        yield _line("kind", "actuated" if winched else "passive")
-        yield _line("stiffness_n_per_m", facts.actuated_stiffness if winched else facts.passive_stiffness, as_first)
-        yield _line("damping_n_s_per_m", facts.actuated_damping if winched else facts.passive_damping, as_first)
-        if not winched:
-            note = as_first or "not published ([P] measured a cubic, without its numbers): linear until calibrated"
-            yield _line("stiffness2_n_per_m2", 0.0, note)
-            yield _line("stiffness3_n_per_m3", 0.0, note)
-            yield _line("rest_length_m", facts.passive_rest_length, as_first)
-        yield "sites_m = ["
-        for cap, site in zip((a, b), sites[k], strict=True):
-            yield f"  {_point(site)},  # derived: on cap {cap}, frame of rod {facts.rods[cap // 2][0]}"
-        yield "]"
-
-
-def _drives(facts: RobotFacts) -> Iterator[str]:
-    for k, motor in enumerate(facts.motors):
-        as_first = "as cable 0" if k else ""
-        yield ""
-        yield f"[[motors]]  # winch of cable {k}"
-        yield _line("cable", k)
-        yield _line("no_load_rad_per_s", facts.no_load, as_first)
-        yield _line("speed", facts.speed, as_first)
-        yield _line("winch_radius_m", facts.winch_radius, as_first)
-        if motor.board:
-            yield _line("board", motor.board, facts.board_source)
-        yield _line("sign", motor.sign, facts.sign_source)
-    if facts.sensors:
-        yield from _sensors(facts)
-    yield ""
-    yield "# Low-level controller: position = (cap distance - min_length_m) / range_m, 0 short .. 1 long."
+    yield "# Low-level controller: position = (cap distance - min_length_m) / range_m, 0 short to 1 long."
     yield "[pid]"
     for key, fact in (
         ("p", facts.p), ("i", facts.i), ("d", facts.d), ("tolerance", facts.tolerance),
         ("min_length_m", facts.min_length), ("range_m", facts.range), ("rate_hz", facts.rate),
         ("step_timeout_s", facts.step_timeout),
     ):  # fmt: skip
-        yield _line(key, fact)
+        yield _fact(key, fact)
     yield ""
-    yield "[limits]  # between cap centres; outside them `validate` complains and the host stops"
-    yield _line("cable_length_min_m", facts.cable_length_min)
-    yield _line("cable_length_max_m", facts.cable_length_max)
-    yield _line("cap_height_max_m", facts.cap_height_max)
+    yield "# What a healthy robot never leaves, between cap centres: outside, `validate` complains and the host stops."
+    yield "[limits]"
+    yield _fact("cable_length_min_m", facts.cable_length_min)
+    yield _fact("cable_length_max_m", facts.cable_length_max)
+    yield _fact("cap_height_max_m", facts.cap_height_max)
     yield ""
-    yield "[contact]  # where identification starts, not a truth"
-    yield _line("friction", facts.friction)
-    yield _line("restitution", facts.restitution)
-    for color in facts.colors:
-        yield ""
-        yield "[[colors]]"
-        yield _line("rod", color.rod)
-        yield f"hue = [{color.hue[0]}, {color.hue[1]}]  # {HSV_SOURCE}"
-        yield _line("saturation_min", SATURATION_MIN)
-        yield _line("value_min", VALUE_MIN)
+    yield "# Where identification starts, not a truth."
+    yield "[contact]"
+    yield _fact("friction", facts.friction)
+    yield _fact("restitution", facts.restitution)
+
+
+def _rods(facts: RobotFacts) -> Iterator[str]:
+    yield ""
+    yield f"# Rods, {facts.rod_mass.value:g} kg each {facts.rod_mass.source}."
+    yield "# offset_m of a part: along the rod from its middle, positive towards the odd cap."
+    for i, (rod, caps) in enumerate(facts.rods):
+        if i:
+            yield ""
+        yield "[[rods]]"
+        yield _line("name", rod, caps)
+        yield _fact("length_m", facts.rod_length, not i)
+        yield _fact("radius_m", facts.rod_radius, not i)
+        yield _fact("cap_radius_m", facts.cap_radius, not i)
+        for part in facts.parts:
+            for side in (-1, 1) if part.pair else (0,):
+                yield from _part(part, side, first=not i and side < 1)
+
+
+def _part(part: Part, side: int, *, first: bool) -> Iterator[str]:
+    yield "  [[rods.parts]]"
+    yield "  " + _line("name", part.name + {-1: "_even", 0: "", 1: "_odd"}[side])
+    yield "  " + _line("shape", part.shape)
+    yield "  " + _fact("mass_kg", part.mass, first)
+    yield "  " + _line("offset_m", part.offset.value * (side or 1), part.offset.source if first else "")
+    yield "  " + _fact("radius_m", part.radius, first)
+    if part.length is not None:
+        yield "  " + _fact("length_m", part.length, first)
+    if part.inner_radius is not None:
+        yield "  " + _fact("inner_radius_m", part.inner_radius, first)
+
+
+def _cables(facts: RobotFacts, attachment: Mode) -> Iterator[str]:
+    sites = attach(facts.rest_caps(), facts.cables, facts.cap_radius.value, attachment, guides=facts.guides).sites
+    how = "derived: points A to H [P]" if attachment == "surface" else "derived: cap centres"
+    n = len(facts.actuated)
+    yield ""
+    yield f"# Cables, in the order of their numbers: 0 to {n - 1} winched, the others passive."
+    yield "# sites_m: where the cable is tied, one point a cap, in the frame of that cap's rod at rest: origin in its"
+    yield "# middle, z towards the odd cap, x perpendicular to the rod and most upwards (docs/concepts/attachment.md)."
+    for k, (a, b) in enumerate(facts.cables):
+        winched, first = k < n, k in (0, n)
+        if k:
+            yield ""
+        yield f"[[cables]]  # cable {k}"
+        yield f"caps = [{a}, {b}]" + (f"  # {facts.cables_source}" if first else "")
+        yield _line("kind", "actuated" if winched else "passive")
+        yield _fact("stiffness_n_per_m", facts.actuated_stiffness if winched else facts.passive_stiffness, first)
+        yield _fact("damping_n_s_per_m", facts.actuated_damping if winched else facts.passive_damping, first)
+        if not winched:
+            for power in (2, 3):
+                note = "assumption: linear until calibrated, [P] gives no coefficients" if first else ""
+                yield _line(f"stiffness{power}_n_per_m{power}", 0.0, note)
+            yield _fact("rest_length_m", facts.passive_rest_length, first)
+        yield f"sites_m = [{', '.join(map(_point, sites[k]))}]" + (f"  # {how}" if first else "")
+
+
+def _motors(facts: RobotFacts) -> Iterator[str]:
+    yield ""
+    yield "# Winches, one a winched cable. sign: of the wire command that reels in."
+    for k, motor in enumerate(facts.motors):
+        if k:
+            yield ""
+        yield f"[[motors]]  # winch of cable {k}"
+        yield _line("cable", k)
+        yield _fact("no_load_rad_per_s", facts.no_load, not k)
+        yield _fact("speed", facts.speed, not k)
+        yield _fact("winch_radius_m", facts.winch_radius, not k)
+        if motor.board:
+            yield _line("board", motor.board, "" if k else facts.board_source)
+        yield _line("sign", motor.sign, "" if k else facts.sign_source)
 
 
 def _sensors(facts: RobotFacts) -> Iterator[str]:
     yield ""
-    yield "# Stretch sensors, sensor i on cable i ([R3] and the authors' sensor list). Not calibrated yet:"
-    yield "# `r2s2r calibrate` writes slope_f_per_m and offset_f (capacitance [F] = slope length + offset)."
+    yield "# Stretch sensors, sensor i on cable i [H]. Capacitance in farad = slope_f_per_m length + offset_f;"
+    yield "# `r2s2r calibrate` writes both. Until then the sensors are not calibrated."
     for k, (a, b) in enumerate(facts.cables):
-        yield ""
-        yield f"[[sensors]]  # sensor {k}, caps {a}-{b}"
+        if k:
+            yield ""
+        yield f"[[sensors]]  # sensor {k}, caps {a} and {b}"
         yield _line("cable", k)
-        if k < len(facts.actuated):
-            note = "as sensor 0" if k else (
-                "assumption: left out; a published variant [R2] has 100 N/m beyond 140-175 mm"
-            )  # fmt: skip
-            yield _line("stiffness_n_per_m", 0.0, note)
+        if k == 0:
+            note = "assumption: its own tendon left out"
         else:
-            yield _line(
-                "stiffness_n_per_m", 0.0, "[P Offline Robot Measurements]: the passive tendon is itself a sensor"
-            )
+            note = "[P] the passive tendon is the sensor" if k == len(facts.actuated) else ""
+        yield _line("stiffness_n_per_m", 0.0, note)
+
+
+def _colors(facts: RobotFacts) -> Iterator[str]:
+    yield ""
+    yield "# Colours of the rods' caps in the camera's picture."
+    for i, color in enumerate(facts.colors):
+        if i:
+            yield ""
+        yield "[[colors]]"
+        yield _line("rod", color.rod)
+        yield f"hue = [{color.hue[0]}, {color.hue[1]}]" + ("" if i else f"  # {HSV_SOURCE}")
+        yield _fact("saturation_min", SATURATION_MIN, not i)
+        yield _fact("value_min", VALUE_MIN, not i)

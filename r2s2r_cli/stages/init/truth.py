@@ -123,8 +123,8 @@ def kinematic_truth(facts: RobotFacts, intervals: int) -> KinematicTruth:
     if facts.support != PRISM_SUPPORT or len(facts.rods) != 3:
         raise UsageError(
             f"the kinematic sample is a 3-bar prism, {facts.name} is not one",
-            where="sample", expected="threebar or threebar-330", received=facts.name,
-            hint="r2s2r init --robot threebar",
+            where="--sample", expected="--robot threebar or threebar-330", received=facts.name,
+            hint="r2s2r init --robot threebar --sample",
         )  # fmt: skip
     if intervals < 1:
         raise UsageError(

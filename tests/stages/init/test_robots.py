@@ -19,6 +19,7 @@ from r2s2r_cli.stages.init.robots import ROBOTS, robot_toml
 from schemas.robot import Robot
 
 NAMES = sorted(ROBOTS)
+DOCS = Path(__file__).resolve().parents[3] / "docs"
 GRAMS = {"threebar": 133.4, "threebar-330": 242.9, "sixbar": 133.4}
 
 
@@ -59,13 +60,44 @@ def test_written_sites_and_rest_pose_agree(name: str) -> None:
     np.testing.assert_allclose(np.linalg.norm(arms, axis=-1), robot.rods[0].cap_radius_m, atol=3e-6)
 
 
+INDICES = ("schema_version", "cable")
+
+
+@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("name", NAMES)
-def test_every_number_has_a_source(name: str) -> None:
-    """Each line with a measured or assumed number has a comment; only indices and the version stand alone."""
+def test_every_number_has_a_source(name: str, mode: Mode) -> None:
+    """A number, or the same key in the first table of its kind, has a comment; only indices stand alone."""
+    sourced: set[tuple[str, str]] = set()
+    table = kind = ""
+    for line in robot_toml(name, mode).splitlines():
+        if line.strip().startswith("[["):
+            table = kind = line.split("]]")[0]
+        part = re.fullmatch(r'\s*(?:name|kind) = "(\w+?)(?:_even|_odd)?".*', line)
+        if part and table.strip() in ("[[rods.parts", "[[cables"):
+            kind = table + part[1]
+        number = re.fullmatch(r"\s*(\w+) = [-\d\[][^#]*(#.*)?", line)
+        if number and number[1] not in (*INDICES, "rest_caps_m"):
+            # `caps` stand above `kind`: those of all cables are of one kind.
+            assert number[2] or (kind, number[1]) in sourced, line
+            sourced.add((kind, number[1]))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_fits_a_screen(name: str) -> None:
+    """No line is wider than 115 characters, and no comment behind a number longer than 70."""
     for line in robot_toml(name).splitlines():
-        bare = re.fullmatch(r"\s*(\w+) = [-\d\[.].*", line)
-        if bare and bare[1] not in ("schema_version", "cable") and not line.rstrip().endswith("["):
-            assert "  # " in line, line
+        assert len(line) <= 115, line
+        assert line.startswith("#") or len(line.partition("  # ")[2]) <= 70, line
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_sources_are_public(name: str) -> None:
+    """Every abbreviation is explained in the head, and no page is named that users do not get."""
+    head, _, body = robot_toml(name).partition("\n\n")
+    assert set(re.findall(r"\[([A-Z]\d?)\]", body)) <= set(re.findall(r"^# \[([A-Z])\]", head, re.MULTILINE))
+    pages = set(re.findall(r"[\w/]+\.md", head + body))
+    assert pages == {"docs/concepts/robots.md", "docs/concepts/attachment.md"}
+    assert all((DOCS.parent / page).is_file() for page in pages)
 
 
 def test_cable_numbers_and_sensors_are_the_authors() -> None:

@@ -126,9 +126,17 @@ def test_it_says_what_it_is() -> None:
     assert sidecar["pid"]["min_length_m"] == 0.1
 
 
-@pytest.mark.parametrize(("robot", "intervals"), [("sixbar", 8), ("nobody", 8), ("threebar", 0)])
-def test_wrong_requests_are_usage_errors(robot: str, intervals: int) -> None:
-    """Another robot, an unknown one, or no interval at all: a usage error with a hint."""
+@pytest.mark.parametrize(
+    ("robot", "intervals", "hint"),
+    [
+        ("sixbar", 8, "r2s2r init --robot threebar --sample"),
+        ("nobody", 8, "r2s2r init --robot "),
+        ("threebar", 0, "ask for 8"),
+    ],
+)
+def test_wrong_requests_are_usage_errors(robot: str, intervals: int, hint: str) -> None:
+    """Another robot, an unknown one, or no interval at all: a usage error (exit 2) with a hint."""
     with pytest.raises(UsageError) as caught:
         kinematic_sample(1, robot=robot, intervals=intervals)
-    assert caught.value.hint
+    assert caught.value.exit_code == 2
+    assert caught.value.hint.startswith(hint)

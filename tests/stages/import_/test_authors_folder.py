@@ -101,7 +101,7 @@ def test_missing_parts_are_counted_and_pairs_say_none(folder: Path) -> None:
 
 
 def test_a_folder_without_depth_or_without_images_is_a_recording_too(folder: Path) -> None:
-    """What is absent is left out, not stored empty; no depth scale is asked for, and the frames are counted as missing."""
+    """What is absent is left out, not stored empty; no depth scale is asked for; missing frames are counted."""
     shutil.rmtree(folder / "depth")
     (folder / "config.json").unlink()
     run = load(folder)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import traceback
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
 import typer
@@ -21,15 +22,26 @@ BUG_MESSAGE = "this is a bug in r2s2r, please report it with the lines above"
 class ErrorGroup(TyperGroup):
     """Turns every outcome into an exit code of `errors.ExitCode`; tracebacks are for bugs only."""
 
-    def main(self, args: Any = None, prog_name: str | None = None, **extra: Any) -> Any:
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        windows_expand_args: bool = True,
+        **extra: Any,
+    ) -> Any:
         """Run; leave through SystemExit with one of our codes."""
+        del standalone_mode  # our own error handling replaces Typer's, which this flag would switch on
         arguments = list(sys.argv[1:] if args is None else args)
-        extra["standalone_mode"] = False
-        code = run_guarded(lambda: super(ErrorGroup, self).main(arguments, prog_name, **extra), "--json" in arguments)
+        run = super().main
+        code = run_guarded(
+            lambda: run(arguments, prog_name, complete_var, False, windows_expand_args, **extra), "--json" in arguments
+        )
         sys.exit(code)
 
 
-def run_guarded(call: Any, as_json: bool) -> int:
+def run_guarded(call: Callable[[], object], as_json: bool) -> int:
     """Run `call` and return its exit code; errors are printed in our form."""
     try:
         result = call()

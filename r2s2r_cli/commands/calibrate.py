@@ -97,7 +97,11 @@ def calibrate(
         outcome.append(report)
         return data, report
 
-    result = run.run(compute, (lambda data: _draw(data, outcome[0], here.robot())) if draw else None)
+    result = run.run(
+        compute,
+        (lambda data: _draw(data, outcome[0], here.robot())) if draw else None,
+        lambda: _apply(here, outcome[0]),
+    )
     show_outcome(result, console)
     for report in outcome:
         _show(report, console)
@@ -149,11 +153,8 @@ def _compute(
     project: Project, asked: dict[str, Any], use: str | None, overrides: dict[str, Any], kept: list[str]
 ) -> tuple[ArtifactData, CalibrationReport]:
     from r2s2r_cli.artifact import ArtifactData
-    from r2s2r_cli.stages.calibrate import apply_changes
     from r2s2r_cli.stages.calibrate import calibrate as fit
-    from r2s2r_cli.store.atomic import write_text
     from r2s2r_cli.store.read import read_artifact
-    from r2s2r_cli.store.toml import read_text
 
     sources: dict[str, Any] = {
         name: [_source(path) for path in value] if isinstance(value, list) else _source(value)
@@ -166,9 +167,17 @@ def _compute(
         wanted_groups = {group for name in kept for group in PARTS[name]}
         earlier = {path: group for path, group in before.groups.items() if path.split("/")[0] in wanted_groups}
         data = ArtifactData(data.kind, {**earlier, **data.groups})
+    return data, report
+
+
+def _apply(project: Project, report: CalibrationReport) -> None:
+    """Write the new numbers into robot.toml, once the artifact that explains them stands."""
+    from r2s2r_cli.stages.calibrate import apply_changes
+    from r2s2r_cli.store.atomic import write_text
+    from r2s2r_cli.store.toml import read_text
+
     if not report.changes.empty:
         write_text(project.robot_path, apply_changes(read_text(project.robot_path), report.changes))
-    return data, report
 
 
 def _source(path: Path) -> Source:

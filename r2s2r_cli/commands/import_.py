@@ -112,8 +112,13 @@ def _refs(project: Project, sources: list[Path]) -> list[InputRef]:
             if sidecar.is_file():
                 refs.append(source_ref(project, sidecar))
         except OSError as error:
-            raise InputError("the source cannot be read", where=str(path), expected="a log that is there",
-                             received=error.strerror or str(error), hint=f"ls -la '{path.parent}'") from error  # fmt: skip
+            raise InputError(
+                "the source cannot be read",
+                where=str(path),
+                expected="a log that is there",
+                received=error.strerror or str(error),
+                hint=f"ls -la '{path.parent}'",
+            ) from error
     return refs
 
 

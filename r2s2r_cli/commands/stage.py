@@ -31,7 +31,14 @@ if TYPE_CHECKING:
 _GEOMETRY = {"rods": ("length_m", "cap_radius_m"), "cables": ("caps", "kind")}
 ROBOT_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
     "import": {"name": (), **_GEOMETRY},
-    "calibrate": {"name": (), "sensors": ("cable",), "cables": ("caps", "kind")},
+    "calibrate": {
+        "name": (),
+        "rods": ("name", "length_m", "cap_radius_m"),
+        "sensors": ("cable",),
+        "cables": ("caps", "kind", "rest_length_m"),
+        "pid": (),
+        "limits": (),
+    },
     "estimate": {"name": (), "rods": ("length_m", "cap_radius_m", "parts"), "cables": ("caps", "kind"), "pid": ()},
 }
 """Which part of robot.toml each stage uses; a change elsewhere does not make its results stale."""
@@ -86,8 +93,12 @@ class StageRun:
         self,
         compute: Callable[[], tuple[ArtifactData, BaseModel]],
         draw: Callable[[ArtifactData], Iterable[tuple[str, bytes]]] | None,
+        after: Callable[[], None] = lambda: None,
     ) -> StageResult:
-        """Compute and write where the artifact is not fresh; `draw` yields (suffix, bytes): `-run.png`, `.html`."""
+        """Compute and write where the artifact is not fresh; `draw` yields (suffix, bytes): `-run.png`, `.html`.
+
+        `after` runs once the artifact stands, still under the lock.
+        """
         present, why = self.why()
         if not why and not self.force:
             os.utime(self.target)  # make decides by file time; it must see that this is up to date
@@ -97,7 +108,7 @@ class StageRun:
         if self.guard is not None and not self.force:
             self.guard(present)
         with writing(self.project.root, self.stage):
-            return self._run_locked(compute, draw, why or ["--force was given"])
+            return self._run_locked(compute, draw, after, why or ["--force was given"])
 
     def why(self) -> tuple[Header | None, list[str]]:
         """The header of what is there, and why it must be made (again); empty: it is fresh."""
@@ -120,6 +131,7 @@ class StageRun:
         self,
         compute: Callable[[], tuple[ArtifactData, BaseModel]],
         draw: Callable[[ArtifactData], Iterable[tuple[str, bytes]]] | None,
+        after: Callable[[], None],
         why: Sequence[str],
     ) -> StageResult:
         from r2s2r_cli.store.provenance import build_provenance
@@ -134,6 +146,7 @@ class StageRun:
             wall_s=time.monotonic() - clock,
         )  # fmt: skip
         header = write_artifact(self.target, data, provenance)
+        after()
         drawings = []
         for suffix, content in draw(data) if draw else ():
             path = self.target.with_name(self.target.stem + suffix)

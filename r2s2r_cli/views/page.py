@@ -14,9 +14,11 @@ _TEMPLATE = """\
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{{ page.title }}</title>
 <style>
-  body { font: 15px/1.5 system-ui, sans-serif; color: #1c2430; max-width: 72rem; margin: 2rem auto; padding: 0 1rem; }
+  body { font: 15px/1.5 system-ui, sans-serif; color: #1c2430; max-width: 72rem; margin: 2rem auto;
+         padding: 0 1rem; }
   h1 { font-size: 1.5rem; margin-bottom: .2rem; } h2 { font-size: 1.1rem; margin-top: 2rem; }
-  p.verdict { font-size: 1.1rem; } p.label { background: #fff3cd; border-left: 4px solid #b58900; padding: .4rem .8rem; }
+  p.verdict { font-size: 1.1rem; }
+  p.label { background: #fff3cd; border-left: 4px solid #b58900; padding: .4rem .8rem; }
   table { border-collapse: collapse; } th, td { padding: .2rem .8rem .2rem 0; text-align: left; vertical-align: top; }
   th { border-bottom: 1px solid #8792a2; } td.number { text-align: right; font-variant-numeric: tabular-nums; }
   img { max-width: 100%; height: auto; } footer { margin-top: 3rem; color: #5a6675; font-size: .85rem; }

@@ -113,36 +113,45 @@ def _top_view(axes: Axes, caps: Group) -> None:
 
 def import_rows(report: ImportReport) -> list[tuple[str, str]]:
     """What `import` found, as (what, found) rows with units."""
+    return [*_frame_rows(report), *_geometry_rows(report), *_stream_rows(report)]
+
+
+def _frame_rows(report: ImportReport) -> Iterator[tuple[str, str]]:
     dropped = report.dropped
-    rows = [
-        ("nature", report.nature),
-        ("frames kept", f"{report.kept} of {report.rows} rows, {report.duration_s:.2f} s"),
-        ("dropped", f"{dropped.total} ({dropped.total / max(1, report.rows):.0%}): {dropped.duplicate} duplicates "
-         f"(< 20 ms after a kept frame), {dropped.backwards} backwards in time, {dropped.not_observed} not observed"),
-    ]  # fmt: skip
+    yield "nature", report.nature
+    yield "frames kept", f"{report.kept} of {report.rows} rows, {report.duration_s:.2f} s"
+    share = f"{dropped.total} ({dropped.total / max(1, report.rows):.0%})"
+    duplicates = f"{dropped.duplicate} duplicates (< 20 ms after a kept frame)"
+    others = f"{dropped.backwards} backwards in time, {dropped.not_observed} not observed"
+    yield "dropped", f"{share}: {duplicates}, {others}"
     if report.frame_gap_median_s is not None and report.stamp_jitter_s is not None:
-        rows.append(("frame gap", f"median {1e3 * report.frame_gap_median_s:.0f} ms, jitter of the stamps "
-                     f"{1e3 * report.stamp_jitter_s:.0f} ms (sd)"))  # fmt: skip
+        median, jitter = 1e3 * report.frame_gap_median_s, 1e3 * report.stamp_jitter_s
+        yield "frame gap", f"median {median:.0f} ms, jitter of the stamps {jitter:.0f} ms (sd)"
     if report.gaps:
         longest = max(report.gaps, key=lambda gap: gap.length_s)
-        rows.append(("gaps", f"{len(report.gaps)}, the longest {longest.length_s:.2f} s after {longest.after_s:.2f} s"))
-    rows.append(("target intervals", f"{report.intervals} ({report.intervals_complete} complete), "
-                 f"{report.segments} segments"))  # fmt: skip
+        yield "gaps", f"{len(report.gaps)}, the longest {longest.length_s:.2f} s after {longest.after_s:.2f} s"
+    complete = f"{report.intervals} ({report.intervals_complete} complete)"
+    yield "target intervals", f"{complete}, {report.segments} segments"
+
+
+def _geometry_rows(report: ImportReport) -> Iterator[tuple[str, str]]:
     if report.noise is not None:
+        low, high, median = (1e3 * sd for sd in (report.noise.low_m, report.noise.high_m, report.noise.median_m))
         held = f"; held by the source: {', '.join(report.noise.held)}" if report.noise.held else ""
-        rows.append(("noise per axis", f"{1e3 * report.noise.low_m:.1f} to {1e3 * report.noise.high_m:.1f} mm (sd), "
-                     f"median {1e3 * report.noise.median_m:.1f} mm{held}"))  # fmt: skip
-    for i, length in enumerate(report.rod_length_m):
-        rows.append((f"rod {i}", f"{1e3 * length:.1f} +- {1e3 * report.rod_length_sd_m[i]:.1f} mm between cap centres, "
-                     f"robot.toml says {1e3 * report.rod_length_robot_m[i]:.1f} mm"))  # fmt: skip
+        yield "noise per axis", f"{low:.1f} to {high:.1f} mm (sd), median {median:.1f} mm{held}"
+    rods = zip(report.rod_length_m, report.rod_length_sd_m, report.rod_length_robot_m, strict=True)
+    for i, (length, sd, stated) in enumerate(rods):
+        found = f"{1e3 * length:.1f} +- {1e3 * sd:.1f} mm between cap centres"
+        yield f"rod {i}", f"{found}, robot.toml says {1e3 * stated:.1f} mm"
     if report.ground_offset_m is not None:
-        rows.append(("ground offset", f"{1e3 * report.ground_offset_m:.1f} mm: the lowest cap lies that much too low "
-                     "on average"))  # fmt: skip
-    if report.streams:
-        rows.append(("samples", ", ".join(f"{name} {count}" for name, count in report.streams.items())))
-    if report.missing:
-        rows.append(("missing", ", ".join(f"{name} {count}" for name, count in report.missing.items())))
-    return rows
+        offset = 1e3 * report.ground_offset_m
+        yield "ground offset", f"{offset:.1f} mm: the lowest cap lies that much too low on average"
+
+
+def _stream_rows(report: ImportReport) -> Iterator[tuple[str, str]]:
+    for title, counts in (("samples", report.streams), ("missing", report.missing)):
+        if counts:
+            yield title, ", ".join(f"{name} {count}" for name, count in counts.items())
 
 
 def recording_page(reports: ImportReports, pictures: Mapping[str, bytes]) -> bytes:

@@ -10,8 +10,13 @@ import numpy as np
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.errors import InputError
 
-_PID = {"pid_min_length": "min_length_m", "pid_range": "range_m", "pid_tolerance": "tolerance",
-        "motor_speed": "motor_speed", "winch_radius": "winch_radius_m"}  # fmt: skip
+_STATED = {"frame_stated": "frame", "start_unix": "start_unix_s"}
+_PID = {
+    "pid_min_length": "min_length_m", "pid_range": "range_m", "pid_tolerance": "tolerance", "pid_p": "p", "pid_i": "i",
+    "pid_d": "d", "motor_speed": "motor_speed", "winch_radius": "winch_radius_m",
+}  # fmt: skip
+"""Attribute of the run -> key of the sidecar."""
+_NOT_STATED = "not stated"
 
 
 def trajectory_files(data: ArtifactData, run: str) -> list[tuple[str, bytes]]:
@@ -35,7 +40,7 @@ def trajectory_files(data: ArtifactData, run: str) -> list[tuple[str, bytes]]:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([name for name, _ in columns])
     writer.writerows([[repr(float(v)) for v in row] for row in zip(*(c for _, c in columns), strict=True)])
-    return [(f"{run}.csv", text.getvalue().encode()), (f"{run}.toml", _sidecar(data.groups[f"runs/{run}"]))]
+    return [(f"{run}.csv", text.getvalue().encode()), (f"{run}.toml", _sidecar(data.groups[f"runs/{run}"], caps))]
 
 
 def policy_file(data: ArtifactData, run: str) -> tuple[str, bytes]:
@@ -58,12 +63,18 @@ def policy_file(data: ArtifactData, run: str) -> tuple[str, bytes]:
     return f"{run}.policy.toml", tomlkit.dumps(document).encode()
 
 
-def _sidecar(run: Group) -> bytes:
+def _sidecar(run: Group, caps: Group) -> bytes:
     import tomlkit
 
     document = tomlkit.document()
     for name in ("robot", "nature", "source"):
-        document[name] = str(run.attributes[name])
+        if run.attributes[name] != _NOT_STATED:
+            document[name] = str(run.attributes[name])
+    if "noise_sd_stated" in caps.attributes:
+        document["noise_sd_m"] = float(caps.attributes["noise_sd_stated"])
+    for name, key in _STATED.items():
+        if name in run.attributes:
+            document[key] = run.attributes[name]
     pid = tomlkit.table()
     for name, key in _PID.items():
         if name in run.attributes:

@@ -1,0 +1,157 @@
+"""Commands that look: status, inspect, doctor, bench."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import h5py
+import pytest
+
+from r2s2r_cli.store.header import read_header
+from tests.commands.conftest import document, invoke
+
+RECORD = "iterations/001/10-record.h5"
+ESTIMATE = "iterations/001/20-estimate.h5"
+
+
+def states() -> dict[str, tuple[str, list[str]]]:
+    """Artifact -> (state, reasons) as `status --json` says it."""
+    return {a["artifact"]: (a["state"], a["reasons"]) for a in document("status")["artifacts"]}
+
+
+def test_everything_is_fresh_after_the_stages(estimated: Path) -> None:
+    """Right after import and estimate nothing is stale and --check passes."""
+    assert {state for state, _ in states().values()} == {"fresh"}
+    assert invoke("status", "--check").exit_code == 0
+
+
+def test_comments_order_and_times_do_not_count(estimated: Path) -> None:
+    """A comment, another order of the sections and newer file times leave everything fresh."""
+    for name in ("project.toml", "robot.toml"):
+        Path(name).write_text("# a remark\n" + Path(name).read_text() + "\n# another\n")
+    head, *sections = Path("project.toml").read_text().split("\n[")
+    Path("project.toml").write_text("\n[".join([head, *reversed(sections)]) + "\n")
+    for path in estimated.rglob("*.*"):
+        os.utime(path, (2e9, 2e9))
+    assert {state for state, _ in states().values()} == {"fresh"}
+
+
+def test_a_setting_names_itself(estimated: Path) -> None:
+    """A changed setting makes its own stage stale, with old and new value, and no other."""
+    text = Path("project.toml").read_text()
+    Path("project.toml").write_text(text.replace("contact_clearance_m = 0.003", "contact_clearance_m = 0.004"))
+    found = states()
+    assert found[RECORD] == ("fresh", [])
+    assert found[ESTIMATE] == ("stale", ["setting estimate.contact_clearance_m was 0.003, is 0.004"])
+
+
+def test_a_value_of_the_robot_names_itself(estimated: Path) -> None:
+    """A changed rod length makes stale what used it; a motor's speed, which nobody used, does not."""
+    text = Path("robot.toml").read_text()
+    Path("robot.toml").write_text(text.replace("no_load_rad_per_s = ", "no_load_rad_per_s = 1"))
+    assert {state for state, _ in states().values()} == {"fresh"}
+    Path("robot.toml").write_text(text.replace("length_m = 0.325", "length_m = 0.326", 1))
+    assert states()[ESTIMATE] == ("stale", ["robot.toml: rods.0.length_m was 0.325, is 0.326",
+                                            "input iterations/001/10-record.h5 is stale itself"])  # fmt: skip
+
+
+def test_a_changed_source_travels_down(estimated: Path) -> None:
+    """Another byte in the log makes the recording stale, and the estimate with it; a new import, only the estimate."""
+    text = Path("sample.csv").read_text().rstrip("\n").splitlines()
+    Path("sample.csv").write_text("\n".join(text[:-1]) + "\n")
+    found = states()
+    assert found[RECORD] == ("stale", ["input sample.csv changed: its bytes are others"])
+    assert found[ESTIMATE] == ("stale", ["input iterations/001/10-record.h5 is stale itself"])
+    assert invoke("import", "sample.csv", "--no-draw").exit_code == 0
+    assert states()[ESTIMATE] == ("stale", [f"input {RECORD} changed: its content hash is another"])
+
+
+def test_a_source_that_moved_away_is_not_stale(estimated: Path) -> None:
+    """Logs may live elsewhere: without its source a recording stays what it was."""
+    Path("sample.csv").unlink()
+    assert states()[RECORD] == ("fresh", [])
+
+
+def test_a_new_stage_version_makes_its_results_stale(estimated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Raising a stage's version is a reason of its own."""
+    from schemas import versions
+
+    monkeypatch.setitem(versions.STAGE_VERSIONS, "estimate", 2)
+    assert states()[ESTIMATE] == ("stale", ["stage estimate changed: made by version 1, now 2"])
+
+
+def test_status_of_a_damaged_artifact(estimated: Path) -> None:
+    """A damaged head is said, and the next command is validate."""
+    data = bytearray((estimated / ESTIMATE).read_bytes())
+    data[200] ^= 1
+    (estimated / ESTIMATE).write_bytes(data)
+    assert states()[ESTIMATE][0] == "damaged"
+    assert document("status")["next"] == f"r2s2r validate {ESTIMATE}"
+
+
+def test_inspect_shows_units_and_provenance(estimated: Path) -> None:
+    """The tree names shape, unit, frame and meaning; the header says how it came to be."""
+    answer = document("inspect", ESTIMATE)
+    nodes = {node["path"]: node for node in answer["nodes"]}
+    caps = nodes["runs/sample/frames/p_WE"]
+    assert (caps["unit"], caps["frame"], caps["dims"]) == ("m", "W", "frame,cap,xyz")
+    assert caps["description"]
+    made = answer["header"]["provenance"]
+    assert (made["stage"], made["inputs"][0]["path"]) == ("estimate", RECORD)
+    assert made["inputs"][0]["sha256"] == read_header(estimated / RECORD).content_sha256
+
+
+def test_inspect_names_what_differs(estimated: Path) -> None:
+    """--same-as leaves with 3 and names the datasets where the contents differ."""
+    (estimated / "other.h5").write_bytes((estimated / ESTIMATE).read_bytes())
+    settings = ("--set", "estimate.contact_clearance_m=0.02", "--no-draw")
+    assert invoke("estimate", *settings).exit_code == 0
+    result = invoke("inspect", ESTIMATE, "--same-as", "other.h5")
+    assert result.exit_code == 3
+    assert "differs: runs/sample/frames/contact" in result.stdout
+
+
+def test_inspect_reads_a_foreign_file(tmp_path: Path) -> None:
+    """An HDF5 file of another program is shown as it is."""
+    with h5py.File(tmp_path / "foreign.h5", "w") as file:
+        file.create_dataset("a/b", data=[1.0, 2.0])
+    answer = document("inspect", str(tmp_path / "foreign.h5"))
+    assert answer["header"] is None
+    assert [node["path"] for node in answer["nodes"]] == ["a", "a/b"]
+
+
+@pytest.mark.parametrize("content", [b"", b"\x89HDF\r\n\x1a\n" + bytes(100), b"hello", bytes(5000)])
+def test_inspect_refuses_what_is_no_hdf5(tmp_path: Path, content: bytes) -> None:
+    """Empty, torn and other files are refused with a hint."""
+    (tmp_path / "x.h5").write_bytes(content)
+    result = invoke("inspect", str(tmp_path / "x.h5"))
+    assert result.exit_code == 4
+    assert result.stderr.splitlines()[-1].startswith("hint: ")
+
+
+def test_doctor_names_the_project_and_the_libraries(project: Path) -> None:
+    """doctor finds this project, our schemas, and an HDF5 library that writes and reads."""
+    probes = {probe["name"]: probe for probe in document("doctor")["probes"]}
+    assert probes["schemas"]["state"] == probes["HDF5 write and read"]["state"] == "ok"
+    assert str(project) in probes["project"]["found"]
+    assert {probe["state"] for name, probe in probes.items() if name.startswith("import ")} <= {"ok", "warning"}
+
+
+def test_doctor_names_the_package_to_install(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A library that does not import is a failed gate with the remedy as the hint."""
+    module = sys.modules["r2s2r_cli.commands.doctor"]  # the package's attribute of that name is the command
+    monkeypatch.setattr(module, "LIBRARIES", {"no_such_library": ("error", "apt-get install it")})
+    result = invoke("doctor")
+    assert result.exit_code == 3
+    assert result.stderr.splitlines()[-1] == "hint: apt-get install it"
+
+
+def test_bench_prints_ratios(project: Path) -> None:
+    """bench startup measures in fresh processes and gives each time as a multiple of a bare interpreter."""
+    result = invoke("bench", "startup", "--repeats", "1", "--json")
+    answer = json.loads(result.stdout)
+    assert answer["ratio_to_python"]["python -c pass"] == 1.0
+    assert set(answer["seconds"]) == set(answer["ratio_to_python"])

@@ -10,7 +10,7 @@ from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.stages.import_.authors_folder import import_authors_folder
 from r2s2r_cli.stages.import_.checks import ROD_TOLERANCE
-from r2s2r_cli.stages.import_.files import MAX_CSV_BYTES, list_folder, quoted, read_source, shown
+from r2s2r_cli.stages.import_.files import MAX_CSV_BYTES, file_size, list_folder, quoted, read_source, shown
 from r2s2r_cli.stages.import_.run import ImportedRun, run_name
 from r2s2r_cli.stages.import_.sidecar import read_sidecar, sidecar_path
 from r2s2r_cli.stages.import_.trajectory import import_trajectory
@@ -19,7 +19,7 @@ from schemas.results_import import ImportFormat
 from schemas.robot import Robot
 from schemas.sidecar import Sidecar
 
-__all__ = ["FORMATS", "ImportedRun", "find_format", "import_source", "merge_runs"]
+__all__ = ["FORMATS", "ImportedRun", "check_source", "find_format", "import_source", "merge_runs"]
 
 FORMATS: tuple[ImportFormat, ...] = ("trajectory_csv", "authors_folder", "tum_rgbd")
 
@@ -41,19 +41,8 @@ def import_source(
     robots by name, to say which one fits. Raises InputError for whatever cannot be read exactly as it stands,
     UsageError for an unknown format.
     """
-    chosen = find_format(path) if format == "auto" else format
-    if chosen not in FORMATS:
-        raise UsageError(
-            f"unknown format {shown(str(format))}",
-            where="--format",
-            expected=", ".join(("auto", *FORMATS)),
-            received=str(format),
-            hint=f"r2s2r import {quoted(path)} --format auto",
-        )
-    if chosen == "trajectory_csv":
-        data = read_source(path, "the CSV", limit=MAX_CSV_BYTES)
-    else:
-        list_folder(path, "the recording")
+    chosen = check_source(path, format)
+    data = read_source(path, "the CSV", limit=MAX_CSV_BYTES) if chosen == "trajectory_csv" else b""
     name = run_name(path)
     files = (path,) if sidecar is not None else (path, sidecar_path(path))
     stated = read_sidecar(path) if sidecar is None else sidecar
@@ -74,12 +63,33 @@ def import_source(
     return ImportedRun(name=name, groups=groups, report=report, files=files)
 
 
+def check_source(path: Path, format: ImportFormat | Literal["auto"] = "auto") -> ImportFormat:
+    """The format of a source that can be read: there, a file or folder as the format asks, of a sane size.
+
+    Nothing is read yet, so it can be asked before the source is hashed. Raises InputError, UsageError.
+    """
+    chosen = find_format(path) if format == "auto" else format
+    if chosen not in FORMATS:
+        raise UsageError(
+            f"unknown format {shown(str(format))}",
+            where="--format",
+            expected=", ".join(("auto", *FORMATS)),
+            received=str(format),
+            hint=f"r2s2r import {quoted(path)} --format auto",
+        )
+    if chosen == "trajectory_csv":
+        file_size(path, "the CSV", limit=MAX_CSV_BYTES)
+    else:
+        list_folder(path, "the recording")
+    return chosen
+
+
 def find_format(path: Path) -> ImportFormat:
     """The format of a source by what lies there. Raises InputError where it is none of the known ones."""
     if not path.is_dir():
         if path.suffix.lower() == ".csv":
             return "trajectory_csv"
-        read_source(path, "the log", limit=MAX_CSV_BYTES)
+        file_size(path, "the log", limit=MAX_CSV_BYTES)
         raise InputError(
             f"a file ending in {shown(path.suffix)} is no log that can be imported",
             where=str(path),

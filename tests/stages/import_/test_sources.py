@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from r2s2r_cli.errors import InputError, UsageError
-from r2s2r_cli.stages.import_ import find_format, import_source, merge_runs
+from r2s2r_cli.stages.import_ import check_source, find_format, import_source, merge_runs
 from r2s2r_cli.stages.import_.files import FileBytes, clipped, file_size, nearest, read_source
 from r2s2r_cli.stages.import_.sidecar import parse_sidecar, sidecar_path
 from schemas.sidecar import MINIMAL_SIDECAR
@@ -96,6 +96,17 @@ def test_formats_are_found_by_what_lies_there(tmp_path: Path) -> None:
     other = tmp_path / "log.bag"
     other.write_bytes(b"#ROSBAG")
     assert "'.bag'" in refusal(other).what
+
+
+def test_a_source_can_be_checked_before_it_is_read(tmp_path: Path) -> None:
+    """The check gives the format and refuses what reading would refuse, without touching the content."""
+    path = log(tmp_path)
+    path.write_bytes(bytes(range(256)))
+    assert check_source(path) == check_source(path, "trajectory_csv") == "trajectory_csv"
+    (tmp_path / "loop.csv").symlink_to(tmp_path / "loop.csv")
+    for wrong, format_ in ((tmp_path, "trajectory_csv"), (path, "tum_rgbd"), (tmp_path / "loop.csv", "auto")):
+        with pytest.raises(InputError):
+            check_source(wrong, format_)  # type: ignore[arg-type]
 
 
 def test_an_unknown_format_is_a_usage_error(tmp_path: Path) -> None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.base import ArtifactSpec, AttributeSpec, GroupSpec
-from schemas.base import column
+from schemas.base import ArtifactSpec, AttributeSpec, GroupSpec, column
 from schemas.policy import policy_group
 from schemas.segments import INTERVALS, SEGMENTS
 

@@ -5,8 +5,7 @@ Frames are counted among the kept frames of `caps`; in a run without caps, among
 
 from __future__ import annotations
 
-from schemas.base import GroupSpec
-from schemas.base import column
+from schemas.base import GroupSpec, column
 
 INTERVALS = GroupSpec(
     path="runs/{run}/intervals",

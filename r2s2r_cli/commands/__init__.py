@@ -17,6 +17,8 @@ from r2s2r_cli.commands.export import export
 from r2s2r_cli.commands.import_ import import_
 from r2s2r_cli.commands.init import init
 from r2s2r_cli.commands.inspect import inspect
+from r2s2r_cli.commands.migrate import migrate
+from r2s2r_cli.commands.recover import recover
 from r2s2r_cli.commands.status import status
 from r2s2r_cli.commands.validate import validate
 
@@ -28,6 +30,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "status": status,
     "inspect": inspect,
     "validate": validate,
+    "migrate": migrate,
+    "recover": recover,
     "doctor": doctor,
     "export": export,
 }

@@ -82,7 +82,7 @@ def import_(
     settings = here.config(place, overrides).imports
     run = StageRun(
         stage="import", kind="recording", project=here, iteration=place, console=console,
-        inputs=_refs(here, sources), overrides=overrides, flags={"format": format_, "depth_scale": depth_scale},
+        inputs=_refs(here, sources, format_), overrides=overrides, flags={"format": format_, "depth_scale": depth_scale},
         dry_run=dry_run, force=force, guard=_guard(here, place, sources),
     )  # fmt: skip
     outcome: list[ImportReports] = []
@@ -100,12 +100,14 @@ def import_(
         console.hint("r2s2r estimate")
 
 
-def _refs(project: Project, sources: list[Path]) -> list[InputRef]:
+def _refs(project: Project, sources: list[Path], format_: Format) -> list[InputRef]:
+    from r2s2r_cli.stages.import_ import check_source
     from r2s2r_cli.stages.import_.sidecar import sidecar_path
     from r2s2r_cli.store.staleness import source_ref
 
     refs: list[InputRef] = []
     for path in sources:
+        check_source(path, format_.value)
         sidecar = sidecar_path(path)
         try:
             refs.append(source_ref(project, path))

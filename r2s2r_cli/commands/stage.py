@@ -39,7 +39,13 @@ ROBOT_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
         "pid": (),
         "limits": (),
     },
-    "estimate": {"name": (), "rods": ("length_m", "cap_radius_m", "parts"), "cables": ("caps", "kind"), "pid": ()},
+    "estimate": {
+        "name": (),
+        "rods": ("length_m", "cap_radius_m", "parts"),
+        "cables": ("caps", "kind"),
+        "pid": (),
+        "sensors": ("cable", "slope_f_per_m", "offset_f"),
+    },
 }
 """Which part of robot.toml each stage uses; a change elsewhere does not make its results stale."""
 

@@ -179,9 +179,7 @@ def _sibling(path: Path) -> str:
 
 def _unreadable(path: Path, what: str, error: Exception) -> InputError:
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    return InputError(
-        f"{what} cannot be read", where=shown(str(path)), received=reason, hint=f"ls -ld {quoted(shown(str(path)))}"
-    )
+    return InputError(f"{what} cannot be read", where=str(path), received=reason, hint=f"ls -ld {quoted(path)}")
 
 
 def quoted(path: object) -> str:

@@ -71,7 +71,7 @@ def deviations_are_positive(run: Run) -> Iterator[Found]:
         strict = name == "noise_sd"
         bad = sd <= 0 if strict else sd < 0
         if bad.any():
-            yield Found(run.at(stream, name), "a standard deviation cannot be",
+            yield Found(run.at(stream, name), "a standard deviation is too small",
                         "above 0" if strict else "0 or more", worst(sd, bad.astype(float), axes))  # fmt: skip
 
 

@@ -153,10 +153,10 @@ def lengths_match_caps(run: Run) -> Iterator[Found]:
     p = run.p_WE[1]
     first, second = (np.array([cable.caps[i] for cable in run.robot.cables]) for i in (0, 1))
     off = np.abs(length - np.linalg.norm(p[:, second] - p[:, first], axis=-1))
-    if (off > RIGID_M).any():
+    far = off * (off > RIGID_M)
+    if (far > 0).any():
         yield Found(run.at("frames", "length"), "the length of a cable is not the distance of its caps",
-                    "within 1 mm", worst(off, off * (off > RIGID_M), ("frame", "cable"), scale=1e3, unit="mm") + " off"
-                    )  # fmt: skip
+                    "within 1 mm", "off by " + worst(off, far, ("frame", "cable"), scale=1e3, unit="mm"))  # fmt: skip
 
 
 def _axis(q: np.ndarray) -> np.ndarray:

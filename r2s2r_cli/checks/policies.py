@@ -70,7 +70,7 @@ def policy_times_sensible(policy: Policy) -> Iterator[Found]:
     ):
         if bad.any():
             values = policy.hold if name == "hold" else policy.timeout
-            yield Found(policy.at(name), f"the {name} of a step cannot be", expected,
+            yield Found(policy.at(name), f"the {name} of a step is too short", expected,
                         worst(values, bad * (1.0 - np.nan_to_num(values)), ("step",), unit="s"))  # fmt: skip
     if policy.repeat < 1:
         location = f"{policy.root}@repeat" if policy.root else "repeat"

@@ -58,7 +58,7 @@ def codes_known(content: Content) -> Iterator[Found]:
         if spec.codes:
             bad = ~np.isin(values, list(spec.codes))
             if bad.any():
-                known = ", ".join(f"{code} {words}" for code, words in spec.codes.items())
+                known = ", ".join(f"{code} {words.partition(':')[0]}" for code, words in spec.codes.items())
                 yield Found(location, "a code has no meaning", known, worst(values, bad.astype(float), spec.dims))
 
 

@@ -10,6 +10,7 @@ from r2s2r_cli.checks.base import Found, check, number
 from r2s2r_cli.checks.subjects import Run
 
 STAMP_TOLERANCE_S = 1e-9
+_ONE = {"intervals": "target interval", "segments": "segment"}
 _FIX = "run the stage that made the artifact again; intervals and segments are then found anew"
 
 
@@ -27,7 +28,7 @@ def spans_ordered(run: Run) -> Iterator[Found]:
         bad = (last < first) | (first <= ends)
         if bad.any():
             i = int(np.argmax(bad))
-            yield Found(run.at(stream), f"{stream[:-1]} {i + 1} is out of order",
+            yield Found(run.at(stream), f"{_ONE[stream]} {i + 1} is out of order",
                         f"frames after {ends[i]}, the first before the last", f"{first[i]} .. {last[i]}")  # fmt: skip
 
 
@@ -46,7 +47,7 @@ def spans_inside_frames(run: Run) -> Iterator[Found]:
     for stream, _, last in _spans(run):
         if (last >= count).any():
             i = int(np.argmax(last >= count))
-            yield Found(run.at(stream, "last"), f"{stream[:-1]} {i + 1} ends after the last kept frame",
+            yield Found(run.at(stream, "last"), f"{_ONE[stream]} {i + 1} ends after the last kept frame",
                         f"at most frame {count - 1}", str(last[i]))  # fmt: skip
 
 
@@ -71,7 +72,7 @@ def span_stamps_match(run: Run) -> Iterator[Found]:
             off = np.abs(t - stamps[frames]) > STAMP_TOLERANCE_S
             if off.any():
                 i = int(np.argmax(off))
-                yield Found(run.at(stream, name), f"{stream[:-1]} {i + 1} has another stamp than its frame",
+                yield Found(run.at(stream, name), f"{_ONE[stream]} {i + 1} has another stamp than its frame",
                             f"{number(stamps[frames[i]])} s", f"{number(t[i])} s")  # fmt: skip
 
 
@@ -90,10 +91,11 @@ def segments_in_their_interval(run: Run) -> Iterator[Found]:
         return
     for i, number_ in enumerate(interval.tolist()):
         if not 1 <= number_ <= len(begin):
-            yield Found(run.at("segments", "interval"), f"segment {i + 1} names an interval that is not there",
+            yield Found(run.at("segments", "interval"), f"segment {i + 1} names a target interval that is not there",
                         f"1 .. {len(begin)}", str(number_))  # fmt: skip
         elif first[i] < begin[number_ - 1] or last[i] > end[number_ - 1]:
-            yield Found(run.at("segments", "interval"), f"segment {i + 1} does not lie within its interval {number_}",
+            yield Found(run.at("segments", "interval"),
+                        f"segment {i + 1} does not lie within its target interval {number_}",
                         f"frames {begin[number_ - 1]} .. {end[number_ - 1]}", f"{first[i]} .. {last[i]}")  # fmt: skip
 
 

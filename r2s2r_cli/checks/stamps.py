@@ -30,8 +30,8 @@ def time_increases(run: Run) -> Iterator[Found]:
         location, t = run.stamps
         gap = np.diff(t)
         if (gap <= 0).any():
-            yield Found(location, "the stamps of the kept frames do not increase", "each later than the one before",
-                        _first(t, gap <= 0, "kept frame"))  # fmt: skip
+            yield Found(location, f"the stamps of the {run.frame}s do not increase", "each later than the one before",
+                        _first(t, gap <= 0, run.frame))  # fmt: skip
 
 
 @check(

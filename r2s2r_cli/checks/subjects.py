@@ -130,6 +130,11 @@ class Run:
         """The path of a stream or dataset, as messages name it."""
         return "/".join(part for part in ("runs", self.name, stream, name) if part)
 
+    @property
+    def frame(self) -> str:
+        """What the index of a frame counts."""
+        return "kept frame" if self.kind == "recording" else "frame"
+
     @cached_property
     def sizes(self) -> dict[str, int]:
         """Length of the axes that the robot fixes: cap, rod, cable, actuated, as far as the run has them."""

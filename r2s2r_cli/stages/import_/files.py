@@ -179,7 +179,8 @@ def _sibling(path: Path) -> str:
 
 def _unreadable(path: Path, what: str, error: Exception) -> InputError:
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    return InputError(f"{what} cannot be read", where=str(path), received=reason, hint=f"ls -ld {quoted(path)}")
+    name = str(path) if str(path).isprintable() else shown(str(path))
+    return InputError(f"{what} cannot be read", where=name, received=reason, hint=f"ls -ld {quoted(name)}")
 
 
 def quoted(path: object) -> str:

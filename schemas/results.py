@@ -36,7 +36,7 @@ class StageResult(Frozen):
     drawings: tuple[str, ...] = ()
     """Pictures and reports written beside the artifact, relative to the project."""
     report: dict[str, Any] | None = None
-    """Set where the stage ran; its own model is in `schemas/json/result_<stage>.json`."""
+    """Set where the stage ran; its own model is one of `schemas/json/result_*_report.json`."""
 
 
 class InitResult(Frozen):
@@ -133,7 +133,9 @@ class MigrateResult(Frozen):
 
     schema_: Literal["r2s2r.migrate/1"] = Field(default="r2s2r.migrate/1", alias="schema")
     files: dict[str, str]
-    """What was done with each file, in words."""
+    """What was done with each file, in words; with --dry-run, what would be."""
+    failed: dict[str, str] = Field(default_factory=dict)
+    """Files that stayed as they were, and why."""
 
 
 class RecoverResult(Frozen):
@@ -142,6 +144,8 @@ class RecoverResult(Frozen):
     schema_: Literal["r2s2r.recover/1"] = Field(default="r2s2r.recover/1", alias="schema")
     files: dict[str, str]
     """What was done with each file, in words."""
+    failed: dict[str, str] = Field(default_factory=dict)
+    """Files that could not be restored, and why. What could be read of them was rescued."""
     rows: dict[str, int]
     """Rows rescued, by stream."""
     removed: tuple[str, ...]

@@ -49,7 +49,7 @@ def recover(
             except R2S2RError as error:
                 failed[str(path)] = error
             advance(1)
-    whats = {name: error.what for name, error in failed.items()}
+    whats = {name: f"{error.what} ({error.where})" for name, error in failed.items()}
     console.document(
         RecoverResult(files=done, failed=whats, rows=dict(rows), removed=tuple(str(path) for path in removed))
     )

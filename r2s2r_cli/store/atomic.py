@@ -24,7 +24,7 @@ def replacing(target: Path) -> Iterator[Path]:
 
     The caller writes and closes the temp file. Raises ArtifactError (disk full, no permission).
     """
-    temp = _temp(target)
+    temp = temp_beside(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         yield temp
@@ -42,7 +42,7 @@ def replacing(target: Path) -> Iterator[Path]:
 @contextlib.contextmanager
 def creating(target: Path) -> Iterator[Path]:
     """As `replacing`, for a file that must be new: FileExistsError where `target` exists, whoever was first."""
-    temp = _temp(target)
+    temp = temp_beside(target)
     try:
         yield temp
         _fsync(temp)
@@ -79,7 +79,8 @@ def keep_beside(path: Path, suffix: str) -> Path:
                         received="1000", hint=f"ls -la '{path.parent}'")  # fmt: skip
 
 
-def _temp(target: Path) -> Path:
+def temp_beside(target: Path) -> Path:
+    """A name for an unfinished file, which `sweep` recognises."""
     return target.with_name(f".{target.name}.{os.getpid()}-{secrets.token_hex(4)}{PARTIAL}")
 
 

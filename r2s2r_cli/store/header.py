@@ -87,14 +87,17 @@ def read_header(path: Path) -> Header:
         raise _damaged(path, error.errors()[0]["msg"]) from error
 
 
-def body_sha256(path: Path, offset: int) -> tuple[str, int]:
-    """Digest and length of the bytes of `path` from `offset` on."""
+def body_sha256(path: Path, offset: int, limit: int | None = None) -> tuple[str, int]:
+    """Digest and length of the bytes of `path` from `offset` on, of at most `limit` bytes. Raises ArtifactError."""
     digest, length = hashlib.sha256(), 0
-    with path.open("rb") as file:
-        file.seek(offset)
-        while block := file.read(_READ):
-            digest.update(block)
-            length += len(block)
+    try:
+        with path.open("rb") as file:
+            file.seek(offset)
+            while part := file.read(_READ if limit is None else min(_READ, limit - length)):
+                digest.update(part)
+                length += len(part)
+    except OSError as error:
+        raise unreadable(path, error) from error
     return digest.hexdigest(), length
 
 

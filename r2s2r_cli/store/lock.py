@@ -11,6 +11,7 @@ from pathlib import Path
 
 from r2s2r_cli.errors import ArtifactError, UsageError
 from r2s2r_cli.store.atomic import disk_error
+from r2s2r_cli.store.project import root_of
 
 STATE_DIR = ".r2s2r"
 
@@ -52,6 +53,14 @@ def writing(root: Path, command: str) -> Iterator[None]:
         with contextlib.suppress(OSError):
             holder.unlink(missing_ok=True)
         lock.release()
+
+
+@contextlib.contextmanager
+def writing_at(path: Path, command: str) -> Iterator[None]:
+    """Hold the write lock of the project that `path` lies in; outside of any project there is nothing to lock."""
+    root = root_of(path)
+    with writing(root, command) if root else contextlib.nullcontext():
+        yield
 
 
 def _describe(holder: Path) -> str:

@@ -130,9 +130,20 @@ class Project:
             raise UsageError(error.what, where=error.where, expected=error.expected, received=error.received,
                              hint=error.hint) from error  # fmt: skip
 
+    def artifacts(self) -> list[Path]:
+        """Every artifact that is there, in the order of the data: of the project, then of each iteration."""
+        places = [(self.root, "project"), *((iteration.path, "iteration") for iteration in self.iterations())]
+        candidates = [folder / s.filename for folder, level in places for s in KINDS.values() if s.level == level]
+        return [path for path in candidates if path.is_file()]
+
     def journals(self) -> list[Path]:
         """Recordings that were not sealed."""
         return sorted((self.root / ITERATIONS).glob(f"*/*{JOURNAL_SUFFIX}"))
+
+
+def root_of(path: Path) -> Path | None:
+    """The nearest folder above `path` with a project.toml, readable or not; None where there is none."""
+    return next((folder for folder in path.absolute().parents if (folder / PROJECT_FILE).is_file()), None)
 
 
 def journal_of(artifact: Path) -> Path:

@@ -15,7 +15,7 @@ from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Value
 from r2s2r_cli.errors import ArtifactError
 from r2s2r_cli.store.hashing import PROVENANCE, attributes, walk
 from r2s2r_cli.store.hdf5_errors import translate
-from r2s2r_cli.store.header import body_sha256, read_header, unreadable
+from r2s2r_cli.store.header import body_sha256, read_header
 from r2s2r_cli.store.isolated import IsolatedReader
 from r2s2r_cli.store.layout import BLOB_BYTES, BLOB_OFFSET
 from schemas.header import Header
@@ -93,10 +93,7 @@ def check_body(path: Path, header: Header) -> None:
 
     Raises ArtifactError with the damaged dataset; warns DamageWarning where only unread bytes changed.
     """
-    try:
-        digest, length = body_sha256(path, header.body_offset)
-    except OSError as error:
-        raise unreadable(path, error) from error
+    digest, length = body_sha256(path, header.body_offset)
     if digest == header.body_sha256:
         return
     if length < header.body_bytes:

@@ -54,9 +54,9 @@ def save(path: str, dataset: str, target: str) -> Report:
     """Write one dataset to `target` as a `.npy` file. `digest`: of what was read; `problem`: why it could not be."""
     try:
         with h5py.File(path, "r", locking=False) as file:
-            node = file.get(dataset)
+            node = file[dataset]
             if not isinstance(node, h5py.Dataset):
-                return {"digest": "", "problem": "the dataset is gone"}
+                return {"digest": "", "problem": "a group stands in its place"}
             check_dataset(node)
             digest = dataset_digest(node)
             with Path(target).open("wb") as out:

@@ -30,10 +30,13 @@ _BLOB_BUFFER = 1 << 20
 _ZEROS = "0" * 64
 
 
-def write_artifact(path: Path, data: ArtifactData, provenance: Provenance, *, title: str = "") -> Header:
+def write_artifact(
+    path: Path, data: ArtifactData, provenance: Provenance, *, title: str = "", content_sha256: str = ""
+) -> Header:
     """Write `data` to `path` and return its header.
 
     Temp file in the same directory, flush, close, reopen and verify, fsync, replace, fsync of the directory.
+    `content_sha256`: the content must have this hash, or nothing is written.
     Raises ArtifactError (disk full, no permission) and leaves what was there; ValueError where `data` departs
     from the schema, which is a bug of the caller.
     """
@@ -49,6 +52,8 @@ def write_artifact(path: Path, data: ArtifactData, provenance: Provenance, *, ti
         _write_body(temp, data, spec, draft)
         header = _seal(temp, spec, draft)
         write_block(temp, header)
+        if content_sha256 not in ("", header.content_sha256):
+            raise ValueError(f"the content of {path.name} is not the one that was promised")
         if read_header(temp).model_dump_json() != header.model_dump_json():
             raise ValueError(f"the header of {path.name} does not read back as it was written")
     return header

@@ -94,7 +94,8 @@ def _headless(path: Path, error: ArtifactError, reader: IsolatedReader) -> Exami
         error.received = f"{error.received}; the data behind it are intact"
         error.hint = f"r2s2r recover '{path}'"
         return Examined(refused=error)
-    return Examined(refused=error, damage=tuple(p for p in report["problems"] if p.where != HEAD))
+    unknown = Mismatch("", "the data changed too; which dataset, only the head could tell", "the sealed data", "others")
+    return Examined(refused=error, damage=tuple(p for p in report["problems"] if p.where != HEAD) or (unknown,))
 
 
 def _ask(path: Path, reader: IsolatedReader) -> dict[str, Any]:

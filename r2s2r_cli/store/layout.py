@@ -110,11 +110,13 @@ def _check_groups(
             continue
         yield from _check_attributes(path, node, group)
         for dataset in group.datasets:
-            for name, expected in on_disk(dataset):
+            parts = on_disk(dataset)
+            required = dataset.required or any(f"{path}/{name}" in datasets for name, _ in parts)  # never half of it
+            for name, expected in parts:
                 full = f"{path}/{name}"
                 if full in datasets:
                     yield from _check_dataset(full, datasets[full], expected, scope(path, group), sizes)
-                elif dataset.required:
+                elif required:
                     yield Mismatch(
                         full, "a required dataset is missing", f"{expected.dtype} {expected.dims}", "nothing"
                     )

@@ -61,15 +61,36 @@ def check_model(values: dict[str, Any], model: type[Model], where: str) -> Model
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise first_problem(error, model, where) from error
+        raise _problems(error, model, where)[0] from error
 
 
-def first_problem(error: ValidationError, model: type[BaseModel], where: str) -> InputError:
-    """The first problem that pydantic found, in our form."""
-    problem = error.errors()[0]
+def model_problems(values: dict[str, Any], model: type[BaseModel], where: str) -> list[InputError]:
+    """Everything that is wrong with parsed values, one error each; empty where nothing is."""
+    try:
+        model.model_validate(values)
+    except ValidationError as error:
+        return _problems(error, model, where)
+    return []
+
+
+def _problems(error: ValidationError, model: type[BaseModel], where: str) -> list[InputError]:
+    """What pydantic found, in our form. Unknown keys come first: a misspelt one is also missing under its right name,
+    which then goes without saying; and so does a list that is too short because its items are wrong."""
+    everything = error.errors()
+    places = [p["loc"] for p in everything]
+    found = [p for p in everything if p["type"] != "too_short" or not _is_above(p["loc"], places)]
+    unknown = [_unknown_key(p["loc"], model, where) for p in found if p["type"] == "extra_forbidden"]
+    meant = {(*p["loc"][:-1], name) for p in found if p["type"] == "extra_forbidden" for name in _near(p["loc"], model)}
+    rest = [p for p in found if p["type"] != "extra_forbidden" and not (p["type"] == "missing" and p["loc"] in meant)]
+    return unknown + [_wrong_value(p, where) for p in rest]
+
+
+def _is_above(loc: tuple[int | str, ...], others: list[tuple[int | str, ...]]) -> bool:
+    return any(len(other) > len(loc) and other[: len(loc)] == loc for other in others)
+
+
+def _wrong_value(problem: Any, where: str) -> InputError:
     key = ".".join(str(part) for part in problem["loc"])
-    if problem["type"] == "extra_forbidden":
-        return _unknown_key(problem["loc"], key, model, where)
     if problem["type"] == "missing":
         return InputError("a key is missing", where=where, expected=f"a value for {key}", received="nothing",
                           hint=f"add '{key.rpartition('.')[2]} = ...' to {where}")  # fmt: skip
@@ -83,12 +104,16 @@ def first_problem(error: ValidationError, model: type[BaseModel], where: str) ->
     )
 
 
-def _unknown_key(loc: tuple[int | str, ...], key: str, model: type[BaseModel], where: str) -> InputError:
-    known = _keys_at(model, loc[:-1])
-    near = difflib.get_close_matches(str(loc[-1]), known, n=1, cutoff=0.5)
+def _near(loc: tuple[int | str, ...], model: type[BaseModel]) -> list[str]:
+    """The known key that an unknown one was probably meant to be; empty where none is near."""
+    return difflib.get_close_matches(str(loc[-1]), _keys_at(model, loc[:-1]), n=1, cutoff=0.5)
+
+
+def _unknown_key(loc: tuple[int | str, ...], model: type[BaseModel], where: str) -> InputError:
+    known, near = _keys_at(model, loc[:-1]), _near(loc, model)
     hint = f"rename it to '{near[0]}' in {where}" if near else f"remove it from {where}; known keys: {', '.join(known)}"
-    return InputError(f"unknown key {key}", where=where, expected=near[0] if near else " | ".join(known),
-                      received=str(loc[-1]), hint=hint)  # fmt: skip
+    return InputError(f"unknown key {'.'.join(map(str, loc))}", where=where, received=str(loc[-1]), hint=hint,
+                      expected=near[0] if near else " | ".join(known))  # fmt: skip
 
 
 def _keys_at(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:

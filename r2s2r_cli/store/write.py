@@ -136,6 +136,8 @@ def _write_rows(node: h5py.Group, name: str, spec: DatasetSpec, rows: Rows, chec
         if block.ndim == 0:
             target[()] = block
             return
+        if start + len(block) > rows.shape[0]:
+            raise ValueError(f"{spec.path}: more rows came than the {rows.shape[0]} that were promised")
         target[start : start + len(block)] = block
         start += len(block)
     if rows.shape and start != rows.shape[0]:

@@ -161,7 +161,8 @@ def _specs(content: Content, group: str) -> tuple:
 
 
 def _names(group: Group) -> list[str]:
-    return [item.decode("utf-8", "replace") for item in group["name"].tolist()]
+    items = group["name"].tolist()
+    return [item.decode("utf-8", "replace") if isinstance(item, bytes) else str(item) for item in items]
 
 
 def _sets(lines: Group) -> Iterator[tuple[int, str]]:

@@ -17,8 +17,7 @@ from r2s2r_cli.checks.subjects import Reading
 )
 def file_opens(reading: Reading) -> Iterator[Found]:
     """Missing, unreadable, not an artifact, a damaged head, wrong TOML."""
-    error = reading.refused
-    if error is not None and not reading.newer:
+    for error in () if reading.newer else reading.refused:
         yield Found(error.where, error.what, error.expected, error.received, error.hint)
 
 
@@ -31,8 +30,7 @@ def file_opens(reading: Reading) -> Iterator[Found]:
 )
 def version_known(reading: Reading) -> Iterator[Found]:
     """An artifact of a newer r2s2r."""
-    error = reading.refused
-    if error is not None and reading.newer:
+    for error in reading.refused if reading.newer else ():
         yield Found(error.where, error.what, error.expected, error.received)
 
 

@@ -35,7 +35,7 @@ class Difference:
 class Reading:
     """What came of reading one file."""
 
-    refused: R2S2RError | None = None
+    refused: tuple[R2S2RError, ...] = ()
     """Why it cannot be read at all."""
     newer: bool = False
     """`refused` because of its kind or version, not because it is damaged."""

@@ -51,7 +51,7 @@ def validate(
     if files:
         if iteration is not None:
             raise UsageError("--iteration and files exclude each other", where="--iteration", expected="one of the two",
-                             received="both", hint="r2s2r validate --iteration N")  # fmt: skip
+                             received="both", hint=f"r2s2r validate --iteration {iteration}")  # fmt: skip
         found = _check(files, chosen, project, places, console)
         paths = list(files)
     else:

@@ -29,9 +29,10 @@ from r2s2r_cli.store.canonical import source_sha256
 from r2s2r_cli.store.examine import Examined, examine
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.isolated import IsolatedReader
+from r2s2r_cli.store.journal import unwatched
 from r2s2r_cli.store.layout import Mismatch
 from r2s2r_cli.store.project import CONFIG_FILE, ITERATIONS, JOURNAL_SUFFIX, PROJECT_FILE, Project
-from r2s2r_cli.store.toml import check_model, read_toml
+from r2s2r_cli.store.toml import model_problems, read_toml
 from schemas.base import Frozen
 from schemas.config import ProjectFile, RunConfig
 from schemas.header import InputRef
@@ -76,7 +77,7 @@ class Gathered:
     @property
     def unreadable(self) -> bool:
         """Whether nothing but `reading` could be checked."""
-        return self.reading.refused is not None or bool(self.reading.damage)
+        return bool(self.reading.refused or self.reading.damage)
 
 
 @dataclass
@@ -123,8 +124,19 @@ def files_of(place: Place, iteration: int | None = None) -> list[Path]:
 
 
 def journals_of(place: Place) -> Journals:
-    """The recordings of a project that were not sealed."""
-    return Journals(tuple(shown(p) for p in sorted((place.root / ITERATIONS).glob(f"*/*{JOURNAL_SUFFIX}"))))
+    """The recordings of a project that were cut off; one that is running is none of them."""
+    journals = sorted((place.root / ITERATIONS).glob(f"*/*{JOURNAL_SUFFIX}"))
+    return Journals(tuple(shown(path) for path in journals if not _running(path)))
+
+
+def _running(journal: Path) -> bool:
+    try:
+        with unwatched(journal):
+            return False
+    except UsageError:
+        return True
+    except ArtifactError:
+        return False
 
 
 def _artifacts(folder: Path) -> list[Path]:
@@ -151,7 +163,7 @@ def gather(path: Path, place: Place | None, reader: IsolatedReader) -> Gathered:
             return _gather_toml(path, place)
         _refuse_others(path)
     except R2S2RError as error:
-        return Gathered(Reading(refused=error))
+        return Gathered(Reading(refused=(error,)))
     return _gather_artifact(path, examine(path, reader), place)
 
 
@@ -194,7 +206,8 @@ def _refuse_others(path: Path) -> None:
 
 
 def _gather_artifact(path: Path, found: Examined, place: Place | None) -> Gathered:
-    reading = Reading(found.refused, found.newer, _differences(found.damage), found.unread_bytes)
+    refused = () if found.refused is None else (found.refused,)
+    reading = Reading(refused, found.newer, _differences(found.damage), found.unread_bytes)
     if found.header is None or found.data is None:
         return Gathered(reading)
     robot = place.robot if place is not None else None
@@ -245,7 +258,11 @@ def _gather_toml(path: Path, place: Place | None) -> Gathered:
     if path.exists() and not path.is_file():
         raise InputError("this is no regular file", where=str(path), expected="a TOML file", hint=f"ls -la '{path}'")
     values = read_toml(path)
-    model = check_model(values, _model_of(path, values, place), str(path))
+    kind = _model_of(path, values, place)
+    problems = model_problems(values, kind, str(path))
+    if problems:
+        return Gathered(Reading(refused=tuple(problems)))
+    model = kind.model_validate(values)
     if isinstance(model, Robot):
         return Gathered(Reading(), subjects=(model,))
     if isinstance(model, PolicyFile):

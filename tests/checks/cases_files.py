@@ -31,12 +31,12 @@ def _made(**changes: object) -> Links:
 FAILS: tuple[Case, ...] = (
     Case(
         "file_opens",
-        lambda: Reading(refused=MISSING),
+        lambda: Reading(refused=(MISSING,)),
         (("a.h5", "there is no such file", "an artifact", ""),),
     ),
     Case(
         "version_known",
-        lambda: Reading(refused=NEWER, newer=True),
+        lambda: Reading(refused=(NEWER,), newer=True),
         (("a.h5", "this version cannot be read", "version 1", "7"),),
     ),
     Case(

@@ -53,33 +53,54 @@ class ForeignContent(ValueError):
     """Something that no artifact holds (a link, an object dtype, an array as attribute), in words."""
 
 
-def walk(file: h5py.File, *, strict: bool = True) -> Iterator[tuple[str, Any]]:
+Broken = list[tuple[str, Exception]]
+"""Path of a node that the library could not open, and what it said."""
+
+
+def walk(file: h5py.File, *, strict: bool = True, broken: Broken | None = None) -> Iterator[tuple[str, Any]]:
     """Every group and dataset below the root, by path.
 
     Raises ForeignContent for a link and for a node met twice. With `strict=False` these are yielded as text.
+    Nodes that cannot be opened go into `broken` where it is given, else the library's exception is raised.
     """
     stack: list[tuple[str, h5py.Group]] = [("", file)]
-    met = {_address(file)}
+    met: set[int | None] = {_address(file)}
     while stack:
         prefix, group = stack.pop()
-        for name in group:
+        try:
+            names = list(group)
+        except Exception as error:
+            _keep(broken, prefix or "/", error)
+            continue
+        for name in names:
             path = f"{prefix}/{name}" if prefix else name
-            link = group.get(name, getlink=True)
-            if not isinstance(link, h5py.HardLink):
+            try:
+                link = group.get(name, getlink=True)
+                node = group[name] if isinstance(link, h5py.HardLink) else None
+                address = None if node is None else _address(node)
+            except Exception as error:
+                _keep(broken, path, error)
+                continue
+            if node is None:
                 if strict:
                     raise ForeignContent(f"{path} is a link, artifacts have none")
                 yield path, f"link to {getattr(link, 'path', '?')}"
                 continue
-            node = group[name]
-            if _address(node) in met:  # a ring of hard links would never end
+            if address in met:  # a ring of hard links would never end
                 if strict:
                     raise ForeignContent(f"{path} is a second name of another node, artifacts have none")
                 yield path, f"another name of {node.name}"
                 continue
-            met.add(_address(node))
+            met.add(address)
             yield path, node
             if isinstance(node, h5py.Group):
                 stack.append((path, node))
+
+
+def _keep(broken: Broken | None, path: str, error: Exception) -> None:
+    if broken is None:
+        raise error
+    broken.append((path, error))
 
 
 def attributes(node: h5py.Group | h5py.Dataset) -> dict[str, str | int | float | bool]:

@@ -8,7 +8,7 @@ from typing import Any
 import h5py
 
 from r2s2r_cli.errors import ArtifactError
-from r2s2r_cli.store.hashing import attributes, blocks, check_dataset, digest_file, plain, walk
+from r2s2r_cli.store.hashing import Broken, attributes, blocks, check_dataset, digest_file, plain, walk
 from r2s2r_cli.store.hdf5_errors import meaning
 from r2s2r_cli.store.header import HDF5_SIGNATURE, MAX_BLOCK, MIN_BLOCK, read_header
 from r2s2r_cli.store.layout import check_layout
@@ -97,14 +97,15 @@ def _verify_open(file: h5py.File, header: Header | None, problems: list[dict[str
 
 def _unreadable_nodes(file: h5py.File) -> list[dict[str, str]]:
     problems: list[dict[str, str]] = []
+    broken: Broken = []
     try:
-        for path, node in walk(file):
+        for path, node in walk(file, broken=broken):
             problem = _read_through(path, node)
             if problem is not None:
                 problems.append(problem)
     except Exception as error:
         problems.append(_problem("/", meaning(error), "a readable tree", _short(error)))
-    return problems
+    return problems + [_problem(path, meaning(error), "a readable node", _short(error)) for path, error in broken]
 
 
 def _read_through(path: str, node: h5py.Dataset | h5py.Group) -> dict[str, str] | None:
@@ -146,4 +147,5 @@ def _problem(where: str, what: str, expected: str, received: str) -> dict[str, s
 
 
 def _short(error: BaseException) -> str:
-    return (" ".join(str(error).split()) or type(error).__name__)[:200]
+    text = " ".join(str(error).split()).strip("'\"")  # a KeyError puts quotes around its message
+    return (text or type(error).__name__)[:200]

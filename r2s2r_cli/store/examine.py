@@ -60,11 +60,21 @@ def examine(path: Path, reader: IsolatedReader) -> Examined:
         return Examined(header, refused=error, newer=True)
     try:
         digest, length = body_sha256(path, header.body_offset)
+        padded = _is_padded(path, header)
     except OSError as error:
         return Examined(header, refused=unreadable(path, error))
     if digest == header.body_sha256:
-        return _read(path, header)
+        return _read(path, header, unread_bytes=not padded)
     return _examine_changed(path, header, length, reader)
+
+
+def _is_padded(path: Path, header: Header) -> bool:
+    """Whether the head is followed by spaces only, as it was written: these bytes are in no digest."""
+    with path.open("rb") as file:
+        head = file.read(header.body_offset)
+    line, _, rest = head.partition(b"\n")
+    padding = rest[int(line.split()[-1]) :]
+    return padding == b"\n".rjust(len(padding))
 
 
 def _examine_changed(path: Path, header: Header, length: int, reader: IsolatedReader) -> Examined:

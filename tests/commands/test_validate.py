@@ -86,10 +86,15 @@ def test_a_damaged_dataset_is_named(estimated: Path) -> None:
     assert "sensors_are_calibrated" in checks(document, "advice")
 
 
-def test_bytes_that_nothing_reads_are_a_warning(estimated: Path) -> None:
-    """Bytes after the end of the HDF5 data change no value: the hash proves it, a warning says it, the code is 0."""
-    with RECORDING.open("ab") as file:
-        file.write(b"junk")
+@pytest.mark.parametrize("place", ["behind the data", "behind the head"])
+def test_bytes_that_nothing_reads_are_a_warning(estimated: Path, place: str) -> None:
+    """Bytes that hold no value changed: the hash proves it, a warning says it, the code is 0."""
+    content = bytearray(RECORDING.read_bytes())
+    if place == "behind the data":
+        content += b"junk"
+    else:
+        content[read_header(RECORDING).body_offset - 2] = ord("x")
+    RECORDING.write_bytes(content)
     code, document = outcome(str(RECORDING))
     assert (code, checks(document), checks(document, "warning")) == (0, [], ["bytes_intact"])
 

@@ -6,8 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from schemas.base import ArtifactSpec, AttributeSpec, Frozen, GroupSpec
-from schemas.base import column
+from schemas.base import ArtifactSpec, AttributeSpec, Frozen, GroupSpec, column
 
 Position = Annotated[float, Field(ge=0, le=1)]
 

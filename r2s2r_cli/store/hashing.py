@@ -73,7 +73,13 @@ def walk(file: h5py.File, *, strict: bool = True, broken: Broken | None = None) 
             _keep(broken, prefix or "/", error)
             continue
         for name in names:
-            path = f"{prefix}/{name}" if prefix else name
+            readable = name if isinstance(name, str) else bytes(name).decode("utf-8", "replace")
+            path = f"{prefix}/{readable}" if prefix else readable
+            if readable is not name:
+                if strict:
+                    raise ForeignContent(f"the name {path} is not UTF-8 text, artifacts have no such")
+                yield path, "a name that is not UTF-8 text"
+                continue
             try:
                 link = group.get(name, getlink=True)
                 node = group[name] if isinstance(link, h5py.HardLink) else None

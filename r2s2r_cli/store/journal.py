@@ -161,7 +161,7 @@ def read_head(path: Path) -> tuple[JournalHead, int]:
         with path.open("rb") as file:
             line = file.readline(200)
             length, crc = (int(part) for part in line[len(MAGIC) :].split())
-            body = file.read(length)
+            body = file.read(min(max(0, length), MAX_RECORD))
             offset = file.tell()
         if not line.startswith(MAGIC) or len(body) != length or zlib.crc32(body) != crc:
             raise ValueError("checksum")

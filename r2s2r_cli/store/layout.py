@@ -162,7 +162,7 @@ def _check_dataset(path: str, node: h5py.Dataset, spec: DatasetSpec, scope: str,
     found = attributes(node)
     for name, expected in (("unit", spec.unit), ("dims", ",".join(spec.dims)), ("frame", spec.frame)):
         if found.get(name) != expected:
-            text = str(found.get(name, "nothing"))
+            text = str(found.get(name, "nothing")) or "an empty text"
             yield Mismatch(f"{path}@{name}", f"a dataset has the wrong {name}", expected or "none", text)
 
 

@@ -121,15 +121,15 @@ def _read_through(path: str, node: h5py.Dataset | h5py.Group) -> dict[str, str] 
 
 
 def _changed(expected: dict[str, str], received: dict[str, str]) -> list[dict[str, str]]:
-    problems = []
+    gone, changed, added = [], [], []
     for path in sorted({**expected, **received}):
         if path not in received:
-            problems.append(_problem(path, "a dataset is gone", "the dataset that was sealed", "nothing"))
+            gone.append(_problem(path, "a dataset is gone", "the dataset that was sealed", "nothing"))
         elif path not in expected:
-            problems.append(_problem(path, "a dataset was added after sealing", "nothing", "a dataset"))
+            added.append(_problem(path, "a dataset was added after sealing", "nothing", "a dataset"))
         elif expected[path] != received[path]:
-            problems.append(_problem(path, "the data changed after sealing", expected[path][:16], received[path][:16]))
-    return problems
+            changed.append(_problem(path, "the data changed after sealing", expected[path][:16], received[path][:16]))
+    return [*gone, *changed, *added]
 
 
 def _safe_attributes(node: h5py.Group | h5py.Dataset) -> dict[str, str]:

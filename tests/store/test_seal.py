@@ -1,0 +1,170 @@
+"""From journal to artifact: every row, once, and never over something else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.store import seal as module
+from r2s2r_cli.store.journal import Journal
+from r2s2r_cli.store.read import read_artifact
+from r2s2r_cli.store.seal import seal
+from r2s2r_cli.store.write import write_artifact
+from schemas.versions import KINDS, MIGRATIONS
+from tests.support.builders import materialised, provenance, recording
+from tests.support.recorder import RUN, append, counts, head, image, write
+
+
+def paths(folder: Path) -> tuple[Path, Path]:
+    """Journal and artifact."""
+    return folder / "10-record.h5.journal", folder / "10-record.h5"
+
+
+def content(target: Path) -> dict[str, dict[str, Any]]:
+    """All values of the sealed recording."""
+    return materialised(read_artifact(target, "recording", blobs=True)[1])
+
+
+def check_rows(target: Path, rows: int) -> None:
+    """The recording holds exactly the rows that `write(rows)` appended."""
+    found = content(target)
+    sensors, camera = found[f"{RUN}/sensors"], found[f"{RUN}/camera"]
+    numbers = np.arange(rows, dtype=float)
+    assert np.array_equal(sensors["capacitance"], np.stack([numbers, -numbers], axis=1))
+    assert camera["color"] == [image(i) for i in range(0, rows, 3)]
+    assert camera["depth"] == [image(i + 1) for i in range(0, rows, 5)]
+    assert len(camera["t"]) == len(camera["color"]) and len(camera["t_depth"]) == len(camera["depth"])
+
+
+def test_all_rows_of_all_streams_are_sealed(tmp_path: Path) -> None:
+    """Two streams of one group at different rates and one of another group; then the journal is gone."""
+    journal, target = paths(tmp_path)
+    write(journal, 700)  # more than one block of rows
+    result = seal(journal, target)
+    check_rows(target, 700)
+    assert result.rows == counts(700) and (result.torn_bytes, result.lost_bytes) == (0, 0)
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_provenance_is_the_recorder_s(tmp_path: Path) -> None:
+    """The artifact says how it was recorded, not how it was sealed."""
+    journal, target = paths(tmp_path)
+    write(journal, 1, seed=7)
+    result = seal(journal, target)
+    assert result.header is not None and result.header.provenance == provenance(stage="record", seed=7)
+
+
+def test_recovered_runs_are_marked(tmp_path: Path) -> None:
+    """After a crash the run says so, otherwise it says nothing."""
+    for name, recovered in (("a", True), ("b", False)):
+        journal, target = paths(tmp_path / name)
+        write(journal, 1)
+        seal(journal, target, recovered=recovered)
+        assert content(target)[RUN]["attributes"].get("recovered", False) is recovered
+
+
+def test_a_stream_without_rows_has_no_group(tmp_path: Path) -> None:
+    """A camera that never sent a frame leaves no empty group behind."""
+    journal, target = paths(tmp_path)
+    with Journal(journal, head()) as open_journal:
+        append(open_journal, 1)
+    seal(journal, target)
+    assert set(content(target)) == {RUN, f"{RUN}/sensors"}
+
+
+def test_a_torn_last_row_is_left_out(tmp_path: Path) -> None:
+    """The rows before it are sealed and the loss is counted."""
+    journal, target = paths(tmp_path)
+    write(journal, 5)
+    journal.write_bytes(journal.read_bytes()[:-3])
+    result = seal(journal, target)
+    assert result.torn_bytes > 0 and result.rows == {**counts(5), f"{RUN}/sensors": 4}
+
+
+def test_a_damaged_stretch_keeps_the_journal(tmp_path: Path) -> None:
+    """Rows around the damage are sealed, and the bytes stay, under names that overwrite nothing."""
+    for number in (1, 2):
+        journal, target = paths(tmp_path)
+        write(journal, 9)
+        damaged = bytearray(journal.read_bytes())
+        damaged[-400] ^= 1
+        journal.write_bytes(damaged)
+        result = seal(journal, target)
+        assert result.lost_bytes > 0 and sum(result.rows.values()) == sum(counts(9).values()) - 1
+        target.unlink()
+        kept = sorted(tmp_path.glob("*-damaged*"))
+        assert len(kept) == number and kept[-1].read_bytes() == bytes(damaged)
+
+
+@pytest.mark.parametrize("torn", [0, 5])
+def test_a_journal_without_a_row_leaves_no_artifact(tmp_path: Path, torn: int) -> None:
+    """Nothing was recorded: the journal goes; the bytes of a torn first row are kept."""
+    journal, target = paths(tmp_path)
+    write(journal, 0)
+    with journal.open("ab") as file:
+        file.write(b"R2SJ?"[:torn])
+    result = seal(journal, target)
+    assert result.header is None and not target.exists() and not journal.exists()
+    assert len(list(tmp_path.iterdir())) == (1 if torn else 0)
+
+
+def test_another_artifact_of_that_name_is_never_replaced(tmp_path: Path) -> None:
+    """The journal stays, and so does what is in its way."""
+    journal, target = paths(tmp_path)
+    write_artifact(target, recording(), provenance())
+    before = target.read_bytes()
+    write(journal, 3)
+    with pytest.raises(ArtifactError, match="exists already"):
+        seal(journal, target)
+    assert target.read_bytes() == before and journal.exists()
+
+
+def test_a_kill_between_sealing_and_tidying_up_is_finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Artifact and journal both there, from the same recording: the second attempt removes the journal only."""
+    journal, target = paths(tmp_path)
+    write(journal, 6)
+    monkeypatch.setattr(module, "_remove", _killed)
+    with pytest.raises(KeyboardInterrupt):
+        seal(journal, target)
+    monkeypatch.undo()
+    before = target.read_bytes()
+    assert seal(journal, target).rows == counts(6)
+    assert target.read_bytes() == before and not journal.exists()
+
+
+def test_the_same_provenance_with_other_rows_is_another_recording(tmp_path: Path) -> None:
+    """Rows that the artifact does not have keep their journal."""
+    journal, target = paths(tmp_path)
+    write(journal, 6)
+    seal(journal, target)
+    write(journal, 7)
+    with pytest.raises(ArtifactError, match="exists already"):
+        seal(journal, target)
+    assert journal.exists()
+
+
+def test_a_journal_of_an_older_version_is_migrated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """r2s2r was upgraded between crash and recovery: the rows go through the same steps as artifacts do."""
+    journal, target = paths(tmp_path)
+    write(journal, 4)
+    spec = KINDS["recording"].model_copy(update={"version": KINDS["recording"].version + 1})
+    monkeypatch.setitem(KINDS, "recording", spec)
+
+    def step(groups: Any) -> Any:
+        walk = groups.pop(RUN)
+        return {**groups, RUN: type(walk)(walk.datasets, {**walk.attributes, "source": "migrated"})}
+
+    with pytest.raises(ArtifactError, match="another version"):
+        seal(journal, target)
+    monkeypatch.setitem(MIGRATIONS, ("recording", spec.version - 1), step)
+    result = seal(journal, target)
+    assert result.header is not None and result.header.schema_version == spec.version
+    assert content(target)[RUN]["attributes"]["source"] == "migrated"
+
+
+def _killed(*_: object, **__: object) -> None:
+    raise KeyboardInterrupt

@@ -80,10 +80,11 @@ def import_(
         print_config(wanted(here, place, "import", overrides, {}).settings, console)
         return
     settings = here.config(place, overrides).imports
+    flags = {"format": format_, "depth_scale": depth_scale}
     run = StageRun(
         stage="import", kind="recording", project=here, iteration=place, console=console,
-        inputs=_refs(here, sources, format_), overrides=overrides, flags={"format": format_, "depth_scale": depth_scale},
-        dry_run=dry_run, force=force, guard=_guard(here, place, sources),
+        inputs=_refs(here, sources, format_), overrides=overrides, flags=flags, dry_run=dry_run, force=force,
+        guard=_guard(here, place, sources),
     )  # fmt: skip
     outcome: list[ImportReports] = []
 

@@ -62,8 +62,9 @@ class Check:
 
     def _finding(self, found: Found, file: str) -> Finding:
         hint = (found.hint or self.fix).replace("{file}", file).replace("{location}", found.location)
+        location = found.location.removeprefix(file).lstrip(":, ")  # errors of the store name the file in their `where`
         return Finding(
-            check=self.name, importance=self.importance, file=file, location=found.location, what=found.what,
+            check=self.name, importance=self.importance, file=file, location=location, what=found.what,
             expected=found.expected, received=found.received, hint=hint,
         )  # fmt: skip
 

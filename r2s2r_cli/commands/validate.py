@@ -52,16 +52,16 @@ def validate(
         if iteration is not None:
             raise UsageError("--iteration and files exclude each other", where="--iteration", expected="one of the two",
                              received="both", hint=f"r2s2r validate --iteration {iteration}")  # fmt: skip
-        found = _check(files, chosen, project, places, console)
-        paths = list(files)
+        names = [shown(path) if path.is_absolute() else str(path) for path in dict.fromkeys(files)]
+        found = _check(names, chosen, project, places, console)
     else:
         place = _here(project, places)
-        paths = files_of(place, iteration)
-        found = _check(paths, chosen, place.root, places, console)
+        names = [shown(path) for path in files_of(place, iteration)]
+        found = _check(names, chosen, place.root, places, console)
         from r2s2r_cli.checks.base import run_checks
 
         found += run_checks(chosen, journals_of(place), shown(place.root))
-    result = _result([shown(path) for path in paths] if not files else [str(p) for p in paths], chosen, found)
+    result = _result(names, chosen, found)
     console.document(result)
     _show(result, console)
     _leave(result, console)
@@ -109,22 +109,21 @@ def _here(project: Path | None, places: Places) -> Place:
 
 
 def _check(
-    paths: Sequence[Path], chosen: Sequence[Check], project: Path | None, places: Places, console: Console
+    names: Sequence[str], chosen: Sequence[Check], project: Path | None, places: Places, console: Console
 ) -> list[Finding]:
-    from r2s2r_cli.commands.validation import findings_of, gather, shown
+    from r2s2r_cli.commands.validation import findings_of, gather
     from r2s2r_cli.store.isolated import IsolatedReader
 
     found: list[Finding] = []
     told: set[str] = set()
-    with IsolatedReader() as reader, console.progress("files", len(paths)) as advance:
-        for path in paths:
-            place = places.of(project or path)
+    with IsolatedReader() as reader, console.progress("files", len(names)) as advance:
+        for name in names:
+            place = places.of(project or Path(name))
             for remark in _remarks(place):
                 if remark not in told:
                     told.add(remark)
                     console.say(remark)
-            name = shown(path) if path.is_absolute() else str(path)
-            found += findings_of(gather(path, place, reader), name, chosen)
+            found += findings_of(gather(Path(name), place, reader), name, chosen)
             advance(1)
     return found
 
@@ -173,10 +172,8 @@ def _show_block(group: Sequence[Finding], console: Console) -> None:
 
 
 def _where(finding: Finding) -> str:
-    """`file:/runs/crawl/caps/p_WE`, `robot.toml, key rods.0`, or the file alone."""
-    if not finding.location or finding.location.startswith(finding.file):
-        return finding.location or finding.file
-    return f"{finding.file}: {finding.location}"
+    """`10-record.h5: runs/crawl/caps/p_WE`, `robot.toml: key rods.0`, or the file alone."""
+    return f"{finding.file}: {finding.location}" if finding.location else finding.file
 
 
 def _summary(result: ValidateResult) -> str:

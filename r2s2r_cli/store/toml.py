@@ -37,7 +37,8 @@ def read_text(path: Path) -> str:
                          received=repr(error.object[error.start : error.start + 1]),
                          hint=f"file '{path}'") from error  # fmt: skip
     except OSError as error:
-        raise InputError("the file cannot be read", where=str(path), received=error.strerror or str(error),
+        raise InputError("the file cannot be read", where=str(path), expected="a TOML file",
+                         received=error.strerror or str(error),
                          hint=f"ls -la '{path.parent}'") from error  # fmt: skip
 
 

@@ -147,7 +147,14 @@ def _policies(root: Path) -> list[Path]:
     """TOML files of the project directory that have steps: policies, whether right or wrong."""
     named = {PROJECT_FILE, ROBOT_FILE}
     candidates = [p for p in (*root.glob("*.toml"), *root.glob("policies/*.toml")) if p.name not in named]
-    return sorted(p for p in candidates if p.is_file() and b"steps" in p.read_bytes())
+    return sorted(p for p in candidates if p.is_file() and _has_steps(p))
+
+
+def _has_steps(path: Path) -> bool:
+    try:
+        return b"steps" in path.read_bytes()
+    except OSError:
+        return True  # reported as a file that cannot be read, rather than passed over
 
 
 def shown(path: Path) -> str:

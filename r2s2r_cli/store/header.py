@@ -12,6 +12,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from r2s2r_cli.errors import ArtifactError, InputError
+from r2s2r_cli.store.canonical import canonical_json
 from schemas.header import Header
 
 NAME = b"r2s2r-artifact "
@@ -142,7 +143,7 @@ def unreadable(path: Path, error: OSError) -> ArtifactError:
 
 
 def _encode(header: Header) -> bytes:
-    return header.model_dump_json().encode()
+    return canonical_json(header.model_dump(mode="json")).encode()
 
 
 def _parse(path: Path, line: bytes) -> tuple[str, int]:

@@ -15,7 +15,7 @@ from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Rows, Scalar, Value
 from r2s2r_cli.store.atomic import replacing
 from r2s2r_cli.store.hashing import PROVENANCE, digest_file
 from r2s2r_cli.store.hdf5_file import writable
-from r2s2r_cli.store.header import MAX_BLOCK, block_size, body_sha256, read_header, write_block
+from r2s2r_cli.store.header import MAX_BLOCK, block, block_size, body_sha256, read_header, write_block
 from r2s2r_cli.store.layout import BLOB_BYTES, BLOB_OFFSET, check_layout, on_disk
 from schemas.base import ArtifactSpec, DatasetSpec
 from schemas.header import Header, Provenance
@@ -54,7 +54,7 @@ def write_artifact(
         write_block(temp, header)
         if content_sha256 not in ("", header.content_sha256):
             raise ValueError(f"the content of {path.name} is not the one that was promised")
-        if read_header(temp).model_dump_json() != header.model_dump_json():
+        if block(read_header(temp)) != block(header):
             raise ValueError(f"the header of {path.name} does not read back as it was written")
     return header
 
@@ -127,19 +127,19 @@ def _write_rows(node: h5py.Group, name: str, spec: DatasetSpec, rows: Rows, chec
         raise ValueError(f"{spec.path}: dtype {rows.dtype}, the schema says {spec.dtype}")
     target = _create(node, name, rows.shape, rows.dtype, spec)
     start = 0
-    for block in rows.blocks:
-        if block.dtype != rows.dtype or block.shape[1:] != rows.shape[1:]:
+    for piece in rows.blocks:
+        if piece.dtype != rows.dtype or piece.shape[1:] != rows.shape[1:]:
             raise ValueError(
-                f"{spec.path}: a block of {block.dtype} {block.shape} in rows of {rows.dtype} {rows.shape}"
+                f"{spec.path}: a piece of {piece.dtype} {piece.shape} in rows of {rows.dtype} {rows.shape}"
             )
         check()
-        if block.ndim == 0:
-            target[()] = block
+        if piece.ndim == 0:
+            target[()] = piece
             return
-        if start + len(block) > rows.shape[0]:
+        if start + len(piece) > rows.shape[0]:
             raise ValueError(f"{spec.path}: more rows came than the {rows.shape[0]} that were promised")
-        target[start : start + len(block)] = block
-        start += len(block)
+        target[start : start + len(piece)] = piece
+        start += len(piece)
     if rows.shape and start != rows.shape[0]:
         raise ValueError(f"{spec.path}: {start} rows came, {rows.shape[0]} were promised")
 

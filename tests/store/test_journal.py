@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from r2s2r_cli.errors import ArtifactError, UsageError
+from r2s2r_cli.store import journal as module
 from r2s2r_cli.store.journal import (
     Field,
     Journal,
@@ -153,9 +154,9 @@ def test_a_row_of_another_form_is_refused_and_harms_nothing(tmp_path: Path, row:
 
 def test_a_row_too_large_to_be_read_again_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What `records` would take for damage cannot be appended; the largest row that can comes back."""
-    monkeypatch.setattr(module, "MAX_RECORD", 1000)
+    monkeypatch.setattr(module, "MAX_RECORD", 4000)
     path = tmp_path / "x.journal"
-    largest = bytes(1000 - 8 - 4)
+    largest = bytes(4000 - 8 - 4)
     with Journal(path, head()) as journal:
         with pytest.raises(ValueError, match="at most"):
             journal.append(COLOR, {"t": 0.0, "color": largest + b"x"})
@@ -184,9 +185,7 @@ def test_every_dtype_and_shape_is_kept(dtype: str, axes: int, draw: st.DataObjec
     bits = np.frombuffer(raw, np.uint8) % 2 if dtype == "bool" else np.frombuffer(raw, np.uint8)
     array = bits[: count * np.dtype(dtype).itemsize].view(dtype).reshape(shape)
     stream = Stream(RUN, (Field("x", dtype, shape), Field("b", "blobs")), {})
-    from r2s2r_cli.store.journal import _encode
-
-    back = decode(stream, _encode(stream, {"x": array, "b": b"tail"}))
+    back = decode(stream, module._encode(stream, {"x": array, "b": b"tail"}))
     assert isinstance(back["x"], np.ndarray) and back["x"].dtype == array.dtype and back["x"].shape == shape
     assert back["x"].tobytes() == array.tobytes() and back["b"] == b"tail"
 

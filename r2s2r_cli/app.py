@@ -14,7 +14,7 @@ from typer.core import TyperGroup
 from r2s2r_cli import __version__
 from r2s2r_cli.commands import COMMANDS, GROUPS
 from r2s2r_cli.console import print_error
-from r2s2r_cli.errors import ExitCode, R2S2RError, UsageError
+from r2s2r_cli.errors import ExitCode, GateError, R2S2RError, UsageError
 
 BUG_MESSAGE = "this is a bug in r2s2r, please report it with the lines above"
 
@@ -48,7 +48,8 @@ def run_guarded(call: Callable[[], object], as_json: bool) -> int:
         sys.stdout.flush()
         return result if isinstance(result, int) else ExitCode.DONE
     except R2S2RError as error:
-        print_error(error, as_json=as_json)
+        # A gate is judged on a result that was printed: stdout holds its document already.
+        print_error(error, as_json=as_json and not isinstance(error, GateError))
         return error.exit_code
     except typer.TyperException as error:
         print_error(_usage_error(error), as_json=as_json)

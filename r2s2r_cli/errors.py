@@ -63,9 +63,16 @@ class UsageError(R2S2RError):
 
 
 class GateError(R2S2RError):
-    """The command worked, and what it checked did not pass."""
+    """The command worked and printed its result, and what it checked did not pass.
+
+    `exit_code` is another where what was checked could not even be read.
+    """
 
     exit_code = ExitCode.GATE
+
+    def __init__(self, what: str, *, exit_code: ExitCode = ExitCode.GATE, **facts: str) -> None:
+        super().__init__(what, **facts)
+        self.exit_code = exit_code
 
 
 class InputError(R2S2RError):

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from r2s2r_cli.console import Console, print_error
-from r2s2r_cli.errors import ArtifactError, GateError, R2S2RError, UsageError
+from r2s2r_cli.console import Console
+from r2s2r_cli.errors import ArtifactError, ExitCode, GateError, UsageError
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from schemas.results import Finding, ValidateResult
 
@@ -64,7 +64,7 @@ def validate(
     result = _result(names, chosen, found)
     console.document(result)
     _show(result, console)
-    _leave(result, console)
+    _leave(result)
 
 
 def choose(select: str | None, ignore: str | None) -> list[Check]:
@@ -186,20 +186,16 @@ def _summary(result: ValidateResult) -> str:
     return f"{checked}: {', '.join(parts)}"
 
 
-def _leave(result: ValidateResult, console: Console) -> None:
-    """Raise what gives the exit code; with --json the document has been printed, so the error goes to stderr only."""
+def _leave(result: ValidateResult) -> None:
+    """Raise what gives the exit code: 4 where a file cannot be read, else 3 where a check found an error."""
     first = next((finding for finding in result.findings if finding.importance == "error"), None)
     if first is None:
         return
-    kind: type[R2S2RError] = GateError
     files = {finding.file for finding in result.findings if finding.importance == "error"}
     errors = "1 error" if result.errors == 1 else f"{result.errors} errors"
-    what = f"{errors} in {len(files)} of {len(result.files)} files"
+    code, what = ExitCode.GATE, f"{errors} in {len(files)} of {len(result.files)} files"
     if result.unreadable:
-        kind, what = ArtifactError, f"{len(result.unreadable)} of {len(result.files)} files cannot be read"
+        code, what = ExitCode.INPUT, f"{len(result.unreadable)} of {len(result.files)} files cannot be read"
         first = next(finding for finding in result.findings if finding.file == result.unreadable[0])
-    error = kind(what, where=_where(first), expected=first.expected, received=first.received, hint=first.hint)
-    if not console.json:
-        raise error
-    print_error(error, as_json=False)
-    raise typer.Exit(int(error.exit_code))
+    raise GateError(what, exit_code=code, where=_where(first), expected=first.expected, received=first.received,
+                    hint=first.hint)  # fmt: skip

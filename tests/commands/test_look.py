@@ -114,6 +114,28 @@ def test_inspect_names_what_differs(estimated: Path) -> None:
     assert "differs: runs/sample/frames/contact" in result.stdout
 
 
+SHORT_POLICY = """\
+schema_version = 1
+robot = "threebar"
+name = "short"
+[[steps]]
+target = [0, 1]
+"""
+
+
+@pytest.mark.parametrize(
+    "arguments", [("status", "--check"), ("inspect", ESTIMATE, "--same-as", RECORD), ("validate", "short.toml")]
+)
+def test_a_failed_gate_still_prints_one_document(estimated: Path, arguments: tuple[str, ...]) -> None:
+    """With --json a command whose gate is not met leaves with 3 and has printed its result, once."""
+    Path("short.toml").write_text(SHORT_POLICY)
+    text = Path("project.toml").read_text()
+    Path("project.toml").write_text(text.replace("contact_clearance_m = 0.003", "contact_clearance_m = 1.0"))
+    result = invoke(*arguments, "--json")
+    assert result.exit_code == 3, result.stderr
+    assert json.loads(result.stdout)["schema"] == f"r2s2r.{arguments[0]}/1"
+
+
 def test_inspect_reads_a_foreign_file(tmp_path: Path) -> None:
     """An HDF5 file of another program is shown as it is."""
     with h5py.File(tmp_path / "foreign.h5", "w") as file:

@@ -154,7 +154,8 @@ def _load(file: h5py.File, path: Path, *, blobs: bool) -> dict[str, Group]:
         datasets: dict[str, Value] = {}
         for child, leaf in node.items():
             if isinstance(leaf, h5py.Dataset):
-                datasets[child] = np.asarray(leaf[()])
+                array = np.asarray(leaf[()])
+                datasets[child] = array.view(array.dtype.str)  # without what h5py hangs on to dtypes of text
             elif blobs and set(leaf) == {BLOB_BYTES, BLOB_OFFSET}:
                 datasets[child] = Blobs(iter_blobs(path, name, child), len(leaf[BLOB_OFFSET]) - 1)
         found = attributes(node)

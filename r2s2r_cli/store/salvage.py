@@ -71,7 +71,7 @@ def save(path: str, dataset: str, target: str) -> Report:
 
 
 def _write_npy(out: Any, node: h5py.Dataset) -> None:
-    header = {"descr": np.lib.format.dtype_to_descr(node.dtype), "fortran_order": False, "shape": node.shape}
+    header = {"descr": node.dtype.str, "fortran_order": False, "shape": node.shape}
     np.lib.format.write_array_header_1_0(out, header)
     for block in blocks(node):
         out.write(np.ascontiguousarray(block).data)

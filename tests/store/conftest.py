@@ -11,6 +11,7 @@ import pytest
 from r2s2r_cli.store.isolated import IsolatedReader
 from schemas.versions import KINDS
 from tests.support.make_golden import golden_path
+from tests.support.nursery import Nursery
 
 Copy = Callable[[str], Path]
 
@@ -30,3 +31,11 @@ def reader() -> Iterator[IsolatedReader]:
     """One child process for all tests of a session."""
     with IsolatedReader() as shared:
         yield shared
+
+
+@pytest.fixture(scope="session")
+def nursery() -> Iterator[Nursery]:
+    """One process that forks all victims."""
+    process = Nursery()
+    yield process
+    process.close()

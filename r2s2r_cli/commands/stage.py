@@ -124,8 +124,8 @@ class StageRun:
             header = read_header(self.target)
         except R2S2RError as error:
             return None, [f"what is there is damaged: {error.what}"]
-        recorded = {(ref.path, ref.sha256) for ref in header.provenance.inputs}
-        asked = {(ref.path, ref.sha256) for ref in self.inputs}
+        recorded = {ref.path for ref in header.provenance.inputs}  # `reasons` compares their content
+        asked = {ref.path for ref in self.inputs}
         found = reasons(self.project, header, self.wanted)
         if header.provenance.stage != self.stage:
             found.insert(0, f"it was made by {header.provenance.stage}")

@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from r2s2r_cli.store.header import read_header
 from schemas.results import MigrateResult
+from schemas.versions import KINDS, MIGRATIONS
 from tests.commands.conftest import document, invoke
 from tests.support.versions import current, write_toy
 
@@ -73,3 +76,18 @@ def test_the_old_files_are_no_artifacts_of_the_project(estimated: Path) -> None:
     assert (paths[0].parent / "90-toy.h5.v1").exists()
     assert [a["artifact"] for a in document("status")["artifacts"]] == [a["artifact"] for a in before]
     assert not any("toy.h5.v" in name for name in json.loads(invoke("validate", "--json").stdout)["files"])
+
+
+def test_what_was_made_of_a_migrated_artifact_stays_fresh(estimated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A new version of the recording's form does not ask for the estimate to be computed again."""
+    record = estimated / "iterations" / "001" / "10-record.h5"
+    before = read_header(record).content_sha256
+    newer = KINDS["recording"].model_copy(update={"version": KINDS["recording"].version + 1})
+    monkeypatch.setitem(KINDS, "recording", newer)
+    monkeypatch.setitem(MIGRATIONS, ("recording", newer.version - 1), lambda groups: groups)
+    assert "migrated" in document("migrate")["files"][str(record)]
+    assert read_header(record).content_sha256 != before
+    assert {a["artifact"]: a["state"] for a in document("status")["artifacts"]}[
+        "iterations/001/20-estimate.h5"
+    ] == "fresh"
+    assert document("estimate")["state"] == "fresh"

@@ -1,5 +1,18 @@
-"""`python -m r2s2r_cli` is `r2s2r`."""
+"""The entry point: `r2s2r` and `python -m r2s2r_cli`."""
 
-from r2s2r_cli.app import main
+from __future__ import annotations
 
-main()
+import sys
+
+
+def main() -> None:
+    """Load the app and run it. Ctrl-C counts as an interrupt from the first moment, not only once all is loaded."""
+    try:
+        from r2s2r_cli.app import app
+    except KeyboardInterrupt:
+        sys.exit(130)
+    app()
+
+
+if __name__ == "__main__":
+    main()

@@ -108,7 +108,3 @@ for _name, _function in COMMANDS.items():
 for _name, _group in GROUPS.items():
     app.add_typer(_group, name=_name)
 
-
-def main() -> None:
-    """Entry point of the console script."""
-    app()

@@ -19,7 +19,7 @@ import atexit, json, sys
 target, arguments = sys.argv[1], sys.argv[2:]
 atexit.register(lambda: open(target, "w").write(json.dumps(sorted(sys.modules))))
 sys.argv = ["r2s2r", *arguments]
-from r2s2r_cli.app import main
+from r2s2r_cli.__main__ import main
 main()
 """
 

@@ -1,0 +1,61 @@
+"""Ctrl-C at any moment: exit code 130 or done, no traceback, nothing half-written."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.commands.conftest import invoke
+
+ESTIMATE = "iterations/001/20-estimate.h5"
+START = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background process inherits "ignore"
+print("started", file=sys.stderr, flush=True)
+sys.argv = ["r2s2r", "estimate", "--force", "--quiet"]
+from r2s2r_cli.__main__ import main
+main()
+"""
+
+
+def interrupted(project: Path, delay_s: float) -> tuple[int, str]:
+    """Exit code and stderr of an estimate that gets SIGINT after `delay_s`."""
+    child = subprocess.Popen(
+        [sys.executable, "-c", START], cwd=project, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    if child.stderr is None:
+        raise RuntimeError("the child has no stderr")
+    child.stderr.readline()
+    time.sleep(delay_s)
+    child.send_signal(signal.SIGINT)
+    _, stderr = child.communicate(timeout=60)
+    return child.returncode, stderr
+
+
+def check(project: Path, delays_s: list[float]) -> None:
+    """Interrupt at each moment; the artifact is whole each time, and at least one run was interrupted."""
+    codes = []
+    for delay in delays_s:
+        code, stderr = interrupted(project, delay)
+        codes.append(code)
+        assert code in (0, 130), (delay, stderr)
+        assert "Traceback" not in stderr
+        assert not list(project.rglob("*.partial"))
+    assert 130 in codes
+    assert invoke("validate", ESTIMATE).exit_code == 0
+
+
+def test_ctrl_c_leaves_everything_whole(estimated: Path) -> None:
+    """A few moments, from the imports of the program to the drawing."""
+    check(estimated, [0.0, 0.1, 0.4, 0.9])
+
+
+@pytest.mark.slow
+def test_ctrl_c_at_many_moments(estimated: Path) -> None:
+    """Forty moments over the whole command."""
+    check(estimated, [0.05 * i for i in range(40)])

@@ -29,7 +29,7 @@ from r2s2r_cli.store.canonical import source_sha256
 from r2s2r_cli.store.examine import Examined, examine
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.isolated import IsolatedReader
-from r2s2r_cli.store.journal import unwatched
+from r2s2r_cli.store.journal_read import unwatched
 from r2s2r_cli.store.layout import Mismatch
 from r2s2r_cli.store.project import CONFIG_FILE, ITERATIONS, JOURNAL_SUFFIX, PROJECT_FILE, Project
 from r2s2r_cli.store.toml import model_problems, read_toml

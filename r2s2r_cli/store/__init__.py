@@ -1,5 +1,5 @@
 """The project on disk: the only code that touches it, and the only importer of h5py.
 
 Light (no h5py): `project`, `header`, `toml`, `staleness`, `lock`, `atomic`, `provenance`.
-Heavy: `write`, `read`, `verify`, `journal`, `recover`.
+Heavy (numpy, h5py): everything else.
 """

@@ -14,22 +14,21 @@ import os
 import struct
 import time
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
-from r2s2r_cli.errors import ArtifactError, UsageError
+from r2s2r_cli.errors import ArtifactError
 from r2s2r_cli.store.atomic import creating, disk_error
-from r2s2r_cli.store.header import unreadable
 
 MAGIC = b"r2s2r-journal 1 "
-_RECORD = struct.Struct("<4sIII")
-_MARK = b"R2SJ"
+RECORD = struct.Struct("<4sIII")
+MARK = b"R2SJ"
 _NUMBERS = struct.Struct("<II")
-_BLOB_LENGTH = struct.Struct("<I")
+BLOB_LENGTH = struct.Struct("<I")
 MAX_RECORD = 1 << 28
 SYNC_INTERVAL_S = 1.0
 """A kill loses at most the last row; a power cut at most this much."""
@@ -121,7 +120,7 @@ class Journal:
         payload = _encode(self.head.streams[number], row)
         if len(payload) > MAX_RECORD:
             raise ValueError(f"{stream}: a row of {len(payload)} bytes, at most {MAX_RECORD} are allowed")
-        self._write(_RECORD.pack(_MARK, number, len(payload), _crc(number, payload)) + payload)
+        self._write(RECORD.pack(MARK, number, len(payload), record_crc(number, payload)) + payload)
         if time.monotonic() - self._synced > SYNC_INTERVAL_S:
             os.fdatasync(self._descriptor)
             self._synced = time.monotonic()
@@ -151,119 +150,9 @@ class Journal:
         self._end += len(data)
 
 
-def _crc(number: int, payload: bytes) -> int:
+def record_crc(number: int, payload: bytes) -> int:
+    """Checksum of a record: over stream number, length and payload."""
     return zlib.crc32(payload, zlib.crc32(_NUMBERS.pack(number, len(payload))))
-
-
-def read_head(path: Path) -> tuple[JournalHead, int]:
-    """Head of a journal and the offset of its first record. Raises ArtifactError where it is damaged."""
-    try:
-        with path.open("rb") as file:
-            line = file.readline(200)
-            length, crc = (int(part) for part in line[len(MAGIC) :].split())
-            body = file.read(min(max(0, length), MAX_RECORD))
-            offset = file.tell()
-        if not line.startswith(MAGIC) or len(body) != length or zlib.crc32(body) != crc:
-            raise ValueError("checksum")
-        return _from_json(json.loads(body)), offset
-    except OSError as error:
-        raise ArtifactError("the journal cannot be read", where=str(path), received=error.strerror or str(error),
-                            hint=f"ls -la '{path.parent}'") from error  # fmt: skip
-    except (ValueError, KeyError, TypeError) as error:
-        raise ArtifactError(
-            "this is not a journal, or its head is damaged",
-            where=str(path),
-            expected="a file that begins 'r2s2r-journal' and the digest of its head",
-            received=f"{path.stat().st_size} bytes that do not begin with an intact head",
-            hint=f"head -c 200 '{path}'",
-        ) from error
-
-
-@contextlib.contextmanager
-def unwatched(path: Path) -> Iterator[None]:
-    """Hold the journal's lock while it is sealed. Raises UsageError where it is still being written."""
-    try:
-        file = path.open("rb")
-    except OSError as error:
-        raise unreadable(path, error) from error
-    with file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise UsageError("this recording is running", where=str(path), expected="a journal that nobody has open",
-                             received="an open one", hint="stop the recording first") from error  # fmt: skip
-        yield
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where a whole record lies in the journal."""
-
-    stream: int
-    start: int
-    """Offset of the record [byte]."""
-    offset: int
-    """Offset of its payload [byte]."""
-    length: int
-
-
-def records(path: Path) -> Iterator[Place]:
-    """Every whole record, in order. Damaged stretches are skipped, a torn last record ends the search."""
-    head, position = read_head(path)
-    size = path.stat().st_size
-    with path.open("rb") as file:
-        while position < size:
-            place = _record_at(file, position)
-            if place is None or place.stream >= len(head.streams):
-                position = _next_mark(file, position + 1, size)
-                continue
-            yield place
-            position = place.offset + place.length
-
-
-def _record_at(file: BinaryIO, position: int) -> Place | None:
-    file.seek(position)
-    head = file.read(_RECORD.size)
-    if len(head) < _RECORD.size:
-        return None
-    mark, number, length, crc = _RECORD.unpack(head)
-    if mark != _MARK or length > MAX_RECORD:
-        return None
-    payload = file.read(length)
-    if len(payload) != length or _crc(number, payload) != crc:
-        return None
-    return Place(number, position, position + _RECORD.size, length)
-
-
-def _next_mark(file: BinaryIO, position: int, size: int) -> int:
-    """Position of the next record mark, or `size`."""
-    step = 1 << 20
-    while position < size:
-        file.seek(position)
-        window = file.read(step + len(_MARK))
-        found = window.find(_MARK)
-        if found >= 0:
-            return position + found
-        position += step
-    return size
-
-
-def decode(stream: Stream, payload: bytes) -> dict[str, np.ndarray | bytes]:
-    """The row that a record holds."""
-    row: dict[str, np.ndarray | bytes] = {}
-    position = 0
-    for field in stream.fields:
-        if field.dtype == "blobs":
-            (length,) = _BLOB_LENGTH.unpack_from(payload, position)
-            position += _BLOB_LENGTH.size
-            row[field.name] = payload[position : position + length]
-            position += length
-        else:
-            dtype = np.dtype(field.dtype)
-            count = int(np.prod(field.shape, dtype=np.int64))
-            row[field.name] = np.frombuffer(payload, dtype, count, position).reshape(field.shape)
-            position += count * dtype.itemsize
-    return row
 
 
 def _encode(stream: Stream, row: Mapping[str, Any]) -> bytes:
@@ -273,7 +162,7 @@ def _encode(stream: Stream, row: Mapping[str, Any]) -> bytes:
     for field in stream.fields:
         value = row[field.name]
         if field.dtype == "blobs":
-            parts += [_BLOB_LENGTH.pack(len(value)), bytes(value)]
+            parts += [BLOB_LENGTH.pack(len(value)), bytes(value)]
             continue
         array = np.asarray(value, dtype=field.dtype)
         if array.shape != field.shape:
@@ -297,11 +186,3 @@ def _to_json(head: JournalHead) -> dict[str, Any]:
         "kind": head.kind, "schema_version": head.schema_version, "streams": streams, "groups": groups,
         "provenance": dict(head.provenance),
     }  # fmt: skip
-
-
-def _from_json(values: dict[str, Any]) -> JournalHead:
-    streams = tuple(
-        Stream(s["path"], tuple(Field(n, d, tuple(shape)) for n, d, shape in s["fields"]), s["attributes"], s["name"])
-        for s in values["streams"]
-    )
-    return JournalHead(values["kind"], values["schema_version"], streams, values["groups"], values["provenance"])

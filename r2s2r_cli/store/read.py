@@ -6,6 +6,7 @@ import contextlib
 import itertools
 import warnings
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,18 @@ def load(path: Path, header: Header, *, blobs: bool = False) -> ArtifactData:
     for _, step in chain(header.kind, header.schema_version):
         groups = dict(step(groups))
     return ArtifactData(header.kind, groups)
+
+
+@dataclass(frozen=True)
+class StoredImages:
+    """The encoded frames of a dataset, read from the file each time they are gone through."""
+
+    path: Path
+    group: str
+    name: str
+
+    def __iter__(self) -> Iterator[bytes]:
+        return iter_blobs(self.path, self.group, self.name)
 
 
 def iter_blobs(path: Path, group: str, name: str) -> Iterator[bytes]:
@@ -157,7 +170,7 @@ def _load(file: h5py.File, path: Path, *, blobs: bool) -> dict[str, Group]:
                 array = np.asarray(leaf[()])
                 datasets[child] = array.view(array.dtype.str)  # without what h5py hangs on to dtypes of text
             elif blobs and set(leaf) == {BLOB_BYTES, BLOB_OFFSET}:
-                datasets[child] = Blobs(iter_blobs(path, name, child), len(leaf[BLOB_OFFSET]) - 1)
+                datasets[child] = Blobs(StoredImages(path, name, child), len(leaf[BLOB_OFFSET]) - 1)
         found = attributes(node)
         if datasets or found or not len(node):
             groups[name] = Group(datasets, found)

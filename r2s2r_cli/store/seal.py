@@ -14,7 +14,8 @@ from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Rows, Value
 from r2s2r_cli.errors import ArtifactError
 from r2s2r_cli.store.atomic import keep_beside
 from r2s2r_cli.store.header import read_header
-from r2s2r_cli.store.journal import Field, JournalHead, Stream, decode, read_head, records, unwatched
+from r2s2r_cli.store.journal import Field, JournalHead, Stream
+from r2s2r_cli.store.journal_read import read_field, read_head, records, unwatched
 from r2s2r_cli.store.read import checked_header, length
 from r2s2r_cli.store.write import write_artifact
 from schemas.header import Header, Provenance
@@ -39,10 +40,9 @@ class Sealed:
 
 @dataclass(frozen=True)
 class Rowset:
-    """Where the whole rows of one stream lie in the journal; 16 bytes a row, runs can be long."""
+    """Where the whole rows of one stream lie in the journal; 8 bytes a row, runs can be long."""
 
     offsets: array[int] = field(default_factory=lambda: array("Q"))
-    sizes: array[int] = field(default_factory=lambda: array("Q"))
 
     def __len__(self) -> int:
         return len(self.offsets)
@@ -90,7 +90,6 @@ def _survey(journal: Path, head: JournalHead, start: int) -> tuple[dict[int, Row
         end = place.offset + place.length
         found = rows.setdefault(place.stream, Rowset())
         found.offsets.append(place.offset)
-        found.sizes.append(place.length)
     return rows, end, lost
 
 
@@ -151,9 +150,8 @@ def _value(journal: Path, stream: Stream, column: Field, rows: Rowset) -> Value:
 
 def _column(journal: Path, stream: Stream, column: Field, rows: Rowset) -> Iterator[np.ndarray | bytes]:
     with journal.open("rb") as file:
-        for offset, size in zip(rows.offsets, rows.sizes, strict=True):
-            file.seek(offset)
-            yield decode(stream, file.read(size))[column.name]
+        for offset in rows.offsets:
+            yield read_field(file, offset, stream, column.name)
 
 
 def _stacked(rows: Iterator[np.ndarray | bytes]) -> Iterator[np.ndarray]:

@@ -12,16 +12,8 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from r2s2r_cli.errors import ArtifactError, UsageError
 from r2s2r_cli.store import journal as module
-from r2s2r_cli.store.journal import (
-    Field,
-    Journal,
-    JournalHead,
-    Stream,
-    decode,
-    read_head,
-    records,
-    unwatched,
-)
+from r2s2r_cli.store.journal import Field, Journal, JournalHead, Stream
+from r2s2r_cli.store.journal_read import decode, read_head, records, unwatched
 from tests.support.recorder import COLOR, RUN, SENSORS, append, head, image, sensor_row, write
 
 IN_A_FOLDER = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

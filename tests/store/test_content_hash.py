@@ -15,7 +15,7 @@ from r2s2r_cli.store.write import write_artifact
 from schemas.versions import KINDS
 from tests.support.builders import BUILDERS, filled, materialised, policy, provenance, recording
 
-IN_A_FOLDER = settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+IN_A_FOLDER = settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def content(tmp_path: Path, data: ArtifactData, **changes: object) -> str:

@@ -42,7 +42,7 @@ def test_writing_with_any_limit_of_file_size(nursery: Nursery, tmp_path: Path) -
     whole = write_artifact(tmp_path / "x.h5", simulation(10), provenance())
     size = whole.body_offset + whole.body_bytes
     codes = []
-    for limit in range(0, size + 2000, 1300):
+    for limit in range(0, size + 2000, 2600):
         folder = tmp_path / str(limit)
         folder.mkdir()
         answer = nursery.run("write", folder, limit=limit)
@@ -67,7 +67,7 @@ def test_writing_on_a_full_disk(nursery: Nursery, disk: SmallDisk) -> None:
     write_artifact(disk.path / "simulation.h5", simulation(8), provenance())
     before = (disk.path / "simulation.h5").read_bytes()
     codes = []
-    for pages in range(0, 24, 3):
+    for pages in range(0, 24, 6):
         disk.fill(leave=pages * PAGE)
         codes.append(nursery.run("write", disk.path)["code"])
         assert disk.names() == {"simulation.h5"}

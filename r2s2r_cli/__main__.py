@@ -9,9 +9,11 @@ def main() -> None:
     """Load the app and run it. Ctrl-C counts as an interrupt from the first moment, not only once all is loaded."""
     try:
         from r2s2r_cli.app import app
+
+        app()
     except KeyboardInterrupt:
+        print("interrupted: nothing was done", file=sys.stderr)
         sys.exit(130)
-    app()
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from typer.core import TyperGroup
 
 from r2s2r_cli import __version__
 from r2s2r_cli.commands import COMMANDS, GROUPS
-from r2s2r_cli.console import print_error
+from r2s2r_cli.console import PipeClosed, print_error
 from r2s2r_cli.errors import ExitCode, GateError, R2S2RError, UsageError
 
 BUG_MESSAGE = "this is a bug in r2s2r, please report it with the lines above"
@@ -31,9 +31,9 @@ class ErrorGroup(TyperGroup):
         windows_expand_args: bool = True,
         **extra: Any,
     ) -> Any:
-        """Run; leave through SystemExit with one of our codes."""
+        """Run; leave through SystemExit with one of our codes. No arguments: show the help."""
         del standalone_mode  # our own error handling replaces Typer's, which this flag would switch on
-        arguments = list(sys.argv[1:] if args is None else args)
+        arguments = list(sys.argv[1:] if args is None else args) or ["--help"]
         run = super().main
         code = run_guarded(
             lambda: run(arguments, prog_name, complete_var, False, windows_expand_args, **extra), "--json" in arguments
@@ -45,8 +45,11 @@ def run_guarded(call: Callable[[], object], as_json: bool) -> int:
     """Run `call` and return its exit code; errors are printed in our form."""
     try:
         result = call()
+        code = result if isinstance(result, int) else ExitCode.DONE
+        if code == ExitCode.INTERRUPTED:  # Typer turns Ctrl-C into this code and says nothing
+            raise KeyboardInterrupt
         sys.stdout.flush()
-        return result if isinstance(result, int) else ExitCode.DONE
+        return code
     except R2S2RError as error:
         # A gate is judged on a result that was printed: stdout holds its document already.
         print_error(error, as_json=as_json and not isinstance(error, GateError))
@@ -55,10 +58,10 @@ def run_guarded(call: Callable[[], object], as_json: bool) -> int:
         print_error(_usage_error(error), as_json=as_json)
         return ExitCode.USAGE
     except (KeyboardInterrupt, typer.Abort):
-        print("interrupted: nothing is half-written", file=sys.stderr)
+        print("interrupted: nothing is half-written; run the command again", file=sys.stderr)
         return ExitCode.INTERRUPTED
-    except BrokenPipeError:
-        _silence_stdout()
+    except (PipeClosed, BrokenPipeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python must not complain at its exit
         return ExitCode.DONE
     except Exception:
         traceback.print_exc()
@@ -70,19 +73,15 @@ def _usage_error(error: typer.TyperException) -> UsageError:
     message = error.format_message() if hasattr(error, "format_message") else str(error)
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "r2s2r"
+    if message.startswith("Usage:"):  # a group without its subcommand: Typer's message is the whole help
+        message = "a subcommand is missing"
     return UsageError(message.rstrip(".").strip(), where=command, hint=f"{command} --help")
-
-
-def _silence_stdout() -> None:
-    """The reader of the pipe went away (`| head`): not an error, but Python must not complain at exit."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 app = typer.Typer(
     name="r2s2r",
     cls=ErrorGroup,
     help="Close the gap between a cable-driven robot and its simulator, and say what causes the rest.",
-    no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -107,4 +106,3 @@ for _name, _function in COMMANDS.items():
     app.command(_name, no_args_is_help=False)(_function)
 for _name, _group in GROUPS.items():
     app.add_typer(_group, name=_name)
-

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from io import StringIO
 from typing import TYPE_CHECKING
 
-from r2s2r_cli.errors import R2S2RError
+from r2s2r_cli.errors import InputError, R2S2RError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,6 +18,23 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
 NO_PROGRESS = "R2S2R_NO_PROGRESS"
+PIPED_WIDTH = 160
+"""Columns of a table that goes to a file or pipe."""
+
+
+class PipeClosed(Exception):
+    """Whoever read our stdout went away (`| head`). Not an error."""
+
+
+def out(text: str) -> None:
+    """A line on stdout. Raises PipeClosed, or InputError where stdout takes no more (a full disk)."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError as error:
+        raise PipeClosed from error
+    except OSError as error:
+        raise InputError("stdout cannot be written", where="stdout", expected="room for the output",
+                         received=error.strerror or str(error), hint="df -h .") from error  # fmt: skip
 
 
 class Console:
@@ -28,16 +47,16 @@ class Console:
     def document(self, result: BaseModel) -> None:
         """The command's one JSON document, if --json was given."""
         if self.json:
-            print(result.model_dump_json(by_alias=True, indent=2))
+            out(result.model_dump_json(by_alias=True, indent=2))
 
     def raw(self, text: str) -> None:
         """Text on stdout that is data in both forms."""
-        print(text)
+        out(text)
 
     def data(self, text: str) -> None:
         """A line of data for people; silent with --json."""
         if not self.json:
-            print(text)
+            out(text)
 
     def table(self, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
         """A table of data for people; silent with --json. Numbers (cells that begin like one) stand right."""
@@ -49,16 +68,20 @@ class Console:
         from rich.text import Text
 
         body = [[str(cell) for cell in row] for row in rows]
-        if title:
-            print(f"\n{title}")
         table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
         for i, name in enumerate(columns):
             numeric = bool(body) and all(_is_number(row[i]) for row in body)
             table.add_column(Text(name), justify="right" if numeric else "left", overflow="fold")
         for row in body:
             table.add_row(*(Text(cell) for cell in row))
-        width = None if sys.stdout.isatty() else 160
-        RichConsole(file=sys.stdout, width=width, highlight=False).print(table)
+        terminal = sys.stdout.isatty()
+        width = shutil.get_terminal_size().columns if terminal else PIPED_WIDTH
+        # Rendered first and printed by us: rich ends the process by itself where a pipe closes.
+        page = RichConsole(file=StringIO(), width=width, highlight=False, force_terminal=terminal)
+        page.print(table)
+        text = page.file.getvalue() if isinstance(page.file, StringIO) else ""
+        lines = text.rstrip().splitlines() if terminal else [line.rstrip() for line in text.rstrip().splitlines()]
+        out("\n".join([f"\n{title}" if title else "", *lines[1:], ""]))
 
     def say(self, text: str) -> None:
         """A remark on stderr; silent with --quiet."""
@@ -83,10 +106,24 @@ class Console:
             yield lambda done: None
             return
         from rich.console import Console as RichConsole
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            Progress,
+            ProgressColumn,
+            Task,
+            TextColumn,
+            TimeRemainingColumn,
+        )
+        from rich.text import Text
 
-        rate = TextColumn("{task.speed:.0f}/s" if total else "")
-        columns = (TextColumn(title), BarColumn(), MofNCompleteColumn(), rate, TimeRemainingColumn())
+        class Rate(ProgressColumn):
+            """Items a second, once there is a speed to tell."""
+
+            def render(self, task: Task) -> Text:
+                return Text("" if task.speed is None else f"{task.speed:.1f}/s")
+
+        columns = (TextColumn(title), BarColumn(), MofNCompleteColumn(), Rate(), TimeRemainingColumn())
         with Progress(*columns, console=RichConsole(stderr=True), transient=True) as bar:
             task = bar.add_task(title, total=total)
             yield lambda done: bar.update(task, advance=done)
@@ -101,7 +138,7 @@ def print_error(error: R2S2RError, *, as_json: bool) -> None:
             exit_code=int(error.exit_code), what=error.what, where=error.where, expected=error.expected,
             received=error.received, hint=error.hint,
         )  # fmt: skip
-        print(document.model_dump_json(by_alias=True, indent=2))
+        out(document.model_dump_json(by_alias=True, indent=2))
     print("\n".join([f"error: {error.what}", *error.lines()[1:]]), file=sys.stderr)
 
 

@@ -139,13 +139,20 @@ def _geometry_rows(report: ImportReport) -> Iterator[tuple[str, str]]:
         low, high, median = (1e3 * sd for sd in (report.noise.low_m, report.noise.high_m, report.noise.median_m))
         held = f"; held by the source: {', '.join(report.noise.held)}" if report.noise.held else ""
         yield "noise per axis", f"{low:.1f} to {high:.1f} mm (sd), median {median:.1f} mm{held}"
-    rods = zip(report.rod_length_m, report.rod_length_sd_m, report.rod_length_robot_m, strict=True)
+    # Only the robot's own lengths are known of a run without end caps (camera folders).
+    stated_m = report.rod_length_robot_m if report.rod_length_m else ()
+    rods = zip(report.rod_length_m, report.rod_length_sd_m, stated_m, strict=True)
     for i, (length, sd, stated) in enumerate(rods):
         found = f"{1e3 * length:.1f} +- {1e3 * sd:.1f} mm between cap centres"
         yield f"rod {i}", f"{found}, robot.toml says {1e3 * stated:.1f} mm"
     if report.ground_offset_m is not None:
-        offset = 1e3 * report.ground_offset_m
-        yield "ground offset", f"{offset:.1f} mm: the lowest cap lies that much too low on average"
+        yield "ground offset", ground_offset(report.ground_offset_m)
+
+
+def ground_offset(offset_m: float) -> str:
+    """How the lowest cap lies over the ground, in words. offset_m: cap radius minus its mean height."""
+    side = "too low" if offset_m >= 0 else "too high"
+    return f"{1e3 * offset_m:+.1f} mm to add to z: the lowest cap lies {1e3 * abs(offset_m):.1f} mm {side} on average"
 
 
 def _stream_rows(report: ImportReport) -> Iterator[tuple[str, str]]:

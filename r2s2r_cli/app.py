@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
@@ -14,7 +15,7 @@ from typer.core import TyperGroup
 from r2s2r_cli import __version__
 from r2s2r_cli.commands import COMMANDS, GROUPS
 from r2s2r_cli.console import PipeClosed, print_error
-from r2s2r_cli.errors import ExitCode, GateError, R2S2RError, UsageError
+from r2s2r_cli.errors import DamageWarning, ExitCode, GateError, R2S2RError, UsageError
 
 BUG_MESSAGE = "this is a bug in r2s2r, please report it with the lines above"
 
@@ -42,7 +43,26 @@ class ErrorGroup(TyperGroup):
 
 
 def run_guarded(call: Callable[[], object], as_json: bool) -> int:
-    """Run `call` and return its exit code; errors are printed in our form."""
+    """Run `call` and return its exit code; errors and warnings are printed in our form."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", DamageWarning)
+        warnings.showwarning = _warner(warnings.showwarning)
+        return _run_guarded(call, as_json)
+
+
+def _warner(other: Callable[..., None]) -> Callable[..., None]:
+    """Print our own warning as one line; leave those of libraries to `other`."""
+
+    def show(message: Warning | str, category: type[Warning], *rest: Any, **options: Any) -> None:
+        if issubclass(category, DamageWarning):
+            print(f"warning: {message}", file=sys.stderr)
+        else:
+            other(message, category, *rest, **options)
+
+    return show
+
+
+def _run_guarded(call: Callable[[], object], as_json: bool) -> int:
     try:
         result = call()
         code = result if isinstance(result, int) else ExitCode.DONE

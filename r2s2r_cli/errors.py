@@ -85,6 +85,10 @@ class ArtifactError(InputError):
     """An artifact or the project is missing, damaged, or of another kind or version."""
 
 
+class DamageWarning(UserWarning):
+    """Bytes of a file changed, but nothing that can be read: the command goes on."""
+
+
 class HardwareError(R2S2RError):
     """A port, camera or board failed; the robot has been told to stop where the protocol allows it."""
 

@@ -88,6 +88,19 @@ def read_header(path: Path) -> Header:
         raise _damaged(path, error.errors()[0]["msg"]) from error
 
 
+def whole_header(path: Path) -> Header:
+    """The header of an artifact that has all its bytes. Raises ArtifactError as `read_header`, and where it was cut off.
+
+    The bytes themselves are not read: this is what a light command can afford.
+    """
+    header = read_header(path)
+    expected, received = header.body_offset + header.body_bytes, path.stat().st_size
+    if received < expected:
+        raise ArtifactError("the file was cut off", where=str(path), expected=f"{expected} bytes",
+                            received=f"{received} bytes", hint=f"r2s2r recover '{path}'")  # fmt: skip
+    return header
+
+
 def body_sha256(path: Path, offset: int, limit: int | None = None) -> tuple[str, int]:
     """Digest and length of the bytes of `path` from `offset` on, of at most `limit` bytes. Raises ArtifactError."""
     digest, length = hashlib.sha256(), 0

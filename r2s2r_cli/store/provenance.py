@@ -33,6 +33,8 @@ def build_provenance(
     wall_s: float,
     seed: int | None = None,
     threads: int | None = None,
+    report: Mapping[str, Any] | None = None,
+    drawings: Sequence[str] = (),
 ) -> Provenance:
     """The provenance of one artifact; `started` is timezone-aware, `wall_s` the time the stage took [s]."""
     commit, dirty = source_commit()
@@ -53,6 +55,8 @@ def build_provenance(
         platform=f"{platform.platform()} {platform.machine()} python {platform.python_version()}",
         started=started.isoformat(timespec="seconds"),
         wall_s=round(wall_s, 3),
+        report=dict(report or {}),
+        drawings=tuple(drawings),
     )
 
 

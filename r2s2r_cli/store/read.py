@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Value
-from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.errors import ArtifactError, DamageWarning
 from r2s2r_cli.store.hashing import PROVENANCE, attributes, walk
 from r2s2r_cli.store.hdf5_errors import translate
 from r2s2r_cli.store.header import body_sha256, read_header
@@ -23,10 +23,6 @@ from r2s2r_cli.store.layout import BLOB_BYTES, BLOB_OFFSET
 from schemas.header import Header
 from schemas.results import NodeInfo
 from schemas.versions import KINDS, NoMigration, chain
-
-
-class DamageWarning(UserWarning):
-    """Bytes of a file changed, but nothing that can be read."""
 
 
 def read_artifact(path: Path, kind: str | None = None, *, blobs: bool = False) -> tuple[Header, ArtifactData]:

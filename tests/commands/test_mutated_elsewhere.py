@@ -10,9 +10,9 @@ from random import Random
 
 import pytest
 
-from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.errors import ArtifactError, DamageWarning
 from r2s2r_cli.store.isolated import IsolatedReader
-from r2s2r_cli.store.read import DamageWarning, checked_header, load
+from r2s2r_cli.store.read import checked_header, load
 from schemas.results import ErrorResult
 from tests.commands.conftest import invoke
 from tests.support.builders import same

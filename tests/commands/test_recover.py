@@ -85,3 +85,15 @@ def test_what_cannot_be_recovered_is_an_error_in_words(project: Path, name: str)
     (project / "iterations").mkdir(exist_ok=True)
     result = invoke("recover", name)
     assert result.exit_code == 4 and "hint: " in result.stderr and "Traceback" not in result.stderr
+
+
+def test_bytes_that_nothing_reads_are_one_line_of_warning(estimated: Path) -> None:
+    """The command goes on, with exit code 0 and no line of Python; `recover` makes the file what it was."""
+    record = estimated / "iterations" / "001" / "10-record.h5"
+    original = record.read_bytes()
+    record.write_bytes(original + b"tail")
+    result = invoke("inspect", str(record))
+    assert result.exit_code == 0
+    assert result.stderr == f"warning: {record}: bytes changed that nothing reads; the content hash still holds\n"
+    document("recover", str(record))
+    assert record.read_bytes() == original and invoke("inspect", str(record)).stderr == ""

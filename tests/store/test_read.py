@@ -9,10 +9,10 @@ import h5py
 import numpy as np
 import pytest
 
-from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.errors import ArtifactError, DamageWarning
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.isolated import IsolatedReader
-from r2s2r_cli.store.read import DamageWarning, checked_header, load, read_artifact
+from r2s2r_cli.store.read import checked_header, load, read_artifact
 from r2s2r_cli.store.write import write_artifact
 from schemas.versions import KINDS
 from tests.store.conftest import Copy

@@ -13,10 +13,10 @@ import h5py
 import numpy as np
 import pytest
 
-from r2s2r_cli.errors import ArtifactError, R2S2RError
+from r2s2r_cli.errors import ArtifactError, DamageWarning, R2S2RError
 from r2s2r_cli.store.header import MAGIC, block, read_header
 from r2s2r_cli.store.isolated import IsolatedReader
-from r2s2r_cli.store.read import DamageWarning, checked_header, read_artifact
+from r2s2r_cli.store.read import checked_header, read_artifact
 from r2s2r_cli.store.recover import recover_file
 from schemas.versions import KINDS
 from tests.store.conftest import Copy

@@ -10,7 +10,7 @@ import pytest
 
 from r2s2r_cli.store.isolated import IsolatedReader
 from schemas.versions import KINDS
-from tests.support.make_golden import golden_path
+from tests.support.make_golden import golden_path, make
 from tests.support.nursery import Nursery
 
 Copy = Callable[[str], Path]
@@ -24,6 +24,18 @@ def golden(tmp_path: Path) -> Copy:
         return Path(shutil.copyfile(golden_path(kind, KINDS[kind].version), tmp_path / f"{kind}.h5"))
 
     return copy
+
+
+@pytest.fixture
+def fresh(tmp_path: Path) -> Copy:
+    """A function that writes the artifact of a kind as this version does, for what must hold byte by byte."""
+
+    def write(kind: str) -> Path:
+        path = tmp_path / f"{kind}.h5"
+        make(kind, path)
+        return path
+
+    return write
 
 
 @pytest.fixture(scope="session")

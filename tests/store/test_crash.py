@@ -189,9 +189,9 @@ def test_a_migration_killed_anywhere_can_be_repeated(nursery: Nursery, tmp_path:
     assert step > 21
 
 
-def test_a_restoration_killed_anywhere_can_be_repeated(nursery: Nursery, tmp_path: Path, golden: Copy) -> None:
+def test_a_restoration_killed_anywhere_can_be_repeated(nursery: Nursery, tmp_path: Path, fresh: Copy) -> None:
     """The damaged file is never gone, and the second attempt restores it."""
-    original = golden("policy").read_bytes()
+    original = fresh("policy").read_bytes()
     damaged = original[:300] + b"?" + original[301:]
     step, finished = 0, False
     while not finished:

@@ -31,33 +31,34 @@ def flipped(path: Path, bits: Iterator[tuple[int, int]]) -> Iterator[None]:
 def check_flips(path: Path, bits: Iterator[tuple[int, int]]) -> None:
     """Every flip is an error, or the header reads the same."""
     sealed = read_header(path)
-    noticed = 0
+    noticed = flips = 0
     for _ in flipped(path, bits):
+        flips += 1
         try:
             assert read_header(path) == sealed
         except ArtifactError as error:
             noticed += 1
             assert error.where and error.expected and error.received and error.hint
     used = len(block(sealed).rstrip())
-    assert noticed > 0.9 * used / sealed.body_offset, "the test flipped nothing that matters"
+    assert noticed > 0.98 * flips * used / sealed.body_offset, "flips of bits that are read went unnoticed"
 
 
-def test_one_flipped_bit_of_every_byte_is_noticed_or_irrelevant(golden: Copy) -> None:
+def test_one_flipped_bit_of_every_byte_is_noticed_or_irrelevant(fresh: Copy) -> None:
     """A changed head is refused, unless only padding changed; never another header."""
-    path = golden("policy")
+    path = fresh("policy")
     check_flips(path, ((i, i * 5 % 8) for i in range(read_header(path).body_offset)))
 
 
 @pytest.mark.slow
-def test_every_flipped_bit_is_noticed_or_irrelevant(golden: Copy) -> None:
+def test_every_flipped_bit_is_noticed_or_irrelevant(fresh: Copy) -> None:
     """The same for all bits of the block."""
-    path = golden("policy")
+    path = fresh("policy")
     check_flips(path, ((i, bit) for i in range(read_header(path).body_offset) for bit in range(8)))
 
 
-def test_a_head_cut_off_anywhere_is_refused(golden: Copy) -> None:
+def test_a_head_cut_off_anywhere_is_refused(fresh: Copy) -> None:
     """No length of file short of the whole header gives a header."""
-    path = golden("policy")
+    path = fresh("policy")
     content, used = path.read_bytes(), len(block(read_header(path)).rstrip())
     for length in (*range(0, used, 97), used - 1):
         path.write_bytes(content[:length])
@@ -93,9 +94,9 @@ def test_a_header_that_would_not_fit_is_refused_before_anything_is_written(tmp_p
     assert list(tmp_path.iterdir()) == []
 
 
-def test_block_is_padded_with_spaces_to_a_power_of_two(golden: Copy) -> None:
+def test_block_is_padded_with_spaces_to_a_power_of_two(fresh: Copy) -> None:
     """The block ends with spaces and a newline, so that it can be looked at with `head`."""
-    header = read_header(golden("recording"))
+    header = read_header(fresh("recording"))
     written = block(header)
     assert len(written) == header.body_offset == block_size(header)
     assert written.startswith(MAGIC) and written.endswith(b" \n")

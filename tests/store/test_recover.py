@@ -49,9 +49,9 @@ RESTORABLE: list[Damage] = [in_head, head_gone, padding]
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("damage", RESTORABLE)
-def test_what_the_digests_prove_is_restored(golden: Copy, reader: IsolatedReader, kind: str, damage: Damage) -> None:
+def test_what_the_digests_prove_is_restored(fresh: Copy, reader: IsolatedReader, kind: str, damage: Damage) -> None:
     """The file is again the one that was written, byte by byte, and the damaged one has a name of its own."""
-    path = golden(kind)
+    path = fresh(kind)
     original, data = path.read_bytes(), bytearray(path.read_bytes())
     damage(data, read_header(path).body_offset)
     path.write_bytes(data)
@@ -68,11 +68,10 @@ def test_an_intact_artifact_is_left_alone(golden: Copy, reader: IsolatedReader) 
     assert not result.changed and [p.name for p in path.parent.iterdir()] == [path.name]
 
 
-def test_changed_descriptions_are_written_again_from_the_schema(golden: Copy, reader: IsolatedReader) -> None:
+def test_changed_descriptions_are_written_again_from_the_schema(fresh: Copy, reader: IsolatedReader) -> None:
     """All numbers are proven by the head: the artifact comes back with the content and the provenance that it had."""
-    path = golden("recording")
+    path = fresh("recording")
     sealed, before = read_artifact(path, blobs=True)
-    before.groups["runs/walk/camera"].datasets["color"]  # frames are read from the file, so compare with a copy
     with h5py.File(path, "r+") as file:
         file["runs/walk/caps/t"].attrs["description"] = np.bytes_("something else")
         file.attrs["note"] = np.bytes_("mine")
@@ -233,8 +232,8 @@ def test_recovering_many_mutated_artifacts_loses_nothing(
     fuzz(tmp_path, golden, reader, 100, seed=50 + seed)
 
 
-def test_block_of_a_header_is_what_stands_in_the_file(golden: Copy) -> None:
+def test_block_of_a_header_is_what_stands_in_the_file(fresh: Copy) -> None:
     """Restoring rests on this: the block made from a header is the block that was written."""
-    path = golden("simulation")
+    path = fresh("simulation")
     header = read_header(path)
     assert path.read_bytes()[: header.body_offset] == block(header)

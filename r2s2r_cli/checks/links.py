@@ -24,8 +24,11 @@ _SHOWN = 60
 def head_matches_body(links: Links) -> Iterator[Found]:
     """Facts that stand twice in the file, and differ."""
     head = links.header.model_dump(mode="json", include=_IN_BODY)
-    made = links.header.provenance.model_dump(mode="json")
-    for name, value in [*head.items(), *((f"provenance/{key}", value) for key, value in made.items())]:
+    made, stated = links.header.provenance.model_dump(mode="json"), links.header.provenance.model_fields_set
+    record = {f"provenance/{key}": (value, key in stated) for key, value in made.items()}
+    for name, (value, said) in {**{key: (value, True) for key, value in head.items()}, **record}.items():
+        if not said and name not in links.body:
+            continue  # a field that is younger than the file
         received = links.body.get(name)
         if received != value:
             yield Found(name, "the head of the file and its body differ", _short(value), _short(received))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from r2s2r_cli.artifact import ArtifactData
-from r2s2r_cli.views.page import Page, PageTable, Picture, render
+from r2s2r_cli.views.page import Page, PageTable, Picture, counted, render
 from schemas.results_estimate import EstimateReport, EstimateRun
 
 _MADE = ("simulated", "kinematic sample")
@@ -40,7 +40,7 @@ def estimate_page(report: EstimateReport, data: ArtifactData, pictures: Mapping[
     return render(
         Page(
             title="Estimate",
-            sentence=f"States at {frames} frames of {len(report.runs)} run{'s' * (len(report.runs) > 1)}.",
+            sentence=f"States at {counted(frames, 'frame')} of {counted(len(report.runs), 'run')}.",
             labels=labels,
             tables=list(report_tables(report)),
             pictures=[Picture(f"run {run}", png) for run, png in pictures.items()],
@@ -50,13 +50,16 @@ def estimate_page(report: EstimateReport, data: ArtifactData, pictures: Mapping[
 
 def _rows(run: EstimateRun) -> Iterator[tuple[str, str]]:
     yield "frames", f"{run.frames} of {run.rows} rows, {run.duration_s:.2f} s"
-    yield "target intervals", f"{run.intervals}, {run.segments} segments"
+    yield "target intervals", f"{run.intervals}, {counted(run.segments, 'segment')}"
     for rod in run.rods:
-        text = f"{1e3 * rod.length_m:.1f} +- {1e3 * rod.length_sd_m:.1f} mm as observed"
-        moved = f"made {1e3 * rod.length_robot_m:.1f} mm by moving a cap at most {1e3 * rod.correction_max_m:.1f} mm"
-        yield f"rod {rod.rod}", f"{text}, {moved}"
+        text = f"observed length {1e3 * rod.length_m:.1f} +- {1e3 * rod.length_sd_m:.1f} mm"
+        given = f"robot.toml says {1e3 * rod.length_robot_m:.1f} mm"
+        # Smoothing moves the caps of a rod apart although every observed frame had its length.
+        yield f"rod {rod.rod}", f"{text}, {given}; largest move of a smoothed cap {1e3 * rod.correction_max_m:.1f} mm"
     ground = run.ground
-    yield "ground", f"moved by {1e3 * ground.shift_m:.1f} +- {1e3 * ground.shift_sd_m:.1f} mm to z = 0"
+    side = "up" if ground.shift_m >= 0 else "down"
+    shift = f"{1e3 * abs(ground.shift_m):.1f} +- {1e3 * ground.shift_sd_m:.1f} mm"
+    yield "ground", f"caps moved {side} by {shift}, so that it lies at z = 0"
     if ground.slope is not None and ground.slope_sd is not None:
         slopes = [f"{_AXES[i]} {1e3 * ground.slope[i]:.1f} +- {1e3 * ground.slope_sd[i]:.1f}" for i in range(2)]
         yield "ground slope", f"{', '.join(slopes)} mm/m, not applied"

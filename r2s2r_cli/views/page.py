@@ -79,6 +79,11 @@ class Page:
     footer: Sequence[str] = field(default_factory=tuple)
 
 
+def counted(number: int, what: str) -> str:
+    """`1 segment`, `2 segments`."""
+    return f"{number} {what}{'s' * (number != 1)}"
+
+
 def render(page: Page) -> bytes:
     """The page as UTF-8 HTML; every text is escaped."""
     from jinja2 import Environment, StrictUndefined

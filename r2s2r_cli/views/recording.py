@@ -1,114 +1,61 @@
-"""Pictures of a recording: what came in, what was dropped, and the target intervals."""
+"""Pictures and page of a recording: what came in, what was dropped, and the target intervals."""
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
-import numpy as np
+from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.views.figure import new_figure, png_bytes
+from r2s2r_cli.views.page import Page, PageTable, Picture, counted, render
+from r2s2r_cli.views.recording_camera import camera_height, draw_camera
+from r2s2r_cli.views.recording_motion import MOTION_HEIGHT, draw_motion
+from r2s2r_cli.views.recording_streams import draw_streams, panels, streams_height
+from schemas.results_import import ImportReport, ImportReports
 
-from r2s2r_cli.artifact import ArtifactData, Group
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from schemas.results_import import ImportReport, ImportReports
-
-ROD_COLORS = ("#c1272d", "#2a7f3e", "#0b5fa5", "#b8860b", "#6b3fa0", "#3b8ea5")
-"""Rods in their order; the first three are the robot's own red, green and blue."""
-_DROPPED = "#888888"
-_BAND = ("#eef2f7", "#dbe3ee")
+_WIDTH = 13.0
+"""Of a picture [inches]."""
 
 
 def draw_recording(data: ArtifactData, cap_radius_m: float) -> Iterator[tuple[str, bytes]]:
-    """(run, PNG) of every run that has end caps or commands. `cap_radius_m`: height of a resting cap centre [m]."""
+    """(run, PNG) of every run: end caps and commands, sensors and motors, camera frames; each where it has them.
+
+    cap_radius_m: height of a resting cap centre.
+    """
     for run in data.runs():
-        caps, commands = data.group(run, "caps"), data.group(run, "commands")
-        if caps is not None or commands is not None:
-            yield run, _picture(run, caps, commands, data.group(run, "intervals"), cap_radius_m)
+        picture = _picture(data, run, cap_radius_m)
+        if picture is not None:
+            yield run, picture
 
 
-def _picture(run: str, caps: Group | None, commands: Group | None, intervals: Group | None, radius: float) -> bytes:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(12, 7.5), layout="constrained")
-    FigureCanvasAgg(figure)
-    grid = figure.add_gridspec(3, 2, width_ratios=(2, 1.2))
-    figure.suptitle(f"run {run}: as recorded")
-    heights, targets, gaps = (figure.add_subplot(grid[i, 0]) for i in range(3))
-    for axes in (heights, targets, gaps):
-        _bands(axes, intervals)
-    if caps is not None:
-        _heights(heights, caps, radius)
-        _gaps(gaps, caps)
-        _top_view(figure.add_subplot(grid[:, 1]), caps)
-    if commands is not None:
-        _targets(targets, commands)
-    gaps.set_xlabel("time [s]")
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
-    return buffer.getvalue()
-
-
-def _bands(axes: Axes, intervals: Group | None) -> None:
-    if intervals is None:
-        return
-    spans = zip(intervals["t_first"], intervals["t_last"], strict=True)
-    for i, (start, stop) in enumerate(spans):
-        axes.axvspan(start, stop, color=_BAND[i % 2], lw=0)
-        axes.annotate(str(i + 1), ((start + stop) / 2, 1.0), xycoords=("data", "axes fraction"), ha="center",
-                      va="bottom", fontsize=7, color="#5a6675")  # fmt: skip
+def _picture(data: ArtifactData, run: str, cap_radius_m: float) -> bytes | None:
+    moving = data.group(run, "caps") is not None or data.group(run, "commands") is not None
+    streams = panels(data, run)
+    camera = data.group(run, "camera")
+    parts: list[float] = []
+    if moving:
+        parts.append(MOTION_HEIGHT if data.group(run, "caps") is not None else MOTION_HEIGHT / 2)
+    if streams:
+        parts.append(streams_height(streams))
+    if camera is not None:
+        parts.append(camera_height(camera, _WIDTH))
+    if not parts:
+        return None
+    figure = new_figure(_WIDTH, sum(parts) + 0.3)
+    nature = str(data.groups[f"runs/{run}"].attributes.get("nature", "not stated"))
+    figure.suptitle(f"run {run}: as recorded ({stated(nature)})")
+    places = iter(figure.subfigures(len(parts), 1, height_ratios=parts, squeeze=False)[:, 0])
+    if moving:
+        draw_motion(next(places), data, run, cap_radius_m)
+    if streams:
+        draw_streams(next(places), streams, data.group(run, "intervals"))
+    if camera is not None:
+        draw_camera(next(places), camera)
+    return png_bytes(figure)
 
 
-def _heights(axes: Axes, caps: Group, radius: float) -> None:
-    kept = caps["drop_reason"] == 0
-    for i in range(caps["p_WE"].shape[1]):
-        style = "-" if i % 2 == 0 else "--"
-        axes.plot(caps["t"][kept], 1e3 * caps["p_WE"][kept, i, 2], style, lw=1,
-                  color=ROD_COLORS[i // 2 % len(ROD_COLORS)], label=f"cap {i}")  # fmt: skip
-    axes.axhline(1e3 * radius, color="black", lw=0.8, ls=":")
-    axes.set_ylabel("cap height [mm]\n(dotted: resting on z = 0)")
-    axes.legend(ncol=6, fontsize=7, loc="upper right")
-
-
-def _targets(axes: Axes, commands: Group) -> None:
-    target = commands["target"]
-    for i in range(target.shape[1]):
-        axes.step(commands["t"], target[:, i] * 0.8 + i, where="post", color="black", lw=1)
-        if "control" in commands:
-            axes.fill_between(commands["t"], i, i + 0.4 * np.nan_to_num(commands["control"][:, i]), step="post",
-                              color="#0b5fa5", alpha=0.4, lw=0)  # fmt: skip
-    axes.set_yticks(range(target.shape[1]), [f"cable {i}" for i in range(target.shape[1])])
-    axes.set_ylabel("target (line, 0 to 1)\ncontrol (blue, up = reel in)")
-
-
-def _gaps(axes: Axes, caps: Group) -> None:
-    t, kept = caps["t"], caps["drop_reason"] == 0
-    if len(t) < 2:
-        return
-    step = 1e3 * np.diff(t)
-    axes.plot(t[1:][kept[1:]], step[kept[1:]], ".", ms=4, color="black", label="kept")
-    axes.plot(t[1:][~kept[1:]], step[~kept[1:]], "x", ms=4, color=_DROPPED, label="dropped")
-    axes.set_ylabel("gap to the row before [ms]")
-    axes.legend(fontsize=7, loc="upper right")
-
-
-def _top_view(axes: Axes, caps: Group) -> None:
-    kept = caps["drop_reason"] == 0
-    p_WE = caps["p_WE"][kept]
-    if not len(p_WE):
-        return
-    path = p_WE.mean(axis=1)
-    axes.plot(path[:, 0], path[:, 1], color="black", lw=1.2, label="mean of the caps")
-    for frame, alpha in ((0, 0.35), (-1, 1.0)):
-        for rod in range(p_WE.shape[1] // 2):
-            ends = p_WE[frame, 2 * rod : 2 * rod + 2]
-            axes.plot(ends[:, 0], ends[:, 1], "o-", color=ROD_COLORS[rod % len(ROD_COLORS)], lw=3, ms=9, alpha=alpha)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set(xlabel="x [m]", ylabel="y [m]", title="from above: first frame (pale) and last")
-    axes.legend(fontsize=7)
+def stated(nature: str) -> str:
+    """The nature of a run as a title says it."""
+    return "nature not stated" if nature in ("", "not stated") else nature
 
 
 def import_rows(report: ImportReport) -> list[tuple[str, str]]:
@@ -131,7 +78,7 @@ def _frame_rows(report: ImportReport) -> Iterator[tuple[str, str]]:
         longest = max(report.gaps, key=lambda gap: gap.length_s)
         yield "gaps", f"{len(report.gaps)}, the longest {longest.length_s:.2f} s after {longest.after_s:.2f} s"
     complete = f"{report.intervals} ({report.intervals_complete} complete)"
-    yield "target intervals", f"{complete}, {report.segments} segments"
+    yield "target intervals", f"{complete}, {counted(report.segments, 'segment')}"
 
 
 def _geometry_rows(report: ImportReport) -> Iterator[tuple[str, str]]:
@@ -163,8 +110,6 @@ def _stream_rows(report: ImportReport) -> Iterator[tuple[str, str]]:
 
 def recording_page(reports: ImportReports, pictures: Mapping[str, bytes]) -> bytes:
     """The HTML page of an import: its report and its pictures."""
-    from r2s2r_cli.views.page import Page, PageTable, Picture, render
-
     frames = sum(report.kept for report in reports.runs)
     intervals = sum(report.intervals for report in reports.runs)
     warnings = [f"{report.run}: {text}" for report in reports.runs for text in report.warnings]
@@ -173,8 +118,8 @@ def recording_page(reports: ImportReports, pictures: Mapping[str, bytes]) -> byt
     return render(
         Page(
             title="Import",
-            sentence=f"{len(reports.runs)} run{'s' * (len(reports.runs) > 1)} with {frames} kept frames in "
-            f"{intervals} target intervals.",
+            sentence=f"{counted(len(reports.runs), 'run')} with {counted(frames, 'kept frame')} in "
+            f"{counted(intervals, 'target interval')}.",
             labels=[*samples, *warnings],
             tables=[PageTable(f"run {r.run}: {r.source}", ["what", "found"], import_rows(r)) for r in reports.runs],
             pictures=[Picture(f"run {run}", png) for run, png in pictures.items()],

@@ -1,0 +1,91 @@
+"""Sensors, motors, inertial units and the path of a camera over time, each where the run has it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.views.figure import draw_bands, legend_beside
+
+if TYPE_CHECKING:
+    from matplotlib.figure import SubFigure
+
+_PANEL_HEIGHT = 2.1
+"""[inches]"""
+_COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#e69f00")
+"""Okabe and Ito's, which colour-blind people can tell apart; from the seventh line on dashed."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One diagram over time: lines with their names."""
+
+    title: str
+    t: Sequence[np.ndarray]
+    """Times of each line [s]."""
+    lines: Sequence[np.ndarray]
+    names: Sequence[str]
+
+
+def panels(data: ArtifactData, run: str) -> list[Panel]:
+    """What can be drawn of a run beside its end caps, commands and images."""
+    return list(_panels(data, run))
+
+
+def streams_height(drawn: Sequence[Panel]) -> float:
+    """[inches]"""
+    return _PANEL_HEIGHT * len(drawn) + 0.3
+
+
+def draw_streams(figure: SubFigure, drawn: Sequence[Panel], intervals: Group | None) -> None:
+    """Draws the panels into `figure`, one above the other."""
+    for axes, panel in zip(figure.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0], drawn, strict=True):
+        draw_bands(axes, intervals)
+        for i, (t, line, name) in enumerate(zip(panel.t, panel.lines, panel.names, strict=True)):
+            style = ("-", "--", ":")[i // len(_COLORS) % 3]
+            axes.plot(t, line, style, marker=".", ms=3, lw=1, color=_COLORS[i % len(_COLORS)], label=name)
+        axes.set_ylabel(panel.title, fontsize=9)
+        legend_beside(axes, ncol=1 + (len(panel.lines) > 9))
+    axes.set_xlabel("time [s]")
+
+
+def _panels(data: ArtifactData, run: str) -> Iterator[Panel]:
+    motors = data.group(run, "motors")
+    if motors is not None:
+        for name, title, scale in (
+            ("position", "cable position\nseen by the controller", 1.0),
+            ("speed", "speed command,\n+1 reels in", 1.0),
+            ("encoder_length", "encoder length [mm]", 1e3),
+        ):
+            if name in motors:
+                yield from _columns(motors["t"], scale * motors[name], title, "motor")
+    sensors = data.group(run, "sensors")
+    if sensors is not None:
+        for name, title, scale in (
+            ("length", "sensor length [mm]\n(source's calibration)", 1e3), ("capacitance", "capacitance [pF]", 1e12),
+        ):  # fmt: skip
+            if name in sensors:
+                yield from _columns(sensors["t"], scale * sensors[name], title, "sensor")
+    imu = data.group(run, "imu")
+    if imu is not None:
+        boards = sorted(set(imu["board"].tolist()))
+        rows = [imu["board"] == board for board in boards]
+        size = np.linalg.norm(imu["a_B"], axis=1)
+        names = [f"board {board}" for board in boards]
+        yield Panel("specific force [m/s²]", [imu["t"][r] for r in rows], [size[r] for r in rows], names)
+    mocap = data.group(run, "mocap")
+    if mocap is not None:
+        yield from _columns(mocap["t"], 1e3 * mocap["p_ME"][:, :, 2], "motion capture,\nheight [mm]", "cap")
+    pose = data.group(run, "camera_pose")
+    if pose is not None:
+        yield Panel("camera position [m]", [pose["t"]] * 3, list(pose["p_WC"].T), ["x", "y", "z"])
+
+
+def _columns(t: np.ndarray, values: np.ndarray, title: str, what: str) -> Iterator[Panel]:
+    """One panel of the columns of `values` (row, column); none where nothing was received."""
+    if np.isfinite(values).any():
+        yield Panel(title, [t] * values.shape[1], list(values.T), [f"{what} {i}" for i in range(values.shape[1])])

@@ -15,7 +15,7 @@ class ImportSettings(Frozen):
 
     model_config = ConfigDict(use_attribute_docstrings=True)
 
-    rod_length_tolerance: Annotated[float, Field(gt=0, lt=0.5)] = 0.05
+    rod_length_tolerance: Annotated[float, Field(strict=True, gt=0, lt=0.5)] = 0.05
     """Largest relative departure of the fitted rod length from robot.toml; beyond it is another robot or unit."""
 
 
@@ -24,7 +24,7 @@ class CalibrateSettings(Frozen):
 
     model_config = ConfigDict(use_attribute_docstrings=True)
 
-    swap_threshold_m: Annotated[float, Field(gt=0)] = 0.05
+    swap_threshold_m: Annotated[float, Field(strict=True, gt=0, le=1)] = 0.05
     """A recalibration that moves a length by more than this is reported as a swapped sensor."""
 
 

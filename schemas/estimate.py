@@ -13,29 +13,33 @@ from schemas.segments import INTERVALS, SEGMENTS
 
 
 class EstimateSettings(Frozen):
-    """Settings of `estimate`. The reasons and the figures behind the defaults: docs/concepts/estimate.md."""
+    """Settings of `estimate`. The reasons and the figures behind the defaults: docs/concepts/estimate.md.
 
-    switch_kick_m_per_s: Annotated[float, Field(ge=0, le=1)] = Field(
+    Upper bounds are what stops being the quantity: a clearance of a whole cap radius (0.1 m: of a 2 m robot) calls every
+    low cap a contact, 2 m/s is faster than any cable reels, and over gaps of 10 s a robot takes several steps.
+    """
+
+    switch_kick_m_per_s: Annotated[float, Field(strict=True, ge=0, le=1)] = Field(
         default=0.02,
         description="sudden change of a cap's velocity when a motor is switched, sd per axis [m/s]; a third of a cable's speed",
     )
-    gate_probability: Annotated[float, Field(gt=0, lt=0.5)] = Field(
+    gate_probability: Annotated[float, Field(strict=True, gt=0, lt=0.5)] = Field(
         default=1e-4,
         description="false alarm of one test for an outlier or jump; a run has about 1,000 tests, so 1 in 10 runs shows one",
     )
-    contact_clearance_m: Annotated[float, Field(gt=0)] = Field(
+    contact_clearance_m: Annotated[float, Field(strict=True, gt=0, le=0.1)] = Field(
         default=0.003,
         description="a cap lower than this above the ground counts as touching [m]; twice the usual noise",
     )
-    contact_lift_m_per_s: Annotated[float, Field(gt=0)] = Field(
+    contact_lift_m_per_s: Annotated[float, Field(strict=True, gt=0, le=2)] = Field(
         default=0.03,
         description="a cap that rises or falls faster than this is not in contact [m/s]; half a cable's speed",
     )
-    sensor_gap_s: Annotated[float, Field(gt=0)] = Field(
+    sensor_gap_s: Annotated[float, Field(strict=True, gt=0, le=10)] = Field(
         default=0.25,
         description="sensor lengths are interpolated over gaps up to this long [s]; beyond they are missing",
     )
-    rod_length_tolerance: Annotated[float, Field(gt=0, lt=0.5)] = Field(
+    rod_length_tolerance: Annotated[float, Field(strict=True, gt=0, lt=0.5)] = Field(
         default=0.05,
         description="largest relative departure of the seen rod length from robot.toml; beyond: another robot",
     )

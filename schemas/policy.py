@@ -7,17 +7,19 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from schemas.base import ArtifactSpec, AttributeSpec, Frozen, GroupSpec, column
+from schemas.typed import Duration, Fraction, Wait
 
-Position = Annotated[float, Field(ge=0, le=1)]
+REPEAT_MAX = 100_000
+"""A step takes seconds: ten thousand repeats of ten steps are a week."""
 
 
 class PolicyStep(Frozen):
     """One target shape, held until every cable is done (event-based), then for `hold_s`."""
 
-    target: tuple[Position, ...] = Field(min_length=1)
+    target: tuple[Fraction, ...] = Field(min_length=1)
     """Position of each actuated cable: 0 short, 1 long."""
-    hold_s: Annotated[float, Field(ge=0)] = 0.0
-    timeout_s: Annotated[float, Field(gt=0)] | None = None
+    hold_s: Duration = 0.0
+    timeout_s: Wait | None = None
     """Go on after this time although a cable is not done; default: `pid.step_timeout_s` of the robot."""
 
 
@@ -28,7 +30,7 @@ class PolicyFile(Frozen):
     robot: str
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][\w.+-]*$")]
     description: str = ""
-    repeat: Annotated[int, Field(ge=1)] = 1
+    repeat: Annotated[int, Field(strict=True, ge=1, le=REPEAT_MAX)] = 1
     """How often the whole sequence is run."""
     steps: tuple[PolicyStep, ...] = Field(min_length=1)
 

@@ -10,10 +10,29 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from schemas.base import Frozen
+from schemas.typed import (
+    Capacitance,
+    CapacitanceSlope,
+    Coordinate,
+    Flag,
+    Fraction,
+    Length,
+    Mass,
+    NonNegative,
+    Number,
+    Positive,
+    Radius,
+    Share,
+    Size,
+    Tolerance,
+    Wait,
+    Whole,
+)
 
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
-Vector3 = tuple[float, float, float]
+Vector3 = tuple[Coordinate, Coordinate, Coordinate]
+Index = Annotated[int, Field(strict=True, ge=0)]
+Hue = Annotated[float, Field(strict=True, ge=0, le=180)]
+Channel = Annotated[float, Field(strict=True, ge=0, le=255)]
 ROBOT_SCHEMA_VERSION = 1
 
 
@@ -21,37 +40,46 @@ class Lump(Frozen):
     """A part of a rod, counted as a solid of its own around the rod's axis."""
 
     name: str
-    mass_kg: Positive
-    offset_m: float
+    mass_kg: Mass
+    offset_m: Coordinate
     """Centre along the rod from the middle between the caps; positive towards the odd cap."""
     shape: Literal["point", "sphere", "cylinder", "tube"]
-    radius_m: NonNegative = 0.0
-    length_m: NonNegative = 0.0
-    inner_radius_m: NonNegative = 0.0
+    radius_m: Size = 0.0
+    length_m: Size = 0.0
+    inner_radius_m: Size = 0.0
 
 
 class Rod(Frozen):
     """A rigid rod with two spherical end caps, numbered 2 i (offset -length/2) and 2 i + 1 (+length/2)."""
 
     name: str
-    length_m: Positive
+    length_m: Length
     """Cap centre to cap centre."""
-    radius_m: Positive
-    cap_radius_m: Positive
+    radius_m: Radius
+    cap_radius_m: Radius
     parts: tuple[Lump, ...] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if max(self.radius_m, self.cap_radius_m) >= self.length_m / 2:
+            raise ValueError(
+                f"rod {self.name}: radius_m and cap_radius_m must be below half of length_m ({self.length_m / 2:g} m), "
+                "else its two caps overlap"
+            )
+        return self
 
 
 class Cable(Frozen):
     """A cable between two end caps. Index = position in the list."""
 
-    caps: tuple[int, int]
+    caps: tuple[Whole, Whole]
     kind: Literal["actuated", "passive"]
     stiffness_n_per_m: Positive
     damping_n_s_per_m: NonNegative
-    stiffness2_n_per_m2: float = 0.0
-    stiffness3_n_per_m3: float = 0.0
+    stiffness2_n_per_m2: Number = 0.0
+    stiffness3_n_per_m3: Number = 0.0
     """Force [N] = stiffness x + stiffness2 x^2 + stiffness3 x^3, x the stretch beyond the rest length [m]."""
-    rest_length_m: Positive | None = None
+    rest_length_m: Length | None = None
     """Passive cables only: an actuated cable's rest length is set by its winch."""
     sites_m: tuple[Vector3, Vector3]
     """Attachment points in the rod frame R of each cap's rod (origin in the middle, z towards the odd cap)."""
@@ -68,11 +96,11 @@ class Cable(Frozen):
 class Motor(Frozen):
     """The winch of one actuated cable."""
 
-    cable: int = Field(ge=0)
+    cable: Index
     no_load_rad_per_s: Positive
-    speed: Annotated[float, Field(gt=0, le=1)]
+    speed: Share
     """Fraction of the no-load speed at full command (the paper's motor speed)."""
-    winch_radius_m: Positive
+    winch_radius_m: Radius
     board: str = ""
     sign: Literal[-1, 1] = 1
     """Sign of the wire command that reels in."""
@@ -81,13 +109,13 @@ class Motor(Frozen):
 class Sensor(Frozen):
     """A capacitive stretch sensor: capacitance [F] = slope length + offset."""
 
-    cable: int = Field(ge=0)
-    slope_f_per_m: float | None = None
-    offset_f: float | None = None
+    cable: Index
+    slope_f_per_m: CapacitanceSlope | None = None
+    offset_f: Capacitance | None = None
     """None: not calibrated."""
     stiffness_n_per_m: NonNegative = 0.0
     """Of the sensor tendon that runs parallel to an actuated cable; 0 where the cable itself is the sensor."""
-    rest_length_m: Positive | None = None
+    rest_length_m: Length | None = None
     """Below it the sensor tendon is slack; needed where its stiffness is above 0."""
 
     @model_validator(mode="after")
@@ -103,35 +131,35 @@ class Pid(Frozen):
     p: NonNegative
     i: NonNegative
     d: NonNegative
-    tolerance: Positive
-    min_length_m: Positive
-    range_m: Positive
+    tolerance: Tolerance
+    min_length_m: Length
+    range_m: Length
     rate_hz: Positive
-    step_timeout_s: Positive
+    step_timeout_s: Wait
 
 
 class Limits(Frozen):
     """What a healthy robot never leaves; `validate` and the host's safety checks use it."""
 
-    cable_length_min_m: Positive
-    cable_length_max_m: Positive
-    cap_height_max_m: Positive
+    cable_length_min_m: Length
+    cable_length_max_m: Length
+    cap_height_max_m: Length
 
 
 class Contact(Frozen):
     """Prior of the ground contact, before identification."""
 
     friction: NonNegative
-    restitution: Annotated[float, Field(ge=0, le=1)]
+    restitution: Fraction
 
 
 class HsvRange(Frozen):
     """Colour range of one rod; hue 0..180 as in 8-bit OpenCV, low > high wraps round red."""
 
     rod: str
-    hue: tuple[float, float]
-    saturation_min: NonNegative
-    value_min: NonNegative
+    hue: tuple[Hue, Hue]
+    saturation_min: Channel
+    value_min: Channel
 
 
 class Robot(Frozen):
@@ -140,7 +168,7 @@ class Robot(Frozen):
     schema_version: Literal[1]
     name: str
     title: str
-    illustrative: bool = False
+    illustrative: Flag = False
     """True: a made-up robot, not one that was measured."""
     attachment: Literal["surface", "rod_end"]
     rods: tuple[Rod, ...] = Field(min_length=1)
@@ -169,6 +197,10 @@ class Robot(Frozen):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        rods = [rod.name for rod in self.rods]
+        for i, name in enumerate(rods):
+            if name in rods[:i]:
+                raise ValueError(f"rods.{i}.name: two rods have the name {name}")
         for i, cable in enumerate(self.cables):
             for cap in cable.caps:
                 if not 0 <= cap < self.n_caps:
@@ -179,6 +211,13 @@ class Robot(Frozen):
         for i, sensor in enumerate(self.sensors):
             if sensor.cable >= len(self.cables):
                 raise ValueError(f"sensors.{i}.cable: cable {sensor.cable} does not exist")
+            if sensor.cable in (other.cable for other in self.sensors[:i]):
+                raise ValueError(f"sensors.{i}.cable: cable {sensor.cable} has two sensors")
+        for i, color in enumerate(self.colors):
+            if color.rod not in rods:
+                raise ValueError(f"colors.{i}.rod: there is no rod {color.rod}, the rods are {', '.join(rods)}")
+            if color.rod in (other.rod for other in self.colors[:i]):
+                raise ValueError(f"colors.{i}.rod: rod {color.rod} has two colours")
         if len(self.rest_caps_m) != self.n_caps:
             raise ValueError(f"rest_caps_m: one point per end cap ({self.n_caps}), received {len(self.rest_caps_m)}")
         if self.limits.cable_length_min_m >= self.limits.cable_length_max_m:

@@ -30,8 +30,8 @@ CHECKS: tuple[Check, ...] = (
     geometry.counts_match_robot, geometry.kept_frames_observed, geometry.rod_length_is_the_robots,
     geometry.rods_keep_their_length, geometry.cable_lengths_in_limits, geometry.caps_above_ground,
     geometry.caps_below_ceiling, geometry.caps_move_like_a_robot,
-    control.targets_in_range, control.controls_in_range, control.positions_plausible, control.targets_constant,
-    control.intervals_enough,
+    control.targets_in_range, control.controls_in_range, control.controls_shorten_cables, control.positions_plausible,
+    control.targets_constant, control.intervals_enough,
     spans.spans_ordered, spans.spans_inside_frames, spans.span_stamps_match, spans.segments_in_their_interval,
     spans.directions_known,
     sensors.sensor_chip_initialised, sensors.capacitance_in_farads, sensors.sensors_move, sensors.sensors_received,
@@ -48,8 +48,10 @@ CHECKS: tuple[Check, ...] = (
     calibrations.tendons_rise, calibrations.masses_make_a_rod, calibrations.history_is_sound,
     policies.policy_robot_known, policies.policy_fits_cables, policies.policy_targets_in_range,
     policies.policy_times_sensible, policies.policy_steps_differ,
-    robots.rest_pose_fits_rods, robots.rest_pose_on_ground, robots.sites_on_their_caps, robots.pid_range_in_limits,
-    robots.sensors_are_calibrated, robots.robot_was_measured,
+    robots.rest_pose_fits_rods, robots.rest_pose_on_ground, robots.sites_on_their_caps, robots.cables_join_other_caps,
+    robots.rod_masses_plausible, robots.parts_on_their_rod, robots.winches_plausible, robots.rest_lengths_in_limits,
+    robots.pid_range_in_limits, robots.sensors_are_calibrated, robots.sensor_lines_plausible,
+    robots.robot_was_measured,
 )  # fmt: skip
 
 FAMILIES: dict[str, str] = {

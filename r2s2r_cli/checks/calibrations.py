@@ -11,7 +11,8 @@ from r2s2r_cli.checks.base import Found, beyond, check, number, worst
 from r2s2r_cli.checks.subjects import Content
 
 RMS_MAX_M = 0.004
-"""Straight lines through real calibrations leave 1.2-3.9 mm rms (reference/robot.md); above that a point is wrong."""
+"""Straight lines through real calibrations leave 1.2-3.9 mm rms (the points that ChemStud24/tensegrity
+publishes, fitted by `calibrate`); above that a point is wrong."""
 GOOD = 0
 """Code of `state` for a line that can be used."""
 _KINDS = ("calibration",)
@@ -71,7 +72,7 @@ def sensors_are_alive(content: Content) -> Iterator[Found]:
     kinds=_KINDS,
     what="the line of every sensor fits its points within 4 mm rms",
     why="real sensors fit within 1.2 to 3.9 mm; beyond that a point was misread or the sensor slips",
-    fix="look at the point with the largest residual in calibration.png, and measure it again",
+    fix="look at the point with the largest residual in calibration-sensors-SET.png, and measure it again",
 )
 def residuals_are_small(content: Content) -> Iterator[Found]:
     """Lines that do not fit."""
@@ -83,7 +84,8 @@ def residuals_are_small(content: Content) -> Iterator[Found]:
         if (high > 0).any():
             yield Found("lines/rms", f"a line of set {name} does not fit its points",
                         f"at most {number(RMS_MAX_M, 1e3)} mm rms",
-                        worst(rms[row], high, ("sensor",), scale=1e3, unit="mm"))  # fmt: skip
+                        worst(rms[row], high, ("sensor",), scale=1e3, unit="mm"),
+                        f"look at its largest residual in calibration-sensors-{name}.png, and measure that point again")  # fmt: skip
 
 
 @check(
@@ -92,7 +94,7 @@ def residuals_are_small(content: Content) -> Iterator[Found]:
     kinds=_KINDS,
     what="every tendon curve rises on its measured range",
     why="where the force falls with the stretch, the tendon snaps through and the simulator with it",
-    fix="look at the named curve in calibration.png: a wrong point, or too few points for a third-order polynomial",
+    fix="look at the named curve in calibration-tendons.png: a wrong point, or too few points for a cubic",
 )
 def tendons_rise(content: Content) -> Iterator[Found]:
     """Curves with a slope below 0."""

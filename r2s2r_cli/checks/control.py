@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from r2s2r_cli.checks.base import Found, beyond, check, worst
+from r2s2r_cli.checks.base import Found, beyond, check, number, worst
 from r2s2r_cli.checks.subjects import Run
+from r2s2r_cli.control_sign import WRONG_SIGN, cable_response
 
 ROUNDING = 1e-6
 """Of a logged position or control."""
@@ -52,6 +53,28 @@ def controls_in_range(run: Run) -> Iterator[Found]:
             if (outside > 0).any():
                 yield Found(run.at(stream, name), "a motor command is out of range", "-1 .. +1 (reels in)",
                             worst(control, outside, ("row", "cable")))  # fmt: skip
+
+
+@check(
+    "warning",
+    Run,
+    kinds=("recording", "estimate"),
+    what="motor commands above 0 shorten their cables",
+    why="+1 reels in; with all signs exchanged a replay runs the gait backwards, and identification learns nonsense",
+    fix="negate the control columns of the source, then r2s2r import it again",
+)
+def controls_shorten_cables(run: Run) -> Iterator[Found]:
+    """Commands and cap distances that clearly go against each other over the whole run."""
+    t_control, control, caps = run.array("commands", "t"), run.array("commands", "control"), run.p_WE
+    robot, stamps = run.robot, run.stamps
+    if t_control is None or control is None or caps is None or stamps is None or robot is None:
+        return
+    ends = np.array([robot.cables[k].caps for k in robot.actuated], dtype=int).reshape(-1, 2)
+    length = np.linalg.norm(caps[1][:, ends[:, 0]] - caps[1][:, ends[:, 1]], axis=-1)
+    response = cable_response(stamps[1], length, t_control, control)
+    if response < WRONG_SIGN:
+        yield Found(run.at("commands", "control"), "the commands have the wrong sign: they lengthen their cables",
+                    "a positive correlation of command and shortening (+1 reels in)", number(response))  # fmt: skip
 
 
 @check(

@@ -13,6 +13,17 @@ REST_TOLERANCE_M = 0.005
 """A rest pose measured with a rule; simulation starts from it and pulls the rods to their length."""
 SITE_FACTOR = 1.5
 """Cables are tied to the surface of a cap or in it; a knot or ring may stand out by half a radius."""
+MASS_PER_CUBE = 250.0
+"""A rod of solid steel and a tenth as thick as long has 246 kg over the cube of its length in metres; the rods of the
+3-bar robot have 4. Relative to the length, so that it holds for a robot of any size."""
+BEYOND_TIP = 1.1
+"""A part may stand out beyond the tip of its rod's cap by a tenth, as `calibrate` lets pass."""
+WINCH_SHARE = 0.1
+"""A winch is a hundredth of the length of a rod in radius; a tenth is centimetres for millimetres."""
+TRAVEL_MIN_S = 0.2
+"""Shortest time over a cable's whole range. The 3-bar robot takes 1.6 s; with its speed in rpm it would take 0.16 s."""
+CAPACITANCE_F = (0.1e-12, 1e-9)
+"""Stretch sensors have 10-40 pF; outside this over the cable's limits, slope or offset has another unit."""
 
 
 @check(
@@ -69,10 +80,110 @@ def sites_on_their_caps(robot: Robot) -> Iterator[Found]:
             rod = robot.rods[cap // 2]
             centre = np.array([0.0, 0.0, rod.length_m / 2 * (1 if cap % 2 else -1)])
             distance = float(np.linalg.norm(np.array(site) - centre))
+            other = float(np.linalg.norm(np.array(site) + centre))
             if distance > SITE_FACTOR * rod.cap_radius_m:
                 yield Found(f"cables.{i}.sites_m.{end}", f"cable {i} is attached away from cap {cap}",
                             f"at most {number(SITE_FACTOR * rod.cap_radius_m, 1e3)} mm from its centre",
-                            f"{number(distance, 1e3)} mm")  # fmt: skip
+                            f"{number(distance, 1e3)} mm" + _slip(distance, other, rod.length_m))  # fmt: skip
+
+
+def _slip(own: float, other: float, rod: float) -> str:
+    """What a wrong attachment point probably is; own, other: distance from its cap and the rod's other one [m]."""
+    if own > 2 * rod:
+        return ", which looks like another unit than metres"
+    return ", nearer to the other cap of the rod" if other < own else ""
+
+
+@check(
+    "warning",
+    Robot,
+    what="no two cables join the same two end caps",
+    why="two tendons can run in parallel, but usually one of the two has a wrong cap number and another edge no cable",
+    fix="correct caps of one of the two in {file}, if they are not parallel on purpose",
+)
+def cables_join_other_caps(robot: Robot) -> Iterator[Found]:
+    """Two cables between the same caps, in either order."""
+    seen: dict[frozenset[int], int] = {}
+    for i, cable in enumerate(robot.cables):
+        first = seen.setdefault(frozenset(cable.caps), i)
+        if first != i:
+            a, b = sorted(cable.caps)
+            yield Found(f"cables.{i}.caps", f"cables {first} and {i} join the same end caps", "a pair of caps for each",
+                        f"caps {a} and {b} twice")  # fmt: skip
+
+
+@check(
+    "warning",
+    Robot,
+    what="no rod is heavier than one of solid steel that is a tenth as thick as long",
+    why="grams typed for kilograms make every force a thousand times too small to move the robot",
+    fix="give mass_kg of its parts in kilograms in {file}",
+)
+def rod_masses_plausible(robot: Robot) -> Iterator[Found]:
+    """Rods too heavy for their length."""
+    for i, rod in enumerate(robot.rods):
+        mass, most = sum(part.mass_kg for part in rod.parts), MASS_PER_CUBE * rod.length_m**3
+        if mass > most:
+            j = int(np.argmax([part.mass_kg for part in rod.parts]))
+            heaviest = f"{rod.parts[j].name} {number(rod.parts[j].mass_kg)} kg"
+            yield Found(f"rods.{i}.parts.{j}.mass_kg", f"rod {i} ({rod.name}) is too heavy for its length: grams?",
+                        f"at most {number(most)} kg for {number(rod.length_m, 1e3)} mm",
+                        f"{number(mass)} kg, of which {heaviest}")  # fmt: skip
+
+
+@check(
+    "warning",
+    Robot,
+    what="the parts of a rod lie on it",
+    why="a part far out dominates the moment of inertia, and is usually in millimetres",
+    fix="give offset_m, length_m and radius_m of the part in metres in {file}",
+)
+def parts_on_their_rod(robot: Robot) -> Iterator[Found]:
+    """Parts beyond the tips of their rod, or wider than it is long."""
+    for i, rod in enumerate(robot.rods):
+        tip = BEYOND_TIP * (rod.length_m / 2 + rod.cap_radius_m)
+        for j, part in enumerate(rod.parts):
+            reach = max(abs(part.offset_m) + part.length_m / 2, part.radius_m)
+            if reach > tip:
+                yield Found(f"rods.{i}.parts.{j}", f"part {part.name} does not lie on rod {i} ({rod.name})",
+                            f"within {number(tip, 1e3)} mm of its middle", f"{number(reach, 1e3)} mm")  # fmt: skip
+
+
+@check(
+    "warning",
+    Robot,
+    what="winches are thinner than a tenth of the shortest rod is long, and need 0.2 s or more over a cable's range",
+    why="radius and speed of the winch set the speed of every simulated cable; rpm or centimetres make it ten times",
+    fix="give winch_radius_m in metres and no_load_rad_per_s in rad/s (rpm / 9.55) in {file}",
+)
+def winches_plausible(robot: Robot) -> Iterator[Found]:
+    """Winches of another robot, or of another unit."""
+    most = WINCH_SHARE * min(rod.length_m for rod in robot.rods)
+    for i, motor in enumerate(robot.motors):
+        travel = robot.pid.range_m / (motor.no_load_rad_per_s * motor.speed * motor.winch_radius_m)
+        if motor.winch_radius_m > most:
+            yield Found(f"motors.{i}.winch_radius_m", f"the winch of cable {motor.cable} is too thick for this robot",
+                        f"at most {number(most, 1e3)} mm", f"{number(motor.winch_radius_m, 1e3)} mm")  # fmt: skip
+        elif travel < TRAVEL_MIN_S:
+            yield Found(f"motors.{i}.no_load_rad_per_s", f"the winch of cable {motor.cable} is too fast: rpm?",
+                        f"{number(TRAVEL_MIN_S)} s or more from position 0 to 1", f"{number(travel)} s")  # fmt: skip
+
+
+@check(
+    "warning",
+    Robot,
+    what="the rest lengths of passive cables and of sensor tendons are below the longest cable of the limits",
+    why="a tendon longer than its cable ever gets never pulls; usually its length has another unit",
+    fix="correct rest_length_m in {file}, in metres",
+)
+def rest_lengths_in_limits(robot: Robot) -> Iterator[Found]:
+    """Tendons that are always slack."""
+    most = robot.limits.cable_length_max_m
+    for table, entries in (("cables", robot.cables), ("sensors", robot.sensors)):
+        for i, entry in enumerate(entries):
+            if entry.rest_length_m is not None and entry.rest_length_m >= most:
+                yield Found(f"{table}.{i}.rest_length_m", f"the tendon of {table[:-1]} {i} is always slack",
+                            f"below {number(most, 1e3)} mm", f"{number(entry.rest_length_m, 1e3)} mm")  # fmt: skip
 
 
 @check(
@@ -105,6 +216,30 @@ def sensors_are_calibrated(robot: Robot) -> Iterator[Found]:
     if missing:
         yield Found("sensors", "sensors are not calibrated", "slope_f_per_m and offset_f of every sensor",
                     f"none for sensor {', '.join(map(str, missing))}")  # fmt: skip
+
+
+@check(
+    "warning",
+    Robot,
+    what="the line of every sensor rises, and gives 0.1 pF to 1000 pF over the lengths of the limits",
+    why="slope or offset in pF reads every length wrong by many orders of magnitude",
+    fix="r2s2r calibrate writes both in farads; by hand: 1 pF = 1e-12 F, 1 pF/mm = 1e-9 F/m",
+)
+def sensor_lines_plausible(robot: Robot) -> Iterator[Found]:
+    """Lines of another unit, and lines that fall."""
+    low, high = CAPACITANCE_F
+    for i, sensor in enumerate(robot.sensors):
+        if sensor.slope_f_per_m is None or sensor.offset_f is None:
+            continue
+        lengths = (robot.limits.cable_length_min_m, robot.limits.cable_length_max_m)
+        least, most = (sensor.slope_f_per_m * length + sensor.offset_f for length in lengths)
+        if sensor.slope_f_per_m <= 0:
+            yield Found(f"sensors.{i}.slope_f_per_m", f"the line of sensor {i} does not rise", "above 0 F/m",
+                        f"{number(sensor.slope_f_per_m)} F/m")  # fmt: skip
+        elif least < low or most > high:
+            yield Found(f"sensors.{i}", f"sensor {i} has a capacitance of another unit",
+                        f"{number(low, 1e12)} .. {number(high, 1e12)} pF from the shortest to the longest cable",
+                        f"{number(least, 1e12)} .. {number(most, 1e12)} pF")  # fmt: skip
 
 
 @check(

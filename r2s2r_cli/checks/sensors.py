@@ -10,7 +10,8 @@ from r2s2r_cli.checks.base import Found, beyond, check, number, worst
 from r2s2r_cli.checks.subjects import Run
 
 UNINITIALISED_F = 0.20e-12
-"""What the firmware sends while its sensor chip is not initialised: exactly 0.20 pF (reference/robot.md section 3)."""
+"""What the firmware sends while its sensor chip is not initialised: exactly 0.20 pF (firmware of
+ChemStud24/tensegrity)."""
 _EXACT_F = 1e-18
 """Rounding of 0.20 pF read as text and scaled."""
 CAPACITANCE_F = (0.1e-12, 1e-9)

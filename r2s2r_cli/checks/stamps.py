@@ -10,7 +10,7 @@ from r2s2r_cli.checks.base import Found, check, number
 from r2s2r_cli.checks.subjects import Run
 
 MIN_GAP_S = 0.020
-"""Two frames closer than this are one observation stamped twice (design.md, Measures)."""
+"""Two frames closer than this are one observation stamped twice (docs/guides/import.md)."""
 ROUNDING_S = 1e-6
 """Logs round stamps to milliseconds: 0.020 must not fall below 20 ms by binary rounding."""
 _SAMPLED = (("commands", "t"), ("sensors", "t"), ("motors", "t"), ("camera", "t"), ("camera", "t_depth"),

@@ -14,7 +14,8 @@ from schemas.config import ProjectFile, RunConfig
 from schemas.header import Provenance
 from schemas.policy import PolicyFile
 from schemas.robot import Robot
-from schemas.sidecar import MINIMAL_SIDECAR, Sidecar
+from schemas.sidecar import MINIMAL_SIDECAR, PLACEHOLDER, Sidecar
+from tests.checks.cases_robots import scaled
 from tests.support.builders import provenance
 
 THREEBAR = tomllib.loads(robot_toml("threebar"))
@@ -99,9 +100,81 @@ def test_settings_all_have_defaults_and_refuse_what_is_unknown() -> None:
         ProjectFile.model_validate({"schema_version": 1})
 
 
-def test_the_minimal_sidecar_is_one() -> None:
-    """What `import` shows to a user whose log has none can be used as it is."""
-    assert Sidecar.model_validate(tomllib.loads(MINIMAL_SIDECAR)).robot == "threebar"
+def test_the_minimal_sidecar_is_one_once_its_source_is_true() -> None:
+    """What `import` shows to a user whose log has none is refused as it is, and taken with another source."""
+    with pytest.raises(ValidationError, match="true source"):
+        Sidecar.model_validate(tomllib.loads(MINIMAL_SIDECAR))
+    filled = MINIMAL_SIDECAR.replace(PLACEHOLDER, "tribar, 2023-02-21, crawl")
+    assert Sidecar.model_validate(tomllib.loads(filled)).robot == "threebar"
+
+
+@pytest.mark.parametrize("factor", [0.15, 3.0, 15.4])
+def test_robots_of_other_sizes_are_taken(factor: float) -> None:
+    """The bounds catch units, not sizes: the 3-bar robot with rods of 5 cm, 1 m and 5 m is a robot."""
+    assert scaled(factor).rods[0].length_m == pytest.approx(0.325 * factor)
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "message"),
+    [
+        ("rods.0.length_m", 325, "looks like millimetres"),
+        ("motors.0.winch_radius_m", 3.5, "looks like millimetres"),
+        ("rods.0.parts.0.mass_kg", 1050, "looks like grams"),
+        ("rods.0.parts.0.offset_m", -162.5, "looks like millimetres"),
+        ("cables.8.rest_length_m", 165, "looks like millimetres"),
+        ("cables.0.sites_m.0.2", 162.5, "looks like millimetres"),
+        ("pid.tolerance", 12, "looks like per cent"),
+        ("pid.step_timeout_s", 6000, "looks like milliseconds"),
+        ("limits.cable_length_max_m", 350.0, "looks like millimetres"),
+        ("sensors.0.slope_f_per_m", 0.0272, "looks like pF/mm"),
+        ("sensors.0.offset_f", 12.5, "looks like pF"),
+        ("rods.0.cap_radius_m", 0.1625, "overlap"),
+        ("colors.0.hue", [0, 360], "less than or equal to 180"),
+        ("colors.0.hue", [-5, 10], "greater than or equal to 0"),
+        ("colors.0.value_min", 256, "less than or equal to 255"),
+        ("colors.0.rod", "yellow", "there is no rod yellow, the rods are red, green, blue"),
+        ("colors.1.rod", "red", "two colours"),
+        ("rods.1.name", "red", "two rods have the name red"),
+        ("sensors.1.cable", 0, "two sensors"),
+        ("rods.0.length_m", "0.325", "valid number"),
+        ("rods.0.length_m", True, "valid number"),
+        ("cables.0.caps.0", "3", "valid integer"),
+        ("rest_caps_m.0.0", "0.1", "valid number"),
+        ("pid.p", "6", "valid number"),
+        ("illustrative", "no", "valid boolean"),
+    ],
+)
+def test_slips_of_unit_name_and_type_are_refused(place: str, value: Any, message: str) -> None:
+    """A number in another unit is refused with the unit it looks like; text is no number; names must fit together."""
+    with pytest.raises(ValidationError, match=message):
+        Robot.model_validate(changed(THREEBAR, place, value))
+
+
+def test_policies_in_milliseconds_or_text_are_refused() -> None:
+    """Times of a step above an hour, endless repeats and numbers in quotes."""
+    for place, value in (("hold_s", 6000), ("timeout_s", 6000), ("target", ["0", "1"])):
+        with pytest.raises(ValidationError, match=r"looks like milliseconds|valid number"):
+            PolicyFile.model_validate(changed(POLICY, f"steps.0.{place}", value))
+    with pytest.raises(ValidationError, match="less than or equal"):
+        PolicyFile.model_validate({**POLICY, "repeat": 10**9})
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value"),
+    [
+        ("estimate", "contact_clearance_m", 4),
+        ("estimate", "contact_lift_m_per_s", 30),
+        ("estimate", "sensor_gap_s", 250),
+        ("estimate", "switch_kick_m_per_s", 20),
+        ("calibrate", "swap_threshold_m", 50),
+        ("import", "rod_length_tolerance", 5),
+        ("estimate", "contact_clearance_m", "0.003"),
+    ],
+)
+def test_absurd_settings_are_refused(section: str, key: str, value: Any) -> None:
+    """Settings have an upper bound where a larger value is another unit, and are numbers."""
+    with pytest.raises(ValidationError, match=r"less than|valid number"):
+        RunConfig.model_validate({section: {key: value}})
 
 
 def test_provenance_refuses_what_is_no_digest() -> None:

@@ -13,7 +13,7 @@ from r2s2r_cli.stages.import_.authors_json import number, parse_json
 from r2s2r_cli.stages.import_.files import shown
 
 HALF_PIXEL = 0.5
-"""OpenCV and librealsense put the centre of the first pixel at 0, this project at 0.5 (design.md section 4)."""
+"""OpenCV and librealsense put the centre of the first pixel at 0, this project at 0.5."""
 DEPTH_SCALES_M = (1e-5, 1e-2)
 """A depth count between 10 um and 10 mm: 65535 counts then reach from 0.7 m to 655 m."""
 _ROTATION_TOLERANCE = 1e-3

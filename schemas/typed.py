@@ -1,0 +1,70 @@
+"""Numbers that people type: no text is taken for one, and out of its bounds the usual slip of unit is named.
+
+The bounds are those of any robot that this project could be about, from the hand to a 5 m rod and well beyond: they
+catch a wrong unit, not an unusual robot. What is merely implausible for its size is for the checks of `validate`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+
+@dataclass(frozen=True)
+class AtMost:
+    """Annotation of a number: its size may not exceed `limit`; `trap` says what a larger one was probably meant as."""
+
+    limit: float
+    unit: str
+    trap: str
+
+    def check(self, value: float) -> float:
+        """The value itself. Raises ValueError, which pydantic reports."""
+        if abs(value) > self.limit:
+            raise ValueError(f"at most {self.limit:g}{' ' * bool(self.unit)}{self.unit}: {value:g} {self.trap}")
+        return value
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Hook of pydantic: validate the number first, then its size."""
+        return core_schema.no_info_after_validator_function(self.check, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Hook of pydantic: the bound in the published JSON schema."""
+        return {**handler(schema), "maximum": self.limit}
+
+
+LENGTH_MAX_M = 20.0
+"""Four times the largest robot thought of; 0.02 m, the smallest part that is a length of its own, is 20 in mm."""
+_MM = "looks like millimetres"
+
+Number = Annotated[float, Field(strict=True)]
+Positive = Annotated[float, Field(strict=True, gt=0)]
+NonNegative = Annotated[float, Field(strict=True, ge=0)]
+Whole = Annotated[int, Field(strict=True)]
+Flag = Annotated[bool, Field(strict=True)]
+Fraction = Annotated[float, Field(strict=True, ge=0, le=1)]
+Share = Annotated[float, Field(strict=True, gt=0, le=1)]
+Length = Annotated[float, Field(strict=True, gt=0), AtMost(LENGTH_MAX_M, "m", _MM)]
+"""[m], above 0."""
+Size = Annotated[float, Field(strict=True, ge=0), AtMost(LENGTH_MAX_M, "m", _MM)]
+"""[m], 0 where there is none."""
+Radius = Annotated[float, Field(strict=True, gt=0), AtMost(1.0, "m", _MM)]
+"""[m] of something thin: rod, cap, winch. Those of a 5 m robot like the 36 cm one have 0.27 m at most."""
+Coordinate = Annotated[float, Field(strict=True), AtMost(LENGTH_MAX_M, "m", _MM)]
+Mass = Annotated[float, Field(strict=True, gt=0), AtMost(1000.0, "kg", "looks like grams")]
+"""A part [kg]; a ton is what no cable robot of this sort lifts."""
+Tolerance = Annotated[float, Field(strict=True, gt=0), AtMost(0.9, "", "looks like per cent or millimetres: 0.1 is a tenth of the range")]  # fmt: skip
+"""Share of a cable's range: with 1 every cable would be done before it has moved."""
+Duration = Annotated[float, Field(strict=True, ge=0), AtMost(3600.0, "s", "looks like milliseconds")]
+"""[s] of one step: nobody waits an hour for a cable, and 6000 is 6 s in milliseconds."""
+Wait = Annotated[float, Field(strict=True, gt=0), AtMost(3600.0, "s", "looks like milliseconds")]
+"""The same, above 0."""
+CapacitanceSlope = Annotated[
+    float, Field(strict=True), AtMost(1e-6, "F/m", "looks like pF/mm, of which one is 1e-9 F/m")
+]
+"""Stretch sensors have about 3e-11 F/m (0.03 pF/mm)."""
+Capacitance = Annotated[float, Field(strict=True), AtMost(1e-6, "F", "looks like pF, of which one is 1e-12 F")]
+"""Stretch sensors have about 1e-11 F."""

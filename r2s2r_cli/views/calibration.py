@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
@@ -160,7 +160,7 @@ def _drift_sizes(axes: Axes, history: Group, drift: Group) -> None:
     axes.axhline(threshold, color=RED, lw=0.8, ls="--", label=f"swap, above {threshold:g} mm")
     axes.set_xticks(range(n), [f"sensor {i}" for i in range(n)])
     axes.set_ylabel("change [mm]\nper recalibration")
-    axes.legend(fontsize=8, ncol=4, loc="upper right", framealpha=0.9)
+    axes.legend(fontsize=8, ncol=4, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
 
 
 def _tendons(points: Group, tendons: Group) -> bytes:
@@ -173,8 +173,8 @@ def _tendons(points: Group, tendons: Group) -> bytes:
         x = np.linspace(0, tendons["x_max"][i], 201)
         color, style = (_GREY, "-") if tendons["monotone"][i] else (RED, "--")
         many = i == 0
-        force.plot(1e3 * points["displacement"][mine], points["force"][mine], ".", color=_PALE, ms=4,
-                   label="measured" if many else None)  # fmt: skip
+        force.plot(1e3 * points["displacement"][mine], points["force"][mine], "o", color=ORANGE, mec="black", mew=0.4,
+                   ms=4.5, zorder=3, label="measured" if many else None)  # fmt: skip
         label = "cubic of one tendon" if many else None
         force.plot(1e3 * x, _cubic(ks[i], x), style, color=color, lw=0.8, label=label)
         stiffness.plot(1e3 * x, _slope(ks[i], x), style, color=color, lw=0.8)
@@ -189,7 +189,7 @@ def _tendons(points: Group, tendons: Group) -> bytes:
     stiffness.axhline(0, color="black", lw=0.8)
     force.set_ylabel("force [N]")
     force.set_ylim(bottom=min(0.0, float(points["force"].min())))
-    force.legend(fontsize=8, loc="upper left")
+    force.legend(fontsize=8, ncol=4, loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)
     stiffness.set_ylabel("stiffness [N/m]\n(below 0: falls)")
     stiffness.set_ylim(bottom=min(0.0, stiffness.get_ylim()[0]))
     stiffness.set_xlabel("displacement beyond the rest length [mm]")
@@ -199,25 +199,33 @@ def _tendons(points: Group, tendons: Group) -> bytes:
         else names[0]
     )
     figure.suptitle(
-        f"{title}\nforce [N] = {k[0]:.4g} x {k[1]:+.4g} x² {k[2]:+.4g} x³, x in m;  "
+        f"{title}\nforce [N] = {k[0]:.4g} x {_signed(k[1])} x² {_signed(k[2])} x³, x in m; "
         f"worst residual rms {tendons['rms'].max():.3g} N"
     )
     return _png(figure)
 
 
 def _masses(parts: Group, masses: Group, robot: Robot) -> bytes:
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
     rods = masses["rod"]
-    figure = _figure(11, 2.7 * len(rods) + 0.5)
+    shade = Normalize(0.0, 1e3 * float(parts["mass"].max()))
+    figure = _figure(12, 2.7 * len(rods) + 0.5)
     for row, (axes, rod) in enumerate(
         zip(np.atleast_1d(figure.subplots(len(rods), 1, sharex=True)), rods, strict=True)
     ):
-        _rod(axes, parts, masses, robot, row, int(rod))
+        _rod(axes, parts, masses, robot, row, int(rod), lambda grams: colormaps["Blues"](shade(grams)))
     axes.set_xlabel("along the rod [mm], from the middle between the caps towards the odd cap")
-    figure.suptitle("weighed parts, to scale, and the centre of mass of each rod")
+    figure.colorbar(ScalarMappable(shade, colormaps["Blues"]), ax=figure.axes, label="mass of the part [g]", shrink=0.6)
+    figure.suptitle("weighed parts, to scale, the darker the heavier, and the centre of mass of each rod")
     return _png(figure)
 
 
-def _rod(axes: Axes, parts: Group, masses: Group, robot: Robot, row: int, rod: int) -> None:
+def _rod(
+    axes: Axes, parts: Group, masses: Group, robot: Robot, row: int, rod: int, shade: Callable[[float], Any]
+) -> None:
     from matplotlib.patches import Circle, Rectangle
 
     body = robot.rods[rod]
@@ -231,17 +239,18 @@ def _rod(axes: Axes, parts: Group, masses: Group, robot: Robot, row: int, rod: i
     shapes, names = _texts(parts, "shape"), _texts(parts, "name")
     for place, i in enumerate(mine):
         x, radius, length = (1e3 * float(parts[key][i]) for key in ("offset", "radius", "length"))
-        color = _SERIES[place % 4][0]
-        look: dict[str, Any] = {"facecolor": (color, 0.35), "edgecolor": color, "lw": 1.2}
+        color = shade(1e3 * float(parts["mass"][i]))
+        look: dict[str, Any] = {"facecolor": color, "edgecolor": _GREY, "lw": 1.0}
         if shapes[i] == "point":
-            axes.plot([x], [0], "D", color=color, ms=6)
+            axes.plot([x], [0], "D", color=color, mec=_GREY, ms=8)
         elif shapes[i] == "sphere":
             axes.add_patch(Circle((x, 0), radius, **look))
         else:
             axes.add_patch(Rectangle((x - length / 2, -radius), length, 2 * radius, **look))
         level = top * (1.35 + 0.75 * (place % 3))
         axes.plot([x, x], [0, level], color=_PALE, lw=0.7, zorder=0)
-        axes.text(x, level, f"{names[i]} {1e3 * parts['mass'][i]:.1f} g", fontsize=8, ha="center", va="bottom")
+        axes.text(x, level, f"{names[i]} {1e3 * parts['mass'][i]:.1f} g", fontsize=8, ha="center", va="bottom",
+                  bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6})  # fmt: skip
     com = round(1e3 * float(masses["com"][row]), 6) + 0.0
     axes.plot([com], [0], "X", color="black", ms=9)
     axes.annotate(f"centre of mass {com:+.1f} mm", (com, 0), (com, -1.6 * top), fontsize=8, ha="center", va="top",
@@ -254,6 +263,10 @@ def _rod(axes: Axes, parts: Group, masses: Group, robot: Robot, row: int, rod: i
     axes.set_aspect("equal")
     axes.set_yticks([])
     axes.spines[["left", "right", "top"]].set_visible(False)
+
+
+def _signed(value: float) -> str:
+    return f"{'−' if value < 0 else '+'} {abs(value):.4g}"
 
 
 def _cubic(k: np.ndarray, x: np.ndarray) -> np.ndarray:

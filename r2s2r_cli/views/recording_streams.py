@@ -14,7 +14,7 @@ from r2s2r_cli.views.figure import draw_bands, legend_beside
 if TYPE_CHECKING:
     from matplotlib.figure import SubFigure
 
-_PANEL_HEIGHT = 2.1
+_PANEL_HEIGHT = 1.8
 """[inches]"""
 _COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#e69f00")
 """Okabe and Ito's, which colour-blind people can tell apart; from the seventh line on dashed."""
@@ -54,14 +54,15 @@ def draw_streams(figure: SubFigure, drawn: Sequence[Panel], intervals: Group | N
 
 
 def _panels(data: ArtifactData, run: str) -> Iterator[Panel]:
-    motors = data.group(run, "motors")
+    motors, commands = data.group(run, "motors"), data.group(run, "commands")
+    drawn_already = {"speed"} if commands is not None and "control" in commands else set()
     if motors is not None:
         for name, title, scale in (
             ("position", "cable position\nseen by the controller", 1.0),
             ("speed", "speed command,\n+1 reels in", 1.0),
             ("encoder_length", "encoder length [mm]", 1e3),
         ):
-            if name in motors:
+            if name in motors and name not in drawn_already:
                 yield from _columns(motors["t"], scale * motors[name], title, "motor")
     sensors = data.group(run, "sensors")
     if sensors is not None:

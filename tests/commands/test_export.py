@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from r2s2r_cli.stages.export.tables import column_names
 from r2s2r_cli.store.read import read_artifact
+from schemas.base import Unit, column
 from schemas.policy import PolicyFile
 from tests.commands.conftest import document, invoke
 
@@ -21,7 +23,7 @@ ESTIMATE = "iterations/001/20-estimate.h5"
 def test_csv_holds_every_number_exactly(estimated: Path) -> None:
     """The table of frames has a column for every coordinate, with its unit, and loses no digit."""
     document("export", ESTIMATE, "--to", "csv", "--out", "out")
-    with Path("out/20-estimate/runs/sample/frames/frame.csv").open() as file:
+    with Path("out/20-estimate/runs/sample/frames.csv").open() as file:
         rows = list(csv.DictReader(file))
     _, data = read_artifact(estimated / ESTIMATE)
     frames = data.groups["runs/sample/frames"]
@@ -30,6 +32,40 @@ def test_csv_holds_every_number_exactly(estimated: Path) -> None:
         np.testing.assert_array_equal(column, frames["p_WE"][:, 3, axis])
     np.testing.assert_array_equal([float(row["t_s"]) for row in rows], frames["t"])
     assert {int(row["contact_cap2"]) for row in rows} <= {0, 1}
+
+
+def test_tables_are_named_after_their_group_and_columns_after_their_values(estimated: Path) -> None:
+    """One table a group, a second one where rows differ; quaternions are x, y, z, w; no slash in any column."""
+    document("export", RECORD, "--out", "out")
+    document("export", ESTIMATE, "--out", "out")
+    found = {path.relative_to("out").as_posix(): path for path in Path("out").rglob("*.csv")}
+    run = "10-record/runs/sample"
+    assert {f"{run}/caps.csv", f"{run}/caps_by_cap.csv", f"{run}/caps_by_rod.csv", f"{run}/sensors.csv"} <= set(found)
+    assert "20-estimate/runs/sample/ground.csv" in found
+    with found["20-estimate/runs/sample/ground.csv"].open() as file:
+        (ground,) = csv.DictReader(file)
+    assert [float(ground[f"normal_{axis}"]) for axis in "xyz"] == [0.0, 0.0, 1.0]
+    with found["20-estimate/runs/sample/frames.csv"].open() as file:
+        first = next(csv.DictReader(file))
+    assert sum(float(first[f"q_WR_rod1_{part}"]) ** 2 for part in "xyzw") == pytest.approx(1.0)
+    headers = [path.read_text().splitlines()[0] for path in found.values()]
+    assert headers
+    assert not any(set("/^ ") & set(header) for header in headers)
+
+
+@pytest.mark.parametrize(
+    ("unit", "dims", "shape", "names"),
+    [
+        ("F/m", ("set", "sensor"), (3, 2), ["a_sensor0_f_per_m", "a_sensor1_f_per_m"]),
+        ("1", ("t_pose", "quat"), (9, 4), ["a_x", "a_y", "a_z", "a_w"]),
+        ("m^2", ("frame", "cap", "xyz", "xyz2"), (9, 1, 3, 3), [f"a_cap0_{i}_{j}_m2" for i in "xyz" for j in "xyz"]),
+        ("1", ("mat4", "mat4"), (4, 4), [f"a_{i}_{j}" for i in range(4) for j in range(4)]),
+        ("unix s", ("entry",), (5,), ["a_unix_s"]),
+    ],
+)
+def test_column_names(unit: Unit, dims: tuple[str, ...], shape: tuple[int, ...], names: list[str]) -> None:
+    """A column says which component it is, and its unit in words that any program takes as a name."""
+    assert column_names(column("a", "float64", dims, unit, "what it is"), shape) == names
 
 
 def test_csv_carries_the_attributes(estimated: Path) -> None:

@@ -7,14 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from r2s2r_cli.stages.import_ import import_source
-from r2s2r_cli.views.recording import ground_offset, import_rows
+from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Value
+from r2s2r_cli.stages.import_ import import_source, merge_runs
+from r2s2r_cli.views.figure import spread_out
+from r2s2r_cli.views.recording import draw_recording, ground_offset, import_rows
+from r2s2r_cli.views.recording_streams import panels
 from tests.support.import_samples import (
     SIDECAR,
     frame_json,
     sample_robot,
     small_csv,
     write_authors_folder,
+    write_image,
     write_tum_folder,
 )
 
@@ -25,6 +29,7 @@ def _source(kind: str, folder: Path) -> Path:
     if kind == "tum_rgbd":
         stamps = (5.0 + 0.1 * np.arange(8)).tolist()
         return write_tum_folder(folder / "walk", stamps, stamps)
+    folder.mkdir(exist_ok=True)
     path = folder / "walk.csv"
     path.write_text(small_csv())
     path.with_suffix(".toml").write_text(SIDECAR)
@@ -45,3 +50,51 @@ def test_the_side_of_the_ground_follows_the_sign() -> None:
     """A positive offset lifts caps that lie too low, a negative one lowers caps that lie too high."""
     assert ground_offset(0.004) == "+4.0 mm to add to z: the lowest cap lies 4.0 mm too low on average"
     assert ground_offset(-0.746) == "-746.0 mm to add to z: the lowest cap lies 746.0 mm too high on average"
+
+
+@pytest.mark.parametrize("kind", ["authors_folder", "tum_rgbd"])
+def test_camera_frames_are_drawn(kind: str, tmp_path: Path) -> None:
+    """The picture of a camera run shows its frames: another image gives another picture, the same one the same."""
+    source = _source(kind, tmp_path)
+    before = _drawn(source)
+    assert before.startswith(b"\x89PNG")
+    assert _drawn(source) == before
+    first = sorted((source / ("color" if kind == "authors_folder" else "rgb")).iterdir())[0]
+    write_image(first, depth=False, value=99)
+    assert _drawn(source) != before
+
+
+def test_depth_without_a_partner_and_frames_that_cannot_be_decoded_are_drawn(tmp_path: Path) -> None:
+    """A colour frame without depth, and bytes that are no image, do not stop the drawing."""
+    source = _source("tum_rgbd", tmp_path)
+    camera = _recording(source).groups["runs/walk/camera"]
+    spoilt: dict[str, Value] = {
+        "pair": np.full(8, -1, dtype=np.int64),
+        "color": Blobs([b"no image", *[b""] * 7], 8),
+    }
+    changed = Group({**camera.datasets, **spoilt}, camera.attributes)
+    data = ArtifactData("recording", {**_recording(source).groups, "runs/walk/camera": changed})
+    assert dict(draw_recording(data, 0.0175))["walk"].startswith(b"\x89PNG")
+
+
+def test_what_the_robot_sent_is_drawn(tmp_path: Path) -> None:
+    """Motors, sensors, inertial units and motion capture have a panel each, with the unit in its title."""
+    titles = [panel.title for panel in panels(_recording(_source("authors_folder", tmp_path)), "walk")]
+    for words in ("position", "encoder length [mm]", "sensor length [mm]", "capacitance [pF]", "specific force", "mm]"):
+        assert any(words in title for title in titles), words
+    assert panels(_recording(_source("trajectory_csv", tmp_path / "other")), "walk") == []
+
+
+def test_numbers_that_would_overlap_are_left_out() -> None:
+    """Of points in a row every one far enough from those taken before is taken, the first always."""
+    points = np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0], [1.0, 0.2], [3.0, 0.0]])
+    assert spread_out(points, 1.0) == [0, 2, 4]
+    assert spread_out(points, 0.0) == [0, 1, 2, 3, 4]
+
+
+def _recording(source: Path) -> ArtifactData:
+    return merge_runs([import_source(source, robot=sample_robot())])
+
+
+def _drawn(source: Path) -> bytes:
+    return dict(draw_recording(_recording(source), 0.0175))["walk"]

@@ -1,4 +1,4 @@
-"""An artifact as CSV tables: one file for each group and first axis, units in the column names."""
+"""An artifact as CSV tables: one file a group, units in the column names."""
 
 from __future__ import annotations
 
@@ -12,15 +12,18 @@ import numpy as np
 from r2s2r_cli.artifact import ArtifactData, Blobs, Group
 from schemas.base import ArtifactSpec, DatasetSpec, GroupSpec
 
-_SHORT = {"m/s": "m_per_s", "rad/s": "rad_per_s", "m/s^2": "m_per_s2", "N/m": "n_per_m", "kg m^2": "kg_m2", "1": ""}
-_XYZ = "xyz"
+_NO_UNIT = ("1", "index", "code", "bool", "count")
+_COMPONENTS = {"xyz": "xyz", "xyz2": "xyz", "quat": "xyzw", "pair": "01", "mat4": "0123"}
+"""Axes that are no rows of a table but parts of one value, and the names of these parts."""
 _IMAGE_ENDING = {b"\x89PNG": "png", b"\xff\xd8\xff\xe0": "jpg", b"\xff\xd8\xff\xe1": "jpg", b"\xff\xd8\xff\xdb": "jpg"}
 
 
 def csv_files(data: ArtifactData, spec: ArtifactSpec, stem: str) -> Iterator[tuple[str, bytes]]:
     """Every group as CSV, its attributes as one JSON, its encoded frames as image files.
 
-    Names: `<stem>/<group path>/<first axis>.csv`. Numbers are written with all their digits.
+    Names: `<stem>/<group path>.csv` for the rows of a group (a frame, a command, an interval ...),
+    `<group path>_by_<axis>.csv` for values that it holds by something else (`caps_by_rod.csv`), and
+    `<group path>_constant.csv` for single vectors beside rows. Numbers are written with all their digits.
     """
     attributes: dict[str, object] = {}
     for path, group in data.groups.items():
@@ -29,8 +32,9 @@ def csv_files(data: ArtifactData, spec: ArtifactSpec, stem: str) -> Iterator[tup
             continue
         if group.attributes:
             attributes[path] = dict(group.attributes)
-        for axis, names in _by_first_axis(group, layout).items():
-            yield f"{stem}/{path}/{axis}.csv", _table(group, layout, names)
+        tables = _by_rows(group, layout)
+        for place, (axis, names) in enumerate(tables.items()):
+            yield f"{stem}/{path}{_ending(axis) if place else ''}.csv", _table(group, layout, names)
         yield from _frames(group, f"{stem}/{path}")
     yield f"{stem}/attributes.json", (json.dumps(attributes, indent=2, ensure_ascii=False) + "\n").encode()
 
@@ -49,23 +53,30 @@ def npz_file(data: ArtifactData, stem: str, header_json: str) -> tuple[str, byte
 
 
 def column_names(dataset: DatasetSpec, shape: tuple[int, ...]) -> list[str]:
-    """Names of the columns of one dataset, the first axis being the rows: `p_WE_cap0_x_m`."""
-    unit = _SHORT.get(dataset.unit, dataset.unit).lower()
-    ending = f"_{unit}" if unit and unit not in ("index", "code", "bool", "count") else ""
+    """Names of the columns of one dataset: `p_WE_cap3_x_m`, `q_WR_rod0_w`. shape: rows first, or of a single value."""
+    unit = "" if dataset.unit in _NO_UNIT else dataset.unit.lower()
+    ending = "_" + unit.replace("1/", "per_").replace("/", "_per_").replace("^", "").replace(" ", "_") if unit else ""
     names = [dataset.path]
-    for axis, size in zip(dataset.dims[1:], shape[1:], strict=True):
-        labels = list(_XYZ) if axis.startswith(_XYZ) else [f"{axis}{i}" for i in range(size)]
+    single = dataset.dims[0] in _COMPONENTS
+    for axis, size in list(zip(dataset.dims, shape, strict=True))[0 if single else 1 :]:
+        labels = _COMPONENTS[axis] if axis in _COMPONENTS else [f"{axis}{i}" for i in range(size)]
         names = [f"{name}_{label}" for name in names for label in labels]
     return [name + ending for name in names]
 
 
-def _by_first_axis(group: Group, layout: GroupSpec) -> dict[str, list[str]]:
+def _by_rows(group: Group, layout: GroupSpec) -> dict[str, list[str]]:
+    """Names of the datasets by the axis of their rows, the group's own axis first; '' for single values."""
     tables: dict[str, list[str]] = {}
     for dataset in layout.datasets:
         value = group.datasets.get(dataset.path)
         if isinstance(value, np.ndarray) and value.ndim:
-            tables.setdefault(dataset.dims[0], []).append(dataset.path)
+            axis = "" if dataset.dims[0] in _COMPONENTS else dataset.dims[0]
+            tables.setdefault(axis, []).append(dataset.path)
     return tables
+
+
+def _ending(axis: str) -> str:
+    return f"_by_{axis.removeprefix('t_')}" if axis else "_constant"
 
 
 def _table(group: Group, layout: GroupSpec, names: list[str]) -> bytes:
@@ -76,7 +87,8 @@ def _table(group: Group, layout: GroupSpec, names: list[str]) -> bytes:
         if dataset is None:
             continue
         header += column_names(dataset, value.shape)
-        columns += list(value.reshape(len(value), -1).T) if value.size else []
+        rows = 1 if dataset.dims[0] in _COMPONENTS else len(value)
+        columns += list(value.reshape(rows, -1).T) if value.size else []
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)

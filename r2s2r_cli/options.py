@@ -30,18 +30,32 @@ DrawOption = Annotated[
 ShowConfigOption = Annotated[bool, typer.Option("--show-config", help="Print the effective settings as TOML and stop.")]
 
 
-def parse_overrides(items: list[str] | None) -> dict[str, Any]:
-    """`--set a.b=value` items as dotted keys and TOML values; bare words are text. Raises UsageError."""
+def parse_overrides(items: list[str] | None, stage: str) -> dict[str, Any]:
+    """`--set stage.key=value` items as dotted keys and TOML values; bare words are text.
+
+    Raises UsageError for an item without a value, or of another stage, which would be ignored in silence.
+    """
     import tomllib
 
     overrides: dict[str, Any] = {}
     for item in items or []:
-        key, equals, text = item.partition("=")
-        if not equals or not key.strip():
+        name, equals, text = item.partition("=")
+        key = name.strip()
+        if not equals or not key:
             raise UsageError("an override has no value", where="--set", expected="KEY=VALUE", received=item,
-                             hint="--set estimate.key=0.1")  # fmt: skip
+                             hint=f"--set {stage}.key=0.1")  # fmt: skip
+        if key.split(".")[0] != stage or "." not in key:
+            tail = key.rpartition(".")[2]
+            raise UsageError(
+                f"this is no setting of {stage}",
+                where="--set",
+                expected=f"{stage}.KEY=VALUE",
+                received=item,
+                hint=f"--set {stage}.{tail}={text}   # r2s2r {stage} --show-config lists the keys",
+            )
         try:
-            overrides[key.strip()] = tomllib.loads(f"value = {text}")["value"]
+            parsed = tomllib.loads(f"value = {text}")
         except tomllib.TOMLDecodeError:
-            overrides[key.strip()] = text
+            parsed = {"value": text}
+        overrides[key] = parsed["value"] if len(parsed) == 1 else text
     return overrides

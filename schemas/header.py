@@ -61,6 +61,10 @@ class Provenance(Frozen):
     """UTC, ISO 8601."""
     wall_s: float = Field(ge=0)
     migrations: tuple[MigrationNote, ...] = ()
+    report: dict[str, Any] = Field(default_factory=dict)
+    """What the stage said about its result, so that it can be said and drawn again without computing."""
+    drawings: tuple[str, ...] = ()
+    """Names of the pictures and the page that lie beside the artifact."""
 
 
 class Header(Frozen):

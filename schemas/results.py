@@ -56,6 +56,8 @@ class ArtifactState(Frozen):
     artifact: str
     state: Literal["fresh", "stale", "damaged", "unsealed"]
     reasons: tuple[str, ...]
+    overrides: dict[str, Any] = Field(default_factory=dict)
+    """Settings that came from `--set` when it was made: the same command without them makes it again."""
     bytes: int
     content_sha256: str | None
 

@@ -76,35 +76,31 @@ def calibrate(
     Example: r2s2r calibrate --points points.csv --use monday
     """
     from r2s2r_cli.commands.stage import StageRun, print_config, show_outcome, wanted
+    from schemas.results_calibrate import CalibrationReport
 
     console = Console(json=json, quiet=quiet)
     here = Project.find(project)
-    overrides = parse_overrides(set_)
+    overrides = parse_overrides(set_, "calibrate")
     if show_config:
-        print_config(wanted(here, None, "calibrate", overrides, {}).settings, console)
+        print_config("calibrate", wanted(here, None, "calibrate", overrides, {}).settings, console)
         return
     given = {"points": points, "history": history, "tendons": tendons, "masses": masses}
     asked = {name: value for name, value in given.items() if value}
-    flags, kept, inputs = _merge_with_earlier(here, asked, use)
+    flags, kept, _ = _merge_with_earlier(here, asked, use)
     run = StageRun(
-        stage="calibrate", kind="calibration", project=here, iteration=None, console=console, inputs=inputs,
-        overrides=overrides, flags=flags, dry_run=dry_run, force=force,
+        stage="calibrate", kind="calibration", project=here, iteration=None,
+        find_inputs=lambda: _merge_with_earlier(here, asked, use)[2],
+        report_model=CalibrationReport, overrides=overrides, flags=flags, dry_run=dry_run, force=force,
+        not_applied=lambda said: _not_applied(here, said),
     )  # fmt: skip
-    outcome: list[CalibrationReport] = []
-
-    def compute() -> tuple[ArtifactData, CalibrationReport]:
-        data, report = _compute(here, asked, use, overrides, kept)
-        outcome.append(report)
-        return data, report
-
-    result = run.run(
-        compute,
-        (lambda data: _draw(data, outcome[0], here.robot())) if draw else None,
-        lambda: _apply(here, outcome[0]),
+    result, report = run.run(
+        lambda: _compute(here, asked, flags.get("use") if "points" in asked else None, overrides, kept),
+        (lambda data, said: _draw(data, said, here.robot())) if draw else None,
+        lambda said: _apply(here, said),
     )
     show_outcome(result, console)
-    for report in outcome:
-        _show(report, console)
+    if report is not None:
+        _show(report, console, applied=result.state == "done")
 
 
 def _merge_with_earlier(
@@ -134,8 +130,9 @@ def _merge_with_earlier(
     kept_paths = {path for name in kept for path in before[name]}
     inputs += [ref for ref in made.inputs if ref.path in kept_paths]
     inherited = {name: before[name] for name in kept}
-    if "points" in kept and "use" in before and "use" not in flags:
-        inherited["use"] = before["use"]
+    same_points = before.get("points") == flags.get("points", before.get("points"))
+    if same_points and "use" in before and "use" not in flags:
+        inherited["use"] = before["use"]  # the choice stands until another is made
     return {**inherited, **flags}, kept, inputs
 
 
@@ -180,6 +177,16 @@ def _apply(project: Project, report: CalibrationReport) -> None:
         write_text(project.robot_path, apply_changes(read_text(project.robot_path), report.changes))
 
 
+def _not_applied(project: Project, report: CalibrationReport) -> list[str]:
+    from r2s2r_cli.stages.calibrate import apply_changes
+    from r2s2r_cli.store.toml import read_text
+
+    if report.changes.empty:
+        return []
+    text = read_text(project.robot_path)
+    return [] if apply_changes(text, report.changes) == text else ["robot.toml does not hold its numbers"]
+
+
 def _source(path: Path) -> Source:
     from r2s2r_cli.stages.calibrate import Source
 
@@ -200,7 +207,7 @@ def _draw(data: ArtifactData, report: CalibrationReport, robot: Robot) -> Iterat
     yield ".html", calibration_page(report, pictures)
 
 
-def _show(report: CalibrationReport, console: Console) -> None:
+def _show(report: CalibrationReport, console: Console, *, applied: bool) -> None:
     from r2s2r_cli.views.calibration_page import report_tables
 
     for table in report_tables(report):
@@ -212,6 +219,8 @@ def _show(report: CalibrationReport, console: Console) -> None:
         if names and report.used is None:
             console.hint(f"r2s2r calibrate --points ... --use SET   # SET one of: {names}")
         return
-    console.say(f"robot.toml: {len(report.changes.sensors)} sensor lines, "
-                f"{'the' if report.changes.tendon else 'no'} tendon curve, "
-                f"{len(report.changes.rods)} rods' parts replaced")  # fmt: skip
+    if applied:
+        what = [f"{len(report.changes.sensors)} sensor lines" if report.changes.sensors else "",
+                "the tendon curve" if report.changes.tendon else "",
+                f"the parts of {len(report.changes.rods)} rods" if report.changes.rods else ""]  # fmt: skip
+        console.say(f"robot.toml has new numbers: {', '.join(filter(None, what))}")

@@ -44,37 +44,39 @@ def estimate(
 
     Example: r2s2r estimate --iteration 1
     """
-    from r2s2r_cli.commands.stage import StageRun, print_config, require_input, show_outcome, wanted
-    from r2s2r_cli.store.header import read_header
-    from r2s2r_cli.store.staleness import artifact_ref
+    from r2s2r_cli.commands.stage import StageRun, print_config, require_input, show_outcome, wanted, wanted_again
+    from r2s2r_cli.store.header import whole_header
+    from r2s2r_cli.store.staleness import artifact_ref, reasons
+    from schemas.results_estimate import EstimateReport
 
     console = Console(json=json, quiet=quiet)
     here = Project.find(project)
     place = here.iteration(iteration)
-    overrides = parse_overrides(set_)
+    overrides = parse_overrides(set_, "estimate")
     if show_config:
-        print_config(wanted(here, place, "estimate", overrides, {}).settings, console)
+        print_config("estimate", wanted(here, place, "estimate", overrides, {}).settings, console)
         return
     source = place.artifact("recording")
     require_input(source, f"r2s2r import run.csv --iteration {place.number}")
+    header = whole_header(source)
+    for reason in reasons(here, header, wanted_again(here, place, header.provenance)):
+        console.warn(f"{here.relative(source)} is stale itself: {reason}")
     run = StageRun(
-        stage="estimate", kind="estimate", project=here, iteration=place, console=console,
-        inputs=[artifact_ref(here, source, read_header(source))], overrides=overrides, dry_run=dry_run, force=force,
+        stage="estimate", kind="estimate", project=here, iteration=place,
+        find_inputs=lambda: [artifact_ref(here, source, whole_header(source))],
+        report_model=EstimateReport, overrides=overrides, dry_run=dry_run, force=force,
     )  # fmt: skip
-    outcome: list[EstimateReport] = []
 
     def compute() -> tuple[ArtifactData, EstimateReport]:
         from r2s2r_cli.stages.estimate import estimate as compute_states
         from r2s2r_cli.store.read import read_artifact
 
         _, recording = read_artifact(source, "recording")
-        data, report = compute_states(recording, here.robot(), here.config(place, overrides).estimate)
-        outcome.append(report)
-        return data, report
+        return compute_states(recording, here.robot(), here.config(place, overrides).estimate)
 
-    result = run.run(compute, (lambda data: _draw(data, here.robot(), outcome[0])) if draw else None)
+    result, report = run.run(compute, (lambda data, said: _draw(data, here.robot(), said)) if draw else None)
     show_outcome(result, console)
-    for report in outcome:
+    if report is not None:
         _show(report, console)
 
 

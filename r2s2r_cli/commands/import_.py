@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -44,8 +45,11 @@ class Format(StrEnum):
 
 def import_(
     sources: Annotated[
-        list[Path], typer.Argument(help="Trajectory CSVs or recorder folders; one run each, named by its stem.")
-    ],
+        list[Path] | None,
+        typer.Argument(
+            help="Trajectory CSVs or recorder folders; one run each, named by its stem.", show_default=False
+        ),
+    ] = None,
     format_: Annotated[
         Format, typer.Option("--format", help="What the sources are; default: decided by what lies there.")
     ] = Format.AUTO,
@@ -71,32 +75,33 @@ def import_(
     Example: r2s2r import crawl.csv
     """
     from r2s2r_cli.commands.stage import StageRun, print_config, show_outcome, wanted
+    from schemas.results_import import ImportReports
 
     console = Console(json=json, quiet=quiet)
     here = Project.find(project)
     place = here.iteration(iteration, create=True)
-    overrides = parse_overrides(set_)
+    overrides = parse_overrides(set_, "import")
     if show_config:
-        print_config(wanted(here, place, "import", overrides, {}).settings, console)
+        print_config("import", wanted(here, place, "import", overrides, {}).settings, console)
         return
+    if not sources:
+        raise UsageError("no log is named", where="r2s2r import", expected="a trajectory CSV or a recorder folder",
+                         received="nothing", hint="r2s2r import run.csv")  # fmt: skip
     settings = here.config(place, overrides).imports
-    flags = {"format": format_, "depth_scale": depth_scale}
+    flags = {"format": format_.value, "depth_scale": depth_scale}
+    logs = sources
     run = StageRun(
-        stage="import", kind="recording", project=here, iteration=place, console=console,
-        inputs=_refs(here, sources, format_), overrides=overrides, flags=flags, dry_run=dry_run, force=force,
-        guard=_guard(here, place, sources),
+        stage="import", kind="recording", project=here, iteration=place, find_inputs=lambda: _refs(here, logs, format_),
+        report_model=ImportReports, overrides=overrides, flags=flags, dry_run=dry_run, force=force,
+        guard=_guard(here, place, logs, format_),
     )  # fmt: skip
-    outcome: list[ImportReports] = []
-
-    def compute() -> tuple[ArtifactData, ImportReports]:
-        data, reports = _compute(here, sources, format_, depth_scale, settings, console)
-        outcome.append(reports)
-        return data, reports
-
-    result = run.run(compute, (lambda data: _draw(here, data, outcome[0])) if draw else None)
+    result, report = run.run(
+        lambda: _compute(here, logs, format_, depth_scale, settings, console),
+        (lambda data, said: _draw(here, data, said)) if draw else None,
+    )
     show_outcome(result, console)
-    for report in outcome[0].runs if outcome else ():
-        _show(report, console)
+    for said in report.runs if report is not None else ():
+        _show(said, console)
     if result.state == "done":
         console.hint("r2s2r estimate")
 
@@ -113,7 +118,7 @@ def _refs(project: Project, sources: list[Path], format_: Format) -> list[InputR
         try:
             refs.append(source_ref(project, path))
             if sidecar.is_file():
-                refs.append(source_ref(project, sidecar))
+                refs.append(source_ref(project, sidecar, kind="sidecar"))
         except OSError as error:
             raise InputError(
                 "the source cannot be read",
@@ -125,26 +130,27 @@ def _refs(project: Project, sources: list[Path], format_: Format) -> list[InputR
     return refs
 
 
-def _guard(project: Project, place: Iteration, sources: list[Path]) -> Callable[[Header | None], None]:
-    """Raw runs are not replaced by others without being told to."""
-    names = {project.relative(path) for path in sources}
+def _guard(project: Project, place: Iteration, sources: list[Path], format_: Format) -> Callable[[Header | None], None]:
+    """A recording is replaced only by one that holds all its runs."""
+    from r2s2r_cli.commands.stage import identity
 
     def guard(present: Header | None) -> None:
         if not place.artifact("recording").exists():
             return
-        if present is not None and present.provenance.stage == "import":
-            before = {ref.path for ref in present.provenance.inputs}
-            if names <= before:
+        received = "a damaged recording"
+        if present is not None:
+            asked = _refs(project, sources, format_)
+            paths, same = {ref.path for ref in asked}, {identity(ref) for ref in asked}
+            before = [ref for ref in present.provenance.inputs if ref.kind in ("file", "folder")]
+            if before and all(ref.path in paths or identity(ref) in same for ref in before):
                 return
-            received = "made from " + ", ".join(sorted(before))
-        else:
-            received = f"made by {present.provenance.stage}" if present else "a damaged recording"
+            received = f"made by {present.provenance.stage} from {', '.join(ref.path for ref in before) or 'a robot'}"
         raise UsageError(
-            "this iteration has a recording already",
+            "this iteration has a recording of other runs already, and import loses none",
             where=project.relative(place.artifact("recording")),
-            expected="none, or one of the same sources",
+            expected="none, or the same sources and more",
             received=received,
-            hint=f"r2s2r import {' '.join(map(str, sources))} --iteration {project.iterations()[-1].number + 1}",
+            hint=f"r2s2r import {shlex.join(map(str, sources))} --iteration {project.iterations()[-1].number + 1}",
         )
 
     return guard

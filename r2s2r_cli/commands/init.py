@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from enum import StrEnum
 from importlib import resources
 from pathlib import Path
@@ -61,7 +62,9 @@ def init(
     for file in files:
         console.data(str(directory / file))
     log = "sample.csv" if sample else "run.csv"
-    console.hint(f"cd {directory} && r2s2r import {log}" if str(directory) != "." else f"r2s2r import {log}")
+    console.hint(
+        f"cd {shlex.quote(str(directory))} && r2s2r import {log}" if str(directory) != "." else f"r2s2r import {log}"
+    )
 
 
 def _makefile() -> str:

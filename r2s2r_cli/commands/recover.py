@@ -58,7 +58,7 @@ def recover(
     for path in removed:
         console.data(f"{path}: removed, a command that was killed left it unfinished")
     if not paths and not removed:
-        console.say("nothing to recover: no unsealed recording, no unfinished file")
+        console.say("nothing to recover: no unsealed recording, no damaged artifact, no unfinished file")
     for problem in failed.values():
         print_error(problem, as_json=False)
     if failed:
@@ -66,13 +66,15 @@ def recover(
 
 
 def _leftovers(start: Path | None) -> tuple[list[Path], list[Path]]:
-    """What killed writers left unfinished, swept away; and the journals of the project."""
+    """What killed writers left unfinished, swept away; and the journals and damaged artifacts of the project."""
     from r2s2r_cli.store.atomic import sweep
     from r2s2r_cli.store.lock import writing
     from r2s2r_cli.store.project import Project
+    from r2s2r_cli.store.recover import is_intact
 
     project = Project.find(start)
     with writing(project.root, "recover"):
         folders = [project.root, *(iteration.path for iteration in project.iterations())]
         removed = [path for folder in folders for path in sweep(folder)]
-    return removed, project.journals()
+    damaged = [path for path in project.artifacts() if not is_intact(path)]
+    return removed, [*project.journals(), *damaged]

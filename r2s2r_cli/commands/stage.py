@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import time
@@ -9,44 +10,33 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
+
+from pydantic import BaseModel
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import ArtifactError, R2S2RError
+from r2s2r_cli.errors import ArtifactError, InputError, R2S2RError, UsageError
 from r2s2r_cli.store.atomic import sweep, write_bytes
-from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.header import read_header, sealed_header
 from r2s2r_cli.store.lock import writing
 from r2s2r_cli.store.project import Iteration, Project
 from r2s2r_cli.store.staleness import Wanted, reasons
 from schemas.header import Header, InputRef, Provenance
 from schemas.results import StageResult
-from schemas.versions import STAGE_VERSIONS
+from schemas.versions import KINDS, STAGE_VERSIONS
 
 if TYPE_CHECKING:
-    from pydantic import BaseModel
-
     from r2s2r_cli.artifact import ArtifactData
     from schemas.robot import Robot
 
-_GEOMETRY = {"rods": ("length_m", "cap_radius_m"), "cables": ("caps", "kind")}
 ROBOT_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
-    "import": {"name": (), **_GEOMETRY},
-    "calibrate": {
-        "name": (),
-        "rods": ("name", "length_m", "cap_radius_m"),
-        "sensors": ("cable",),
-        "cables": ("caps", "kind", "rest_length_m"),
-        "pid": (),
-        "limits": (),
-    },
-    "estimate": {
-        "name": (),
-        "rods": ("length_m", "cap_radius_m", "parts"),
-        "cables": ("caps", "kind"),
-        "pid": (),
-        "sensors": ("cable", "slope_f_per_m", "offset_f"),
-    },
-}
+    "import": {"name": (), "rods": ("length_m", "cap_radius_m"), "cables": ("caps", "kind"), "sensors": ("cable",),
+               "rest_caps_m": ()},
+    "calibrate": {"name": (), "rods": ("name", "length_m", "cap_radius_m"), "sensors": ("cable",),
+                  "cables": ("caps", "kind", "rest_length_m"), "pid": (), "limits": ()},
+    "estimate": {"name": (), "rods": ("length_m", "cap_radius_m"), "cables": ("caps", "kind"),
+                 "sensors": ("cable", "slope_f_per_m", "offset_f")},
+}  # fmt: skip
 """Which part of robot.toml each stage uses; a change elsewhere does not make its results stale."""
 
 
@@ -74,98 +64,165 @@ def wanted_again(project: Project, iteration: Iteration | None, made: Provenance
     return wanted(project, iteration, made.stage, made.overrides, made.settings.get("flags", {}))
 
 
+Report = TypeVar("Report", bound=BaseModel)
+Drawings = Iterable[tuple[str, bytes]]
+
+
 @dataclass
-class StageRun:
+class StageRun(Generic[Report]):
     """One run of one stage command."""
 
     stage: str
     kind: str
     project: Project
     iteration: Iteration | None
-    console: Console
-    inputs: Sequence[InputRef]
+    find_inputs: Callable[[], Sequence[InputRef]]
+    """Called before and after computing: what a stage used must be what its provenance says."""
+    report_model: type[Report]
     overrides: dict[str, Any] = field(default_factory=dict)
     flags: Mapping[str, Any] = field(default_factory=dict)
     dry_run: bool = False
     force: bool = False
     guard: Callable[[Header | None], None] | None = None
     """Raises where the artifact in the way must not be replaced."""
+    not_applied: Callable[[Report], list[str]] | None = None
+    """Why an artifact that is fresh has not had its effect elsewhere."""
 
     def __post_init__(self) -> None:
+        self.inputs = self.find_inputs()
         self.target = self.project.artifact(self.kind, self.iteration)
         self.wanted = wanted(self.project, self.iteration, self.stage, self.overrides, self.flags)
 
     def run(
         self,
-        compute: Callable[[], tuple[ArtifactData, BaseModel]],
-        draw: Callable[[ArtifactData], Iterable[tuple[str, bytes]]] | None,
-        after: Callable[[], None] = lambda: None,
-    ) -> StageResult:
-        """Compute and write where the artifact is not fresh; `draw` yields (suffix, bytes): `-run.png`, `.html`.
+        compute: Callable[[], tuple[ArtifactData, Report]],
+        draw: Callable[[ArtifactData, Report], Drawings] | None,
+        after: Callable[[Report], None] | None = None,
+    ) -> tuple[StageResult, Report | None]:
+        """Compute, write and draw where the artifact is not fresh; say what it says where it is.
 
-        `after` runs once the artifact stands, still under the lock.
+        `draw` yields (suffix, bytes): `-run.png`, `.html`. `after` runs once the artifact stands, under the lock.
         """
-        present, why = self.why()
-        if not why and not self.force:
-            os.utime(self.target)  # make decides by file time; it must see that this is up to date
-            return self._result("fresh", present, (), None)
+        present, why = self.why(drawn=draw is not None)
+        if self.force and not why:
+            why = ["--force was given"]
+        if present is not None and not why:
+            return self._fresh(present, draw)
         if self.dry_run:
-            return self._result("dry_run", present, why or ["--force was given"], None)
+            return self._result("dry_run", present, why, None), None
         if self.guard is not None and not self.force:
             self.guard(present)
         with writing(self.project.root, self.stage):
-            return self._run_locked(compute, draw, after, why or ["--force was given"])
+            return self._run_locked(compute, draw, after, present, why)
 
-    def why(self) -> tuple[Header | None, list[str]]:
+    def why(self, *, drawn: bool) -> tuple[Header | None, list[str]]:
         """The header of what is there, and why it must be made (again); empty: it is fresh."""
+        self._seen = self._content()
         if not self.target.exists():
             return None, ["there is no artifact yet"]
         try:
-            header = read_header(self.target)
+            header = sealed_header(self.target)
         except R2S2RError as error:
             return None, [f"what is there is damaged: {error.what}"]
-        recorded = {ref.path for ref in header.provenance.inputs}  # `reasons` compares their content
-        asked = {ref.path for ref in self.inputs}
         found = reasons(self.project, header, self.wanted)
         if header.provenance.stage != self.stage:
             found.insert(0, f"it was made by {header.provenance.stage}")
-        elif not found and recorded != asked:
+        elif not found and not same_inputs(header.provenance.inputs, self.inputs):
             found.append("it was made from other inputs")
+        elif not found and drawn and not header.provenance.drawings:
+            found.append("it was made with --no-draw")
+        if not found and self.not_applied is not None and header.provenance.report:
+            found += self.not_applied(self.report_model.model_validate(header.provenance.report))
         return header, found
+
+    def _fresh(
+        self, header: Header, draw: Callable[[ArtifactData, Report], Drawings] | None
+    ) -> tuple[StageResult, Report | None]:
+        """Nothing to compute: touch the file for make, and draw again what is missing."""
+        made = header.provenance
+        report = self.report_model.model_validate(made.report) if made.report else None
+        missing = [name for name in made.drawings if not self.target.with_name(name).exists()]
+        drawings: list[str] = []
+        if not self.dry_run:
+            with contextlib.suppress(OSError):  # a file that only others may touch is as fresh
+                os.utime(self.target)
+            if missing and draw is not None and report is not None:
+                from r2s2r_cli.store.read import read_artifact
+
+                with writing(self.project.root, self.stage):
+                    _, data = read_artifact(self.target, self.kind, blobs=True)
+                    drawings = self._write_drawings(list(draw(data, report)))
+        return self._result("fresh", header, (), report, drawings), report
 
     def _run_locked(
         self,
-        compute: Callable[[], tuple[ArtifactData, BaseModel]],
-        draw: Callable[[ArtifactData], Iterable[tuple[str, bytes]]] | None,
-        after: Callable[[], None],
+        compute: Callable[[], tuple[ArtifactData, Report]],
+        draw: Callable[[ArtifactData, Report], Drawings] | None,
+        after: Callable[[Report], None] | None,
+        present: Header | None,
         why: Sequence[str],
-    ) -> StageResult:
+    ) -> tuple[StageResult, Report | None]:
         from r2s2r_cli.store.provenance import build_provenance
         from r2s2r_cli.store.write import write_artifact
 
+        self._require_unchanged()
         sweep(self.target.parent)
         started, clock = datetime.now(UTC), time.monotonic()
         data, report = compute()
+        wall_s = time.monotonic() - clock
+        self._require_same_inputs()
+        pictures = list(draw(data, report)) if draw is not None else []
         provenance = build_provenance(
             stage=self.stage, stage_version=self.wanted.stage_version, argv=sys.argv, settings=self.wanted.settings,
-            overrides=self.overrides, robot=self.wanted.robot, inputs=self.inputs, started=started,
-            wall_s=time.monotonic() - clock,
+            overrides=self.overrides, robot=self.wanted.robot, inputs=self.inputs, started=started, wall_s=wall_s,
+            report=report.model_dump(mode="json"), drawings=[self.target.stem + suffix for suffix, _ in pictures],
         )  # fmt: skip
-        header = write_artifact(self.target, data, provenance)
-        after()
-        drawings = []
-        for suffix, content in draw(data) if draw else ():
+        old = present.provenance.drawings if present is not None else ()
+
+        def clear() -> None:
+            # Before the artifact changes: a picture that is there must never show another artifact.
+            for name in old:
+                self.target.with_name(Path(name).name).unlink(missing_ok=True)
+
+        header = write_artifact(self.target, data, provenance, replacing_now=clear)
+        if after is not None:
+            after(report)
+        return self._result("done", header, why, report, self._write_drawings(pictures)), report
+
+    def _content(self) -> str | None:
+        try:
+            return read_header(self.target).content_sha256
+        except R2S2RError:
+            return None
+
+    def _require_unchanged(self) -> None:
+        """Everything was decided before the lock was held: it must still be so."""
+        if self._content() != self._seen:
+            raise UsageError("another r2s2r wrote this artifact just now", where=self.project.relative(self.target),
+                             expected="what was there when this command began", received="another",
+                             hint="run the command again")  # fmt: skip
+
+    def _require_same_inputs(self) -> None:
+        for before, now in zip(self.inputs, self.find_inputs(), strict=True):
+            if before.sha256 != now.sha256:
+                raise InputError("an input changed while it was read", where=before.path,
+                                 expected=f"sha256 {before.sha256[:16]}", received=now.sha256[:16],
+                                 hint="run the command again")  # fmt: skip
+
+    def _write_drawings(self, pictures: Sequence[tuple[str, bytes]]) -> list[str]:
+        names = []
+        for suffix, content in pictures:
             path = self.target.with_name(self.target.stem + suffix)
             write_bytes(path, content)
-            drawings.append(self.project.relative(path))
-        return self._result("done", header, why, report, drawings)
+            names.append(self.project.relative(path))
+        return names
 
     def _result(
         self,
-        state: Any,
+        state: Literal["done", "fresh", "dry_run"],
         header: Header | None,
         why: Sequence[str],
-        report: BaseModel | None,
+        report: Report | None,
         drawings: Sequence[str] = (),
     ) -> StageResult:
         return StageResult(
@@ -173,6 +230,20 @@ class StageRun:
             content_sha256=header.content_sha256 if header else None, inputs=tuple(ref.path for ref in self.inputs),
             drawings=tuple(drawings), report=report.model_dump(mode="json") if report else None,
         )  # fmt: skip
+
+
+def identity(ref: InputRef) -> tuple[str, str]:
+    """What makes two inputs the same wherever they lie: file name (it names the run) and content."""
+    if ref.kind in KINDS:
+        return ref.path, ""  # `reasons` compares its content, through its migrations
+    return Path(ref.path).name, ref.sha256
+
+
+def same_inputs(recorded: Sequence[InputRef], asked: Sequence[InputRef]) -> bool:
+    """Whether both name the same inputs, each by its path (its content is compared elsewhere) or its identity."""
+    pairs = [(one, two) for one in recorded for two in asked if one.path == two.path or identity(one) == identity(two)]
+    matched = ({one.path for one, _ in pairs}, {two.path for _, two in pairs})
+    return matched == ({ref.path for ref in recorded}, {ref.path for ref in asked})
 
 
 def show_outcome(result: StageResult, console: Console) -> None:
@@ -205,13 +276,14 @@ def require_input(path: Path, command: str) -> None:
         )
 
 
-def print_config(settings: Mapping[str, Any], console: Console) -> None:
-    """The effective settings on stdout: TOML, or JSON with --json."""
+def print_config(stage: str, settings: Mapping[str, Any], console: Console) -> None:
+    """The effective settings on stdout, as a section of project.toml, or JSON with --json."""
+    section = {key: value for key, value in settings.items() if key != "flags"}
     if console.json:
         import json
 
-        console.raw(json.dumps(settings, indent=2))
+        console.raw(json.dumps(section, indent=2))
         return
     import tomlkit
 
-    console.raw(tomlkit.dumps(dict(settings)).rstrip())
+    console.raw(tomlkit.dumps({stage: section}).rstrip())

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import GateError, R2S2RError
+from r2s2r_cli.errors import ArtifactError, GateError
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
-from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.again import command_again
+from r2s2r_cli.store.header import whole_header
 from r2s2r_cli.store.project import Iteration, Project
 from r2s2r_cli.store.staleness import reasons
 from schemas.header import Header
 from schemas.results import ArtifactState, StatusResult
-from schemas.versions import KINDS
 
 
 def status(
@@ -36,14 +37,7 @@ def status(
     console.document(result)
     console.data(f"project {result.project}   robot {result.robot}   {_size(result.bytes)}")
     rows = [
-        [
-            f"{a.iteration:03d}" if a.iteration else "-",
-            a.stage,
-            a.artifact,
-            a.state,
-            _size(a.bytes),
-            "; ".join(a.reasons),
-        ]
+        [f"{a.iteration:03d}" if a.iteration else "-", a.stage, a.artifact, a.state, _size(a.bytes), _remarks(a)]
         for a in result.artifacts
     ]
     if rows:
@@ -62,45 +56,48 @@ def status(
 
 
 def survey(project: Project) -> StatusResult:
-    """The state of every artifact of a project, in the order of the data."""
+    """The state of every artifact of a project, in the order of the data. Raises InputError for wrong settings."""
+    iterations = {iteration.path: iteration for iteration in project.iterations()}
+    journals = project.journals()
     states: list[ArtifactState] = []
+    again: list[str] = []
     stale: set[str] = set()
-    places: list[tuple[Iteration | None, Path]] = [(None, project.root)]
-    places += [(iteration, iteration.path) for iteration in project.iterations()]
-    for iteration, directory in places:
-        level = "project" if iteration is None else "iteration"
-        for spec in KINDS.values():
-            path = directory / spec.filename
-            if spec.level == level and path.exists():
-                states.append(_state(project, iteration, path, stale))
-        states += [_unsealed(project, iteration, path) for path in project.journals() if path.parent == directory]
+    for path in project.artifacts():
+        state, command = _state(project, iterations.get(path.parent), path, stale)
+        states.append(state)
+        again += [command] if command else []
+    states += [_unsealed(project, iterations.get(path.parent), path) for path in journals]
+    again = [f"r2s2r recover {shlex.quote(project.relative(path))}" for path in journals] + again
     return StatusResult(
         project=project.file.name,
         robot=project.robot().name,
-        iterations=len(places) - 1,
+        iterations=len(iterations),
         artifacts=tuple(states),
-        bytes=sum(p.stat().st_size for p in project.root.rglob("*") if p.is_file()),
-        next=_next(states),
+        bytes=sum(p.stat().st_size for p in project.root.rglob("*") if p.is_file() and not p.is_symlink()),
+        next=again[0] if again else _forward(project),
     )
 
 
-def _state(project: Project, iteration: Iteration | None, path: Path, stale: set[str]) -> ArtifactState:
-    name, header, why = project.relative(path), None, []
+def _state(project: Project, iteration: Iteration | None, path: Path, stale: set[str]) -> tuple[ArtifactState, str]:
+    """The line of one artifact, and the command that mends it; empty where it is fresh."""
+    name = project.relative(path)
+    header: Header | None = None
     try:
-        header = read_header(path)
+        header = whole_header(path)
+    except ArtifactError as error:
+        state, why, command = "damaged", [error.what], f"r2s2r recover {shlex.quote(name)}"
+    else:
         why = _reasons(project, iteration, header, stale)
-        state = "stale" if why else "fresh"
-    except R2S2RError as error:
-        state, why = "damaged", [error.what]
+        state, command = ("stale", command_again(header.provenance, path)) if why else ("fresh", "")
     if state != "fresh":
         stale.add(name)
-    return ArtifactState.model_validate(
-        {
-            "stage": header.provenance.stage if header else "?", "iteration": iteration.number if iteration else None,
-            "artifact": name, "state": state, "reasons": tuple(why), "bytes": path.stat().st_size,
-            "content_sha256": header.content_sha256 if header else None,
-        }
-    )  # fmt: skip
+    made = header.provenance if header else None
+    line = {
+        "stage": made.stage if made else "?", "iteration": iteration.number if iteration else None, "artifact": name,
+        "state": state, "reasons": tuple(why), "overrides": made.overrides if made else {},
+        "bytes": path.stat().st_size, "content_sha256": header.content_sha256 if header else None,
+    }  # fmt: skip
+    return ArtifactState.model_validate(line), command
 
 
 def _reasons(project: Project, iteration: Iteration | None, header: Header, stale: set[str]) -> list[str]:
@@ -111,6 +108,11 @@ def _reasons(project: Project, iteration: Iteration | None, header: Header, stal
     return found + [f"input {path} is stale itself" for path in upstream]
 
 
+def _remarks(state: ArtifactState) -> str:
+    made = [f"made with --set {key}={value}" for key, value in state.overrides.items()]
+    return "; ".join([*state.reasons, *made])
+
+
 def _unsealed(project: Project, iteration: Iteration | None, path: Path) -> ArtifactState:
     return ArtifactState(
         stage="record", iteration=iteration.number if iteration else None, artifact=project.relative(path),
@@ -119,21 +121,12 @@ def _unsealed(project: Project, iteration: Iteration | None, path: Path) -> Arti
     )  # fmt: skip
 
 
-def _next(states: list[ArtifactState]) -> str:
-    for state in states:
-        flag = f" --iteration {state.iteration}" if state.iteration else ""
-        if state.state == "unsealed":
-            return f"r2s2r recover {state.artifact}"
-        if state.state == "damaged":
-            return f"r2s2r validate {state.artifact}"
-        if state.state == "stale" and state.stage == "estimate":
-            return f"r2s2r estimate{flag}"
-        if state.state == "stale":
-            return f"r2s2r {state.stage} --help   # run it again on its source"
-    stages = {state.stage for state in states}
-    if not stages & {"import", "record"}:
+def _forward(project: Project) -> str:
+    """The next command where nothing is to be mended."""
+    latest = project.iterations()[-1:]
+    if not latest or not latest[0].artifact("recording").exists():
         return "r2s2r import run.csv"
-    return "" if "estimate" in stages else "r2s2r estimate"
+    return "" if latest[0].artifact("estimate").exists() else f"r2s2r estimate --iteration {latest[0].number}"
 
 
 def _size(count: int) -> str:

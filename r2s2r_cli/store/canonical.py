@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import json
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -42,5 +43,15 @@ def folder_sha256(path: Path) -> str:
 
 
 def source_sha256(path: Path) -> str:
-    """Digest of a source that is not an artifact, file or folder. Raises OSError."""
-    return folder_sha256(path) if path.is_dir() else file_sha256(path)
+    """Digest of a source that is not an artifact: a folder, the values of a TOML file, the bytes of any other.
+
+    Comments and the order of keys in a TOML file do not count. Raises OSError.
+    """
+    if path.is_dir():
+        return folder_sha256(path)
+    if path.suffix == ".toml":
+        try:
+            return json_sha256(tomllib.loads(path.read_text(encoding="utf-8-sig")))
+        except (ValueError, TypeError, RecursionError):  # no TOML, or values that JSON has not: its bytes then
+            pass
+    return file_sha256(path)

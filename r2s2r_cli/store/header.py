@@ -89,7 +89,7 @@ def read_header(path: Path) -> Header:
 
 
 def whole_header(path: Path) -> Header:
-    """The header of an artifact that has all its bytes. Raises ArtifactError as `read_header`, and where it was cut off.
+    """The header of an artifact that has all its bytes. Raises ArtifactError, also where the file was cut off.
 
     The bytes themselves are not read: this is what a light command can afford.
     """
@@ -98,6 +98,16 @@ def whole_header(path: Path) -> Header:
     if received < expected:
         raise ArtifactError("the file was cut off", where=str(path), expected=f"{expected} bytes",
                             received=f"{received} bytes", hint=f"r2s2r recover '{path}'")  # fmt: skip
+    return header
+
+
+def sealed_header(path: Path) -> Header:
+    """The header of an artifact that is byte for byte what was sealed. Raises ArtifactError. Reads the whole file."""
+    header = whole_header(path)
+    if body_sha256(path, header.body_offset) != (header.body_sha256, header.body_bytes):
+        raise ArtifactError("bytes of the file changed after it was sealed", where=str(path),
+                            expected=f"sha256 {header.body_sha256[:16]}", received="another",
+                            hint=f"r2s2r recover '{path}'")  # fmt: skip
     return header
 
 

@@ -80,12 +80,15 @@ class Project:
     def iteration(self, number: int | None, *, create: bool = False) -> Iteration:
         """Iteration `number`, default the latest (with `create`: the first, where there is none).
 
-        Raises UsageError where it does not exist and is not to be created.
+        Raises ArtifactError where there is none yet, UsageError where this one does not exist and is not to be created.
         """
         existing = self.iterations()
         if number is None:
             if existing:
                 return existing[-1]
+            if not create:
+                raise ArtifactError("there is no iteration yet", where=str(self.root / ITERATIONS),
+                                    expected="at least one", received="none", hint="r2s2r import run.csv")  # fmt: skip
             number = 1
         if number < 1:
             raise UsageError("an iteration number is too small", where="--iteration", expected="1 or more",

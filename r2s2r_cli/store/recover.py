@@ -5,7 +5,6 @@ Nothing is overwritten: what is replaced keeps a second name (`.damaged`), what 
 
 from __future__ import annotations
 
-import shlex
 import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,8 +12,9 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.store.again import command_again
 from r2s2r_cli.store.atomic import keep_beside, replacing
-from r2s2r_cli.store.header import NotAnArtifact, block, body_sha256, read_header, unreadable
+from r2s2r_cli.store.header import NotAnArtifact, block, body_sha256, read_header, sealed_header, unreadable
 from r2s2r_cli.store.isolated import IsolatedReader
 from r2s2r_cli.store.project import JOURNAL_SUFFIX, artifact_of
 from r2s2r_cli.store.read import check_kind_and_version, checked_header, load
@@ -54,6 +54,15 @@ def recover_file(path: Path, reader: IsolatedReader) -> Recovered:
         return _without_head(path, reader)
     check_kind_and_version(path, header)
     return _with_head(path, header, reader)
+
+
+def is_intact(path: Path) -> bool:
+    """Whether head and body are byte for byte what was sealed; no HDF5 code sees the file."""
+    try:
+        sealed_header(path)
+    except ArtifactError:
+        return False
+    return True
 
 
 def _recover_journal(path: Path) -> Recovered:
@@ -161,8 +170,8 @@ def _lost(path: Path, header: Header | None, found: Rescue) -> ArtifactError:
     names = ", ".join(f"{name} ({why})" for name, why in list(found.lost.items())[:3])
     more = f" and {len(found.lost) - 3} more" if len(found.lost) > 3 else ""
     where = f"{path}, rescued into {found.path}" if found.path else str(path)
-    if header is not None and header.provenance.argv:
-        hint = shlex.join(["r2s2r", *header.provenance.argv[1:]])
+    if header is not None:
+        hint = command_again(header.provenance, path, force=True)
     else:
         hint = f"unzip -p '{found.path}' README.json" if found.path else f"ls -la '{path}'*"
     return ArtifactError(

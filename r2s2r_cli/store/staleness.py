@@ -83,14 +83,14 @@ def artifact_ref(project: Project, path: Path, header: Header) -> InputRef:
     )
 
 
-def source_ref(project: Project, path: Path) -> InputRef:
+def source_ref(project: Project, path: Path, *, kind: str = "") -> InputRef:
     """The reference to a file or folder from outside. Raises OSError; InputError where its name is not text."""
     try:
         str(path).encode()
     except UnicodeEncodeError as error:
         raise InputError("the name of the file is not UTF-8 text", where=ascii(str(path)), expected="a UTF-8 name",
                          received="other bytes", hint="rename it, then run the command again") from error  # fmt: skip
-    kind = "folder" if path.is_dir() else "file"
+    kind = kind or ("folder" if path.is_dir() else "file")
     return InputRef(path=project.relative(path), kind=kind, sha256=source_sha256(path))
 
 

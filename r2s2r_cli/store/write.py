@@ -31,12 +31,19 @@ _ZEROS = "0" * 64
 
 
 def write_artifact(
-    path: Path, data: ArtifactData, provenance: Provenance, *, title: str = "", content_sha256: str = ""
+    path: Path,
+    data: ArtifactData,
+    provenance: Provenance,
+    *,
+    title: str = "",
+    content_sha256: str = "",
+    replacing_now: Callable[[], None] | None = None,
 ) -> Header:
     """Write `data` to `path` and return its header.
 
     Temp file in the same directory, flush, close, reopen and verify, fsync, replace, fsync of the directory.
-    `content_sha256`: the content must have this hash, or nothing is written.
+    `content_sha256`: the content must have this hash, or nothing is written. `replacing_now` is called once the new
+    file is complete and verified, before it takes the name: what belongs to the old one can go.
     Raises ArtifactError (disk full, no permission) and leaves what was there; ValueError where `data` departs
     from the schema, which is a bug of the caller.
     """
@@ -56,6 +63,8 @@ def write_artifact(
             raise ValueError(f"the content of {path.name} is not the one that was promised")
         if block(read_header(temp)) != block(header):
             raise ValueError(f"the header of {path.name} does not read back as it was written")
+        if replacing_now is not None:
+            replacing_now()
     return header
 
 

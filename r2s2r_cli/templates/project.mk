@@ -10,7 +10,8 @@ R2S2R  ?= r2s2r
 ITER   ?= 001
 SOURCE ?=
 
-I := iterations/$(ITER)
+# ITER=2 and ITER=002 are the same iteration.
+I := iterations/$(shell printf '%03d' "$$((10#$(ITER)))" 2>/dev/null || printf %s '$(ITER)')
 
 # The artifacts of one iteration, in order. A new stage is one name here and one rule below.
 RECORD   := $(I)/10-record.h5

@@ -59,6 +59,24 @@ def test_the_chosen_set_goes_into_robot_toml(points: Path) -> None:
     assert set(before) - set(Path("robot.toml").read_text().splitlines()) == set()
 
 
+def test_a_robot_toml_without_the_numbers_is_mended(points: Path) -> None:
+    """Where robot.toml was put back, or the command was killed before it was written, calibrate writes it again."""
+    before = Path("robot.toml").read_text()
+    command = ("calibrate", "--points", "points.csv", "--use", "friday", "--no-draw")
+    assert document(*command)["state"] == "done"
+    assert document(*command)["state"] == "fresh"
+    Path("robot.toml").write_text(before)
+    answer = document(*command)
+    assert (answer["state"], answer["reasons"]) == ("done", ["robot.toml does not hold its numbers"])
+    assert sensor_zero()["offset_f"] == pytest.approx((OFFSET_PF + 1) * 1e-12, rel=1e-3)
+
+
+def test_a_choice_stands_until_another_is_made(points: Path) -> None:
+    """Running again on the same points without --use keeps the set that was chosen."""
+    assert invoke("calibrate", "--points", "points.csv", "--use", "friday", "--no-draw").exit_code == 0
+    assert document("calibrate", "--points", "points.csv", "--no-draw")["state"] == "fresh"
+
+
 def test_a_later_part_keeps_the_earlier_one(points: Path) -> None:
     """Masses given later join the sensor lines in calibration.h5; both sources are its inputs."""
     assert invoke("calibrate", "--points", "points.csv", "--no-draw").exit_code == 0

@@ -125,15 +125,26 @@ def test_no_escape_codes_when_piped(tmp_path: Path) -> None:
 
 def test_overrides_are_toml_values() -> None:
     """--set takes numbers, booleans, lists and bare words."""
-    items = ["a.b=0.5", "a.c=true", "d=[1, 2]", "e=word", "f=1=2"]
-    assert parse_overrides(items) == {"a.b": 0.5, "a.c": True, "d": [1, 2], "e": "word", "f": "1=2"}
+    items = ["s.a.b=0.5", "s.c=true", "s.d=[1, 2]", "s.e=word", "s.f=1=2", "s.g=1\nx=2"]
+    values = {"s.a.b": 0.5, "s.c": True, "s.d": [1, 2], "s.e": "word", "s.f": "1=2", "s.g": "1\nx=2"}
+    assert parse_overrides(items, "s") == values
 
 
-@pytest.mark.parametrize("item", ["novalue", "=3", ""])
-def test_an_override_without_a_value_is_refused(item: str) -> None:
-    """--set without KEY=VALUE is a usage error."""
-    with pytest.raises(UsageError, match="no value"):
-        parse_overrides([item])
+@pytest.mark.parametrize(
+    ("item", "words"),
+    [
+        ("s.novalue", "no value"),
+        ("=3", "no value"),
+        ("", "no value"),
+        ("key=3", "no setting"),
+        ("t.key=3", "no setting"),
+    ],
+)
+def test_an_override_that_would_be_ignored_is_refused(item: str, words: str) -> None:
+    """--set without KEY=VALUE, without a section or of another stage is a usage error with the right form as hint."""
+    with pytest.raises(UsageError, match=words) as caught:
+        parse_overrides([item], "s")
+    assert caught.value.hint.startswith("--set s.")
 
 
 def test_typer_errors_are_still_of_one_family() -> None:

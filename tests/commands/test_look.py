@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import sys
 from pathlib import Path
 
@@ -30,7 +31,7 @@ def test_everything_is_fresh_after_the_stages(estimated: Path) -> None:
 
 def test_comments_order_and_times_do_not_count(estimated: Path) -> None:
     """A comment, another order of the sections and newer file times leave everything fresh."""
-    for name in ("project.toml", "robot.toml"):
+    for name in ("project.toml", "robot.toml", "sample.toml"):
         Path(name).write_text("# a remark\n" + Path(name).read_text() + "\n# another\n")
     head, *sections = Path("project.toml").read_text().split("\n[")
     Path("project.toml").write_text("\n[".join([head, *reversed(sections)]) + "\n")
@@ -84,12 +85,42 @@ def test_a_new_stage_version_makes_its_results_stale(estimated: Path, monkeypatc
 
 
 def test_status_of_a_damaged_artifact(estimated: Path) -> None:
-    """A damaged head is said, and the next command is validate."""
+    """A damaged head is said, and the next command is recover."""
     data = bytearray((estimated / ESTIMATE).read_bytes())
     data[200] ^= 1
     (estimated / ESTIMATE).write_bytes(data)
     assert states()[ESTIMATE][0] == "damaged"
-    assert document("status")["next"] == f"r2s2r validate {ESTIMATE}"
+    assert document("status")["next"] == f"r2s2r recover {ESTIMATE}"
+
+
+def test_a_truncated_artifact_is_damaged(estimated: Path) -> None:
+    """A file that lost its end is never called fresh, by status or by its own stage."""
+    data = (estimated / ESTIMATE).read_bytes()
+    (estimated / ESTIMATE).write_bytes(data[: len(data) // 2])
+    assert states()[ESTIMATE] == ("damaged", ["the file was cut off"])
+    assert document("estimate", "--no-draw")["state"] == "done"
+
+
+def test_one_changed_byte_is_noticed(estimated: Path) -> None:
+    """A changed byte in the body is no reason to rest: the stage makes its artifact again."""
+    data = bytearray((estimated / ESTIMATE).read_bytes())
+    data[len(data) // 2] ^= 1
+    (estimated / ESTIMATE).write_bytes(data)
+    answer = document("estimate", "--no-draw")
+    assert (answer["state"], answer["reasons"]) == (
+        "done", ["what is there is damaged: bytes of the file changed after it was sealed"],
+    )  # fmt: skip
+
+
+def test_the_next_command_can_be_pasted(estimated: Path) -> None:
+    """The hint of status names the sources and the iteration; run as it is, everything is fresh again."""
+    text = Path("sample.csv").read_text().rstrip("\n").splitlines()
+    Path("sample.csv").write_text("\n".join(text[:-1]) + "\n")
+    for expected in ("r2s2r import sample.csv --iteration 1", "r2s2r estimate --iteration 1"):
+        command = document("status")["next"]
+        assert command == expected
+        assert invoke(*shlex.split(command)[1:], "--no-draw").exit_code == 0
+    assert document("status")["next"] == ""
 
 
 def test_inspect_shows_units_and_provenance(estimated: Path) -> None:
@@ -130,7 +161,7 @@ def test_a_failed_gate_still_prints_one_document(estimated: Path, arguments: tup
     """With --json a command whose gate is not met leaves with 3 and has printed its result, once."""
     Path("short.toml").write_text(SHORT_POLICY)
     text = Path("project.toml").read_text()
-    Path("project.toml").write_text(text.replace("contact_clearance_m = 0.003", "contact_clearance_m = 1.0"))
+    Path("project.toml").write_text(text.replace("contact_clearance_m = 0.003", "contact_clearance_m = 0.05"))
     result = invoke(*arguments, "--json")
     assert result.exit_code == 3, result.stderr
     assert json.loads(result.stdout)["schema"] == f"r2s2r.{arguments[0]}/1"

@@ -91,6 +91,77 @@ def test_another_log_does_not_replace_a_recording(estimated: Path) -> None:
     assert invoke("import", "second.csv", "--iteration", "2", "--no-draw").exit_code == 0
 
 
+def test_a_recording_never_loses_a_run(project: Path) -> None:
+    """Of two imported runs none can be dropped by importing one again; a third can be added."""
+    for name in ("second", "third"):
+        shutil.copy("sample.csv", f"{name}.csv")
+        shutil.copy("sample.toml", f"{name}.toml")
+    assert invoke("import", "sample.csv", "second.csv", "--no-draw").exit_code == 0
+    assert invoke("import", "second.csv", "--no-draw").exit_code == 2
+    assert invoke("import", "sample.csv", "second.csv", "third.csv", "--no-draw").exit_code == 0
+    _, data = read_artifact(project / RECORD, "recording")
+    assert data.runs() == ["sample", "second", "third"]
+
+
+def test_moved_projects_and_logs_stay_fresh(project: Path, tmp_path: Path) -> None:
+    """What counts is the name and content of a source, not where it lies."""
+    outside = tmp_path / "logs"
+    outside.mkdir()
+    for ending in ("csv", "toml"):
+        shutil.move(f"sample.{ending}", outside)
+    assert invoke("import", str(outside / "sample.csv"), "--no-draw").exit_code == 0
+    deep = tmp_path / "elsewhere" / "deep"
+    shutil.copytree(project, deep)
+    where = ("--project", str(deep), "--no-draw")
+    assert document("import", str(outside / "sample.csv"), *where)["state"] == "fresh"
+
+
+def test_missing_pictures_are_drawn_again(estimated: Path) -> None:
+    """A deleted page or picture comes back without computing, with the same report; other ones are left alone."""
+    before = read_header(estimated / ESTIMATE)
+    folder = estimated / "iterations/001"
+    (folder / "20-estimate.html").unlink()
+    answer = document("estimate")
+    assert (answer["state"], answer["report"]) == ("fresh", before.provenance.report)
+    assert (folder / "20-estimate.html").exists()
+    assert read_header(estimated / ESTIMATE) == before
+
+
+def test_pictures_never_show_another_artifact(estimated: Path) -> None:
+    """A new artifact without pictures takes the old ones away; drawing later makes them from the new one."""
+    folder = estimated / "iterations/001"
+    settings = ("--set", "estimate.contact_clearance_m=0.02")
+    assert document("estimate", *settings, "--no-draw")["state"] == "done"
+    assert not list(folder.glob("20-estimate*.png")) and not (folder / "20-estimate.html").exists()
+    assert document("estimate", *settings)["reasons"] == ["it was made with --no-draw"]
+    assert (folder / "20-estimate.html").exists()
+
+
+def test_an_input_that_changes_while_it_is_read_is_noticed(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Provenance must name what was read: a log that grows during the import is refused and nothing is written."""
+    import r2s2r_cli.stages.import_ as stage
+
+    merge = stage.merge_runs
+
+    def grow_and_merge(runs: object) -> object:
+        with Path("sample.csv").open("a") as file:
+            file.write("\n")
+        return merge(runs)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(stage, "merge_runs", grow_and_merge)
+    result = invoke("import", "sample.csv")
+    assert result.exit_code == 4
+    assert "changed while it was read" in result.stderr
+    assert not (project / RECORD).exists()
+
+
+def test_dry_run_of_a_fresh_artifact_touches_nothing(estimated: Path) -> None:
+    """--dry-run leaves even the file time, which make would act on."""
+    before = (estimated / ESTIMATE).stat().st_mtime_ns
+    assert document("estimate", "--dry-run")["state"] == "fresh"
+    assert (estimated / ESTIMATE).stat().st_mtime_ns == before
+
+
 def test_several_logs_become_several_runs(project: Path) -> None:
     """`import a.csv b.csv` makes one run a file, named by its stem, and estimate takes them all."""
     shutil.copy("sample.csv", "second.csv")

@@ -173,7 +173,7 @@ def test_all_reasons_are_given_at_once(project: Project) -> None:
     header = estimated(project)
     (project.root / "project.toml").write_text(SETTINGS.format("sensor_gap_s = 0.5"))
     text = (project.root / "robot.toml").read_text()
-    (project.root / "robot.toml").write_text(text.replace("tolerance = ", "tolerance = 0.5 # was ", 1))
+    (project.root / "robot.toml").write_text(text.replace("\ncap_radius_m = ", "\ncap_radius_m = 0.02 # was ", 1))
     record(project, frames=20)
     found = why(project, header)
     assert [reason.split(":")[0].split(" was")[0] for reason in found] == [

@@ -1,0 +1,28 @@
+"""The command that makes an artifact again, from what it remembers of how it was made."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Any
+
+from schemas.header import Provenance
+
+_PARTS = ("points", "history", "tendons", "masses")
+
+
+def command_again(made: Provenance, artifact: Path, *, force: bool = False) -> str:
+    """The command line, to be pasted in the project's directory; with --force where what lies there looks fresh."""
+    flags: dict[str, Any] = made.settings.get("flags", {})
+    words = ["r2s2r", made.stage]
+    if made.stage == "import":
+        words += [ref.path for ref in made.inputs if ref.kind in ("file", "folder")]
+        for option in ("format", "depth_scale"):
+            if flags.get(option) not in (None, "auto"):
+                words += [f"--{option.replace('_', '-')}", str(flags[option])]
+    elif made.stage == "calibrate":
+        words += [word for part in _PARTS for path in flags.get(part, ()) for word in (f"--{part}", path)]
+        words += ["--use", flags["use"]] if "use" in flags else []
+    if artifact.parent.name.isdigit():
+        words += ["--iteration", str(int(artifact.parent.name))]
+    return shlex.join([*words, "--force"] if force else words)

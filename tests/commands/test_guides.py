@@ -1,0 +1,52 @@
+"""What the guides show works as it stands there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from r2s2r_cli.stages.import_.authors_json import parse_frame
+from tests.commands.conftest import document, invoke
+
+GUIDES = Path(__file__).resolve().parents[2] / "docs" / "guides"
+
+
+def _block(page: str, language: str) -> str:
+    found = re.search(rf"^```{language}\n(.*?)^```", (GUIDES / page).read_text(), flags=re.MULTILINE | re.DOTALL)
+    assert found is not None, f"{page} has no {language} block"
+    return found[1]
+
+
+def test_the_policy_of_the_guide_validates(project: Path) -> None:
+    """The example is a policy of the default robot, without an error or a warning, also when the project is validated."""
+    Path("policies").mkdir()
+    Path("policies/crawl.toml").write_text(_block("policy.md", "toml"))
+    result = invoke("validate", "policies/crawl.toml")
+    assert result.exit_code == 0, result.stdout
+    assert "0 errors, 0 warnings" in result.stdout + result.stderr
+    Path("policies/crawl.toml").write_text(_block("policy.md", "toml").replace("1.0, 0.1", "1.5, 0.1"))
+    assert invoke("validate").exit_code != 0
+
+
+def test_the_frame_of_the_guide_is_read() -> None:
+    """Every value of the example reaches the record, in SI; what is null was not seen."""
+    record = parse_frame(_block("authors-folder.md", "json").encode(), "guide")
+    assert record.t == 1676990000.125
+    assert record.info["max_speed"] == 80
+    assert record.motors[0]["encoder_length"] == pytest.approx(0.0112)
+    assert record.sensors[0] == pytest.approx((21.07e-12, 0.1314))
+    assert record.imu[0][2] == pytest.approx(0.99 * 9.80665)
+    assert record.mocap == {0: pytest.approx((0.1025, -0.0401, 0.0174))}
+
+
+def test_the_export_commands_of_the_guide_run(estimated: Path) -> None:
+    """The commands as they stand in the guide, and the files that its table names."""
+    for line in _block("export.md", "sh").splitlines():
+        words = line.partition("#")[0].split()
+        assert words[:2] == ["r2s2r", "export"]
+        assert document(*words[1:])["files"]
+    for name in ("20-estimate/runs/sample/frames.csv", "20-estimate/runs/sample/frames_by_sensor.csv",
+                 "20-estimate/runs/sample/ground.csv", "20-estimate/attributes.json"):  # fmt: skip
+        assert (Path("exported") / name).is_file(), name

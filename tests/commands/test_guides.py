@@ -20,7 +20,7 @@ def _block(page: str, language: str) -> str:
 
 
 def test_the_policy_of_the_guide_validates(project: Path) -> None:
-    """The example is a policy of the default robot, without an error or a warning, also when the project is validated."""
+    """The example has no error and no warning; a slip in it is found when the whole project is validated."""
     Path("policies").mkdir()
     Path("policies/crawl.toml").write_text(_block("policy.md", "toml"))
     result = invoke("validate", "policies/crawl.toml")

@@ -56,8 +56,8 @@ Radius = Annotated[float, Field(strict=True, gt=0), AtMost(1.0, "m", _MM)]
 Coordinate = Annotated[float, Field(strict=True), AtMost(LENGTH_MAX_M, "m", _MM)]
 Mass = Annotated[float, Field(strict=True, gt=0), AtMost(1000.0, "kg", "looks like grams")]
 """A part [kg]; a ton is what no cable robot of this sort lifts."""
-Tolerance = Annotated[float, Field(strict=True, gt=0), AtMost(0.9, "", "looks like per cent or millimetres: 0.1 is a tenth of the range")]  # fmt: skip
-"""Share of a cable's range: with 1 every cable would be done before it has moved."""
+Tolerance = Annotated[float, Field(strict=True, gt=0), AtMost(1.0, "", "looks like per cent or millimetres: 0.1 is a tenth of the range")]  # fmt: skip
+"""Share of a cable's range: beyond 1 every cable would be done before it has moved."""
 Duration = Annotated[float, Field(strict=True, ge=0), AtMost(3600.0, "s", "looks like milliseconds")]
 """[s] of one step: nobody waits an hour for a cable, and 6000 is 6 s in milliseconds."""
 Wait = Annotated[float, Field(strict=True, gt=0), AtMost(3600.0, "s", "looks like milliseconds")]

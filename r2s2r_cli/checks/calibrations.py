@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -85,7 +86,12 @@ def residuals_are_small(content: Content) -> Iterator[Found]:
             yield Found("lines/rms", f"a line of set {name} does not fit its points",
                         f"at most {number(RMS_MAX_M, 1e3)} mm rms",
                         worst(rms[row], high, ("sensor",), scale=1e3, unit="mm"),
-                        f"look at its largest residual in calibration-sensors-{name}.png, and measure that point again")  # fmt: skip
+                        f"look at its largest residual in {_picture(name)}, and measure that point again")  # fmt: skip
+
+
+def _picture(name: str) -> str:
+    """File name of the picture of a set; names that make no file name are numbered there, so it is described."""
+    return f"calibration-sensors-{name}.png" if re.fullmatch(r"[\w.-]+", name) else f"the picture of set {name}"
 
 
 @check(

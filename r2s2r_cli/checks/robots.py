@@ -179,11 +179,12 @@ def winches_plausible(robot: Robot) -> Iterator[Found]:
 def rest_lengths_in_limits(robot: Robot) -> Iterator[Found]:
     """Tendons that are always slack."""
     most = robot.limits.cable_length_max_m
-    for table, entries in (("cables", robot.cables), ("sensors", robot.sensors)):
-        for i, entry in enumerate(entries):
-            if entry.rest_length_m is not None and entry.rest_length_m >= most:
-                yield Found(f"{table}.{i}.rest_length_m", f"the tendon of {table[:-1]} {i} is always slack",
-                            f"below {number(most, 1e3)} mm", f"{number(entry.rest_length_m, 1e3)} mm")  # fmt: skip
+    tendons = [("cable", i, cable.rest_length_m) for i, cable in enumerate(robot.cables)]
+    tendons += [("sensor", i, sensor.rest_length_m) for i, sensor in enumerate(robot.sensors)]
+    for word, i, length in tendons:
+        if length is not None and length >= most:
+            yield Found(f"{word}s.{i}.rest_length_m", f"the tendon of {word} {i} is always slack",
+                        f"below {number(most, 1e3)} mm", f"{number(length, 1e3)} mm")  # fmt: skip
 
 
 @check(

@@ -46,6 +46,7 @@ def import_source(
     name = run_name(path)
     files = (path,) if sidecar is not None else (path, sidecar_path(path))
     stated = read_sidecar(path) if sidecar is None else sidecar
+    known = tuple(known_rods or ())
     if chosen == "trajectory_csv":
         groups, report = import_trajectory(
             data,
@@ -57,9 +58,13 @@ def import_source(
             known_rods=known_rods,
         )
     elif chosen == "authors_folder":
-        groups, report = import_authors_folder(path, name, robot=robot, sidecar=stated, depth_scale=depth_scale)
+        groups, report = import_authors_folder(
+            path, name, robot=robot, sidecar=stated, depth_scale=depth_scale, known_robots=known
+        )
     else:
-        groups, report = import_tum(path, name, robot=robot, sidecar=stated, depth_scale=depth_scale)
+        groups, report = import_tum(
+            path, name, robot=robot, sidecar=stated, depth_scale=depth_scale, known_robots=known
+        )
     return ImportedRun(name=name, groups=groups, report=report, files=files)
 
 

@@ -7,6 +7,7 @@ The JSON of a frame carries the stamp of the control message; colour and depth w
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from r2s2r_cli.stages.import_.camera_config import camera_attributes
 from r2s2r_cli.stages.import_.files import MAX_TEXT_BYTES, list_folder, quoted, read_source
 from r2s2r_cli.stages.import_.images import check_images, frame_blobs
 from r2s2r_cli.stages.import_.run import NO_NATURE, check_clock, dropped_frames, stream_sizes, time_facts
-from r2s2r_cli.stages.import_.sidecar import check_robot_name, run_attributes
+from r2s2r_cli.stages.import_.sidecar import check_sidecar, run_attributes
 from r2s2r_cli.stages.segments import Intervals, Segments, segments, target_intervals
 from schemas.results_import import ImportReport
 from schemas.robot import Robot
@@ -34,7 +35,13 @@ UNIX_SINCE = 1e9
 
 
 def import_authors_folder(
-    folder: Path, name: str, *, robot: Robot, sidecar: Sidecar, depth_scale: float | None = None
+    folder: Path,
+    name: str,
+    *,
+    robot: Robot,
+    sidecar: Sidecar,
+    depth_scale: float | None = None,
+    known_robots: Sequence[str] = (),
 ) -> tuple[dict[str, Group], ImportReport]:
     """Groups of one run by stream (the run itself under ''), and the report.
 
@@ -42,7 +49,7 @@ def import_authors_folder(
     count, needed where config.json does not give it. The folder has no end caps in the world frame (`estimate`
     finds them in the images), so intervals count the kept frames of `commands`. Raises InputError.
     """
-    check_robot_name(sidecar, robot, str(folder))
+    check_sidecar(sidecar, robot, str(folder), known_robots)
     data, color, depth = (_numbered(folder / part, suffixes) for part, suffixes in SUFFIXES.items())
     if not data:
         raise InputError(

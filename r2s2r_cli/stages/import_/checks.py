@@ -71,8 +71,7 @@ def _wrong_length(
                 where=where,
                 expected=f"rods of {robot_values} m",
                 received=f"rods of {values} m",
-                hint=f"say so in the header: sed -i.bak -e '1s/_{unit},/_{word},/g' -e '1s/_{unit}$/_{word}/' "
-                f"{quoted(where)}",
+                hint=f"sed -i.bak -e '1s/_{unit},/_{word},/g' -e '1s/_{unit}$/_{word}/' {quoted(where)}",
             )
     pairs = _pairs(p_WE, expected, tolerance)
     if pairs:

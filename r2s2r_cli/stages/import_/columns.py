@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.import_ import clock
 from r2s2r_cli.stages.import_.checks import UNITS
-from r2s2r_cli.stages.import_.files import clipped, nearest, quoted, shown
+from r2s2r_cli.stages.import_.files import clipped, in_place, nearest, quoted, shown
 from r2s2r_cli.stages.import_.table import Table
 from schemas.results_import import LengthUnit
 from schemas.robot import Robot
@@ -61,16 +62,18 @@ def find_columns(table: Table, robot: Robot) -> Columns:
     known = [*needed, *([] if has_control else control), *length]
     for i, name in enumerate(table.names):
         if name not in known:
-            near = nearest(name, known)
+            if name.lower() in clock.COLUMNS and "t_s" not in index:
+                raise _other_clock(name, i, where, table.where)
+            near = "t_s" if name.lower() in clock.ALIASES and "t_s" not in index else nearest(name, known)
             raise InputError(
                 f"unknown column {shown(name)}" + (f" (did you mean {near!r}?)" if near else ""),
                 where=f"{where}, column {i + 1}",
                 expected=f"t_s, cap0_x_{unit} .. cap{n_caps - 1}_z_{unit}, target0 .. target{n_actuated - 1}, "
                 f"control0 .., length0_{unit} ..",
                 received=shown(name),
-                hint=f"rename it: sed -i.bak '1s/{name}/{near}/' {quoted(table.where)}"
+                hint=f"sed -i.bak -E '1s/(^|,) *{name} *(,|$)/\\1{near}\\2/' {quoted(table.where)}"
                 if near and re.fullmatch(r"\w+", name)
-                else f"take it out: cut -d, --complement -f{i + 1} {quoted(table.where)} > fewer.csv",
+                else f"{in_place(table.where, f'cut -d, --complement -f{i + 1}')}   # takes it out",
             )
     absent = [name for name in needed if name not in index]
     if absent:
@@ -90,6 +93,17 @@ def find_columns(table: Table, robot: Robot) -> Columns:
         control=np.array([index[name] for name in control], dtype=int) if has_control else None,
         length=np.array([column for _, column in lengths], dtype=int),
         length_cable=np.array([cable for cable, _ in lengths], dtype=np.int64),
+    )
+
+
+def _other_clock(name: str, i: int, where: str, file: str) -> InputError:
+    unit = clock.COLUMNS[name.lower()]
+    return InputError(
+        f"the stamps are in {unit}",
+        where=f"{where}, column {i + 1}",
+        expected="a column t_s, in seconds",
+        received=shown(name),
+        hint=clock.to_seconds(name, unit, file),
     )
 
 

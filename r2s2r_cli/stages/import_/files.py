@@ -132,7 +132,7 @@ def decode(data: bytes, what: str, where: str) -> str:
             where=where,
             expected="UTF-8",
             received=f"a {encoding} byte-order mark",
-            hint=f"iconv -f {encoding} -t UTF-8 {quoted(where)} > utf8.txt",
+            hint=in_place(where, f"iconv -f {encoding} -t UTF-8"),
         )
     zero = data.find(b"\0")
     if zero >= 0:
@@ -153,7 +153,7 @@ def decode(data: bytes, what: str, where: str) -> str:
             where=f"{where}:{line}:{column}",
             expected="UTF-8",
             received=f"byte 0x{data[error.start]:02x}",
-            hint=f"iconv -f LATIN1 -t UTF-8 {quoted(where)} > utf8.txt",
+            hint=in_place(where, "iconv -f LATIN1 -t UTF-8"),
         ) from error
 
 
@@ -181,6 +181,12 @@ def _unreadable(path: Path, what: str, error: Exception) -> InputError:
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     name = str(path) if str(path).isprintable() else shown(str(path))
     return InputError(f"{what} cannot be read", where=name, received=reason, hint=f"ls -ld {quoted(name)}")
+
+
+def in_place(path: object, filter_command: str) -> str:
+    """A command that puts a file through a filter and keeps the original as `.bak`; the sidecar still fits."""
+    copy = quoted(f"{path}.bak")
+    return f"cp {quoted(path)} {copy} && {filter_command} < {copy} > {quoted(path)}"
 
 
 def quoted(path: object) -> str:

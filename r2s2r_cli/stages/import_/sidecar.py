@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ from schemas.sidecar import MINIMAL_SIDECAR, Sidecar, SidecarPid
 
 NOT_STATED = "not stated"
 """Nature of a run whose sidecar does not say it."""
+UNIT_MARGIN = 10**0.5
+"""A wrong unit is off by 10 at least: lengths may leave the robot's limits by this factor, no further."""
 
 
 def sidecar_path(source: Path) -> Path:
@@ -63,15 +66,51 @@ def parse_sidecar(data: bytes, where: str) -> Sidecar:
         raise InputError("the sidecar nests too deep", where=where, hint=f"cat -n {quoted(where)}") from error
 
 
-def check_robot_name(sidecar: Sidecar, robot: Robot, where: str) -> None:
-    """Refuse the log of another robot than the project's."""
+def check_sidecar(sidecar: Sidecar, robot: Robot, where: str, known: Iterable[str] = ()) -> None:
+    """Refuse the log of another robot than the project's, and a controller in another unit than metres.
+
+    known: names of the robots that `init` knows. Raises InputError.
+    """
     if sidecar.robot != robot.name:
+        others = sorted(set(known) - {robot.name})
+        script = f"'s/^ *robot *=.*/robot = \"{robot.name}\"/'"
+        here = f"sed -i.bak {script} {quoted(sidecar_path(Path(where)))}   # if it is this project's robot"
+        if sidecar.robot in others:
+            hint = f"r2s2r init other --robot {quoted(sidecar.robot)}   # and import it into that project"
+        else:
+            hint = here + (f"; r2s2r init also knows {', '.join(others)}" if others else "")
         raise InputError(
             "the log is of another robot than this project",
             where=where,
             expected=f"robot {shown(robot.name)} (robot.toml)",
             received=f"robot {shown(sidecar.robot)} (sidecar)",
-            hint=f"import it into a project of its robot: r2s2r init other --robot {quoted(sidecar.robot)}",
+            hint=hint,
+        )
+    _check_controller(sidecar, robot, where)
+
+
+def _check_controller(sidecar: Sidecar, robot: Robot, where: str) -> None:
+    """Refuse lengths of the controller that cables of this robot are far from: another unit."""
+    low, high = sidecar.pid.min_length_m, sidecar.pid.range_m
+    most = robot.limits.cable_length_max_m * UNIT_MARGIN
+    least = robot.limits.cable_length_min_m / UNIT_MARGIN
+    span = robot.limits.cable_length_max_m - robot.limits.cable_length_min_m
+    wrong = [
+        f"pid.{key} = {value:g}"
+        for key, value, bad in (
+            ("min_length_m", low, low is not None and not least <= low <= most),
+            ("range_m", high, high is not None and not 0 < high <= span * UNIT_MARGIN),
+        )
+        if bad
+    ]
+    if wrong:
+        raise InputError(
+            "the controller in the sidecar asks for lengths that cables of this robot cannot have",
+            where=f"{sidecar_path(Path(where))}, {wrong[0].partition(' ')[0]}",
+            expected=f"metres: cables of {robot.name} are {robot.limits.cable_length_min_m:g} to "
+            f"{robot.limits.cable_length_max_m:g} m long",
+            received=", ".join(wrong),
+            hint="give both in metres: 95 mm is 0.095",
         )
 
 
@@ -131,10 +170,15 @@ def _invalid(error: ValidationError, where: str) -> InputError:
     return InputError(
         f"the sidecar's {key} is wrong",
         where=where,
-        expected="a table" if first["type"] == "model_type" else first["msg"].removeprefix("Input should be "),
+        expected="a table" if first["type"] == "model_type" else _in_words(first["msg"]),
         received=shown(first["input"]),
         hint=f"grep -n {quoted(str(place[-1])[:60] if place else '=')} {quoted(where)}",
     )
+
+
+def _in_words(message: str) -> str:
+    """What pydantic says of a value, without its own first words."""
+    return message.removeprefix("Input should be ").removeprefix("Value error, ")
 
 
 def _known_keys(parents: tuple[Any, ...]) -> list[str]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.import_.files import decode, quoted, shown
+from r2s2r_cli.stages.import_.files import decode, in_place, quoted, shown
 
 MAX_COLUMNS = 2000
 """Far above any robot; a header longer than this is no header."""
@@ -101,7 +101,7 @@ def _header(cells: list[str], text: str, where: str) -> tuple[str, ...]:
                 where=f"{where}:1",
                 expected="commas",
                 received=shown(line),
-                hint=f"tr -s ' ' ',' < {quoted(where)} > commas.csv",
+                hint=in_place(where, "tr -s ' ' ','"),
             )
     if len(cells) > MAX_COLUMNS:
         raise InputError(
@@ -118,7 +118,7 @@ def _header(cells: list[str], text: str, where: str) -> tuple[str, ...]:
             where=f"{where}:1",
             expected="the names of the columns",
             received=shown(line),
-            hint=f"put it into the sidecar's source: grep -v '^#' {quoted(where)} > plain.csv",
+            hint=f"{in_place(where, 'grep -v ^#')}   # after putting it into the sidecar's source",
         )
     if "" in names:
         raise InputError(
@@ -126,7 +126,7 @@ def _header(cells: list[str], text: str, where: str) -> tuple[str, ...]:
             where=f"{where}:1, column {names.index('') + 1}",
             expected="a name",
             received="nothing: a comma too many?",
-            hint=f"name it, or take it out: cut -d, --complement -f{names.index('') + 1} {quoted(where)} > fewer.csv",
+            hint=f"{in_place(where, f'cut -d, --complement -f{names.index(str()) + 1}')}   # or name it",
         )
     if all(_number(name) is not None for name in names):
         raise InputError(
@@ -158,7 +158,7 @@ def _delimiter(delimiter: str, word: str, text: str, where: str) -> InputError:
         where=f"{where}:1",
         expected="commas between columns, points in decimals",
         received=word,
-        hint=f"sed '{script}' {quoted(where)} > commas.csv",
+        hint=f"sed -i.bak '{script}' {quoted(where)}",
     )
 
 

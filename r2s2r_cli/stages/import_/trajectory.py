@@ -7,9 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from r2s2r_cli.artifact import Group, Scalar
+from r2s2r_cli.control_sign import WRONG_SIGN, cable_response
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages import frames
 from r2s2r_cli.stages.import_.checks import ROD_TOLERANCE, UNITS, check_handedness, check_rod_length, check_up_axis
+from r2s2r_cli.stages.import_.clock import check_stamps, few_frames
 from r2s2r_cli.stages.import_.columns import Columns, find_columns
 from r2s2r_cli.stages.import_.run import (
     NO_NATURE,
@@ -20,7 +22,7 @@ from r2s2r_cli.stages.import_.run import (
     stream_sizes,
     time_facts,
 )
-from r2s2r_cli.stages.import_.sidecar import check_robot_name, run_attributes
+from r2s2r_cli.stages.import_.sidecar import check_sidecar, run_attributes
 from r2s2r_cli.stages.import_.table import Table, read_table
 from r2s2r_cli.stages.segments import segments, target_intervals
 from schemas.results_import import ImportReport
@@ -33,8 +35,6 @@ MAX_STAMP_S = 1e11
 """Unix seconds are 1.7e9; milliseconds since 1970 are above this."""
 _EPS = 1e-6
 """Rounding of a logged position or control."""
-SLOW_GAP_S = 5.0
-"""A median gap above this is rather a clock in milliseconds than a camera."""
 
 
 def import_trajectory(
@@ -54,9 +54,10 @@ def import_trajectory(
     other robots, named in the message when this one's do not fit. Raises InputError for anything that cannot be
     read exactly as it stands: nothing is converted but the unit that the column names state.
     """
-    check_robot_name(sidecar, robot, where)
+    check_sidecar(sidecar, robot, where, known_rods or ())
     table = read_table(data, where)
     columns = find_columns(table, robot)
+    check_stamps(table.values[:, columns.t], where)
     _check_cells(table, columns)
     values = table.values
     scale = UNITS[columns.unit]
@@ -123,8 +124,9 @@ def import_trajectory(
         )
     if noise is not None and noise.held:
         warnings.append(f"far quieter than the rest, as if the source held them: {', '.join(noise.held)}")
-    if facts.gap_median is not None and facts.gap_median > SLOW_GAP_S:
-        warnings.append(f"the median gap between frames is {facts.gap_median:g} s: is t_s in milliseconds?")
+    warnings += few_frames(len(t_kept), dropped_frames(reason)) + _check_control(
+        groups["commands"], t_kept, p_kept, robot
+    )
     if sidecar.nature is None:
         warnings.append(NO_NATURE)
     if len(intervals) and not intervals.complete[-1]:
@@ -206,6 +208,26 @@ def _commands(t: np.ndarray, reason: np.ndarray, target: np.ndarray, control: np
     return Group(datasets=datasets)
 
 
+def _check_control(commands: Group, t: np.ndarray, p_WE: np.ndarray, robot: Robot) -> list[str]:
+    """The warning about commands that lengthen their cables: all signs exchanged."""
+    if "control" not in commands.datasets:
+        return []
+    response = cable_response(t, cap_distances(p_WE, robot), commands["t"], commands["control"])
+    if not response < WRONG_SIGN:
+        return []
+    text = (
+        f"control > 0 lengthens the cables (correlation {response:.2f}): +1 must reel in, so the signs of the control "
+        "columns are wrong; negate them and import again"
+    )
+    return [text]
+
+
+def cap_distances(p_WE: np.ndarray, robot: Robot) -> np.ndarray:
+    """Distance of the two caps of each actuated cable [m], shape (frame, actuated)."""
+    ends = np.array([robot.cables[k].caps for k in robot.actuated], dtype=int).reshape(-1, 2)
+    return np.linalg.norm(p_WE[:, ends[:, 0]] - p_WE[:, ends[:, 1]], axis=-1)
+
+
 def _cable_position(p_WE: np.ndarray, robot: Robot, attributes: Mapping[str, Scalar]) -> np.ndarray | None:
     """Position of the actuated cables from the distance of their caps, shape (frame, actuated).
 
@@ -215,6 +237,4 @@ def _cable_position(p_WE: np.ndarray, robot: Robot, attributes: Mapping[str, Sca
     """
     if "pid_min_length" not in attributes or "pid_range" not in attributes:
         return None
-    ends = np.array([robot.cables[k].caps for k in robot.actuated])
-    distance = np.linalg.norm(p_WE[:, ends[:, 0]] - p_WE[:, ends[:, 1]], axis=-1)
-    return (distance - float(attributes["pid_min_length"])) / float(attributes["pid_range"])
+    return (cap_distances(p_WE, robot) - float(attributes["pid_min_length"])) / float(attributes["pid_range"])

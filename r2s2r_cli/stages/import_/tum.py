@@ -6,6 +6,7 @@ Format: https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -18,7 +19,7 @@ from r2s2r_cli.stages.import_.camera_config import check_depth_scale
 from r2s2r_cli.stages.import_.files import MAX_CSV_BYTES, decode, quoted, read_source, shown
 from r2s2r_cli.stages.import_.images import check_images, frame_blobs
 from r2s2r_cli.stages.import_.run import NO_NATURE, check_clock, dropped_frames, stream_sizes, time_facts
-from r2s2r_cli.stages.import_.sidecar import check_robot_name, run_attributes
+from r2s2r_cli.stages.import_.sidecar import check_sidecar, run_attributes
 from schemas.results_import import ImportReport
 from schemas.robot import Robot
 from schemas.sidecar import Sidecar
@@ -43,7 +44,13 @@ class _Lines:
 
 
 def import_tum(
-    folder: Path, name: str, *, robot: Robot, sidecar: Sidecar, depth_scale: float | None = None
+    folder: Path,
+    name: str,
+    *,
+    robot: Robot,
+    sidecar: Sidecar,
+    depth_scale: float | None = None,
+    known_robots: Sequence[str] = (),
 ) -> tuple[dict[str, Group], ImportReport]:
     """Groups of one run by stream (the run itself under ''), and the report.
 
@@ -51,7 +58,7 @@ def import_tum(
     Stamps of the format are wall-clock time. depth_scale [m a count] replaces the format's 1/5000. The intrinsics
     are not part of the format, and are not guessed. Raises InputError.
     """
-    check_robot_name(sidecar, robot, str(folder))
+    check_sidecar(sidecar, robot, str(folder), known_robots)
     color, color_paths, left_color = _images(folder, RGB)
     depth, depth_paths, left_depth = _images(folder, DEPTH)
     size = check_images(color_paths, depth_paths)

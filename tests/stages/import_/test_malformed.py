@@ -8,7 +8,7 @@ import pytest
 
 from r2s2r_cli.errors import ExitCode, InputError
 from r2s2r_cli.stages.import_.authors_json import parse_frame
-from r2s2r_cli.stages.import_.sidecar import check_robot_name, parse_sidecar
+from r2s2r_cli.stages.import_.sidecar import check_sidecar, parse_sidecar
 from r2s2r_cli.stages.import_.trajectory import import_trajectory
 from tests.support.import_samples import SIDECAR, frame_json, sample_robot, small_csv
 from tests.support.malformed import Malformed, csv_cases, json_cases, mutated, sidecar_cases
@@ -24,7 +24,7 @@ def read_csv(data: bytes) -> None:
 
 def read_sidecar(data: bytes) -> None:
     """Parse a sidecar and compare its robot."""
-    check_robot_name(parse_sidecar(data, "log.toml"), ROBOT, "log.toml")
+    check_sidecar(parse_sidecar(data, "log.toml"), ROBOT, "log.toml")
 
 
 def read_json(data: bytes) -> None:

@@ -12,7 +12,7 @@ from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.stages.import_ import check_source, find_format, import_source, merge_runs
 from r2s2r_cli.stages.import_.files import FileBytes, clipped, file_size, nearest, read_source
 from r2s2r_cli.stages.import_.sidecar import parse_sidecar, sidecar_path
-from schemas.sidecar import MINIMAL_SIDECAR
+from schemas.sidecar import MINIMAL_SIDECAR, PLACEHOLDER
 from tests.support.import_samples import SIDECAR, frame_json, sample_robot, small_csv, write_authors_folder
 
 ROBOT = sample_robot()
@@ -54,23 +54,26 @@ def test_two_runs_of_one_name_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_log_without_sidecar_is_refused_and_shown_one(tmp_path: Path) -> None:
-    """The message shows a minimal sidecar, which is a valid one."""
+    """The message shows a minimal sidecar, which is a valid one once its source says something."""
     path = log(tmp_path)
     (tmp_path / "log.toml").unlink()
     error = refusal(path)
     assert MINIMAL_SIDECAR.strip() in error.expected
-    assert parse_sidecar(MINIMAL_SIDECAR.encode(), "x").robot == "threebar"
+    assert parse_sidecar(MINIMAL_SIDECAR.replace(PLACEHOLDER, "tribar").encode(), "x").robot == "threebar"
     assert import_source(path, robot=ROBOT, sidecar=parse_sidecar(SIDECAR.encode(), "x")).files == (path,)
 
 
 def test_the_hint_for_a_missing_sidecar_writes_a_valid_one(tmp_path: Path) -> None:
-    """The pasted command makes the file."""
+    """The pasted command makes the file; only its source is still to be written."""
     import subprocess
 
     path = log(tmp_path)
     (tmp_path / "log.toml").unlink()
     subprocess.run(["sh", "-c", refusal(path).hint], check=True)
-    assert parse_sidecar((tmp_path / "log.toml").read_bytes(), "x").nature == "measured"
+    text = (tmp_path / "log.toml").read_text()
+    with pytest.raises(InputError, match="source is wrong"):
+        parse_sidecar(text.encode(), "x")
+    assert parse_sidecar(text.replace(PLACEHOLDER, "tribar").encode(), "x").nature == "measured"
 
 
 def test_the_sidecar_of_a_folder_lies_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,6 +7,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -15,7 +16,7 @@ from typer.core import TyperGroup
 from r2s2r_cli import __version__
 from r2s2r_cli.commands import COMMANDS, GROUPS
 from r2s2r_cli.console import PipeClosed, print_error
-from r2s2r_cli.errors import DamageWarning, ExitCode, GateError, R2S2RError, UsageError
+from r2s2r_cli.errors import DamageWarning, ExitCode, GateError, InputError, R2S2RError, UsageError
 
 BUG_MESSAGE = "this is a bug in r2s2r, please report it with the lines above"
 
@@ -34,6 +35,7 @@ class ErrorGroup(TyperGroup):
     ) -> Any:
         """Run; leave through SystemExit with one of our codes. No arguments: show the help."""
         del standalone_mode  # our own error handling replaces Typer's, which this flag would switch on
+        _open_streams()
         arguments = list(sys.argv[1:] if args is None else args) or ["--help"]
         run = super().main
         code = run_guarded(
@@ -83,10 +85,40 @@ def _run_guarded(call: Callable[[], object], as_json: bool) -> int:
     except (PipeClosed, BrokenPipeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python must not complain at its exit
         return ExitCode.DONE
+    except OSError as error:
+        print_error(_system_error(error), as_json=as_json)
+        return ExitCode.INPUT
+    except UnicodeError as error:
+        print_error(_text_error(error), as_json=as_json)
+        return ExitCode.USAGE
     except Exception:
         traceback.print_exc()
         print(BUG_MESSAGE, file=sys.stderr)
         return ExitCode.BUG
+
+
+def _system_error(error: OSError) -> InputError:
+    """The operating system refused something that no command foresaw: a deleted directory, a forbidden one."""
+    place = (
+        os.fsdecode(error.filename) if isinstance(error.filename, str | bytes | os.PathLike) else "the directory here"
+    )
+    return InputError("the system does not let r2s2r go on", where=place, expected="a file or directory it may use",
+                      received=error.strerror or str(error), hint="cd to the project, look at it with: ls -la")  # fmt: skip
+
+
+def _text_error(error: UnicodeError) -> UsageError:
+    return UsageError("a name is not UTF-8 text", where="the command line", expected="UTF-8",
+                      received=ascii(str(error))[:100], hint="rename it, then run the command again")  # fmt: skip
+
+
+def _open_streams() -> None:
+    """Streams that exist and take every character: `>&-` closes one, an ASCII locale refuses most."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115 - stays open to the end
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _usage_error(error: typer.TyperException) -> UsageError:

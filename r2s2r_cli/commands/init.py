@@ -52,6 +52,7 @@ def init(
     console = Console(json=json, quiet=quiet)
     root = directory.absolute()
     title = name or root.name or "project"
+    title.encode()  # a name that is not text cannot stand in project.toml: UnicodeEncodeError says so
     texts = init_texts(robot, attachment.value, sample_seed=seed if sample else None)
     files = {PROJECT_FILE: project_toml(title), **texts, "Makefile": _makefile()}
     _refuse_overwriting(root, files)

@@ -42,6 +42,8 @@ def _describe(path: Path) -> InspectResult:
     try:
         header = checked_header(path)
     except NotAnArtifact:
+        if not path.is_file():
+            raise
         return _foreign(path)
     return InspectResult(path=str(path), header=header.model_dump(mode="json"), nodes=tuple(describe(path)))
 

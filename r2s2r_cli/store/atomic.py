@@ -27,6 +27,9 @@ def replacing(target: Path) -> Iterator[Path]:
     temp = temp_beside(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise disk_error(error, target) from error
+    try:
         yield temp
         _fsync(temp)
         os.replace(temp, target)

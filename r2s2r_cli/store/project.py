@@ -16,6 +16,8 @@ from schemas.versions import KINDS
 
 PROJECT_FILE = "project.toml"
 CONFIG_FILE = "config.toml"
+MAX_ITERATION = 9999
+"""A larger number is a slip of the finger that would become "the latest"."""
 ITERATIONS = "iterations"
 JOURNAL_SUFFIX = ".journal"
 _HEAD_KEYS = ("schema_version", "name", "robot")
@@ -90,9 +92,9 @@ class Project:
                 raise ArtifactError("there is no iteration yet", where=str(self.root / ITERATIONS),
                                     expected="at least one", received="none", hint="r2s2r import run.csv")  # fmt: skip
             number = 1
-        if number < 1:
-            raise UsageError("an iteration number is too small", where="--iteration", expected="1 or more",
-                             received=str(number), hint="r2s2r status")  # fmt: skip
+        if not 1 <= number <= MAX_ITERATION:
+            raise UsageError("there is no such iteration number", where="--iteration",
+                             expected=f"1 to {MAX_ITERATION}", received=str(number), hint="r2s2r status")  # fmt: skip
         path = self.root / ITERATIONS / f"{number:03d}"
         if create or path.is_dir():
             return Iteration(number, path)

@@ -49,6 +49,8 @@ def tree(path: str) -> Report:
 
 def find_body(path: Path) -> int | None:
     """Offset of the HDF5 body: the first power of two from 4096 where its signature stands, or None."""
+    if not path.is_file():  # to open a pipe could block for ever
+        return None
     offset = MIN_BLOCK
     with path.open("rb") as file:
         while offset <= MAX_BLOCK:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import pty
 import subprocess
 import sys
 from pathlib import Path
@@ -109,6 +111,7 @@ def test_a_closed_pipe_is_not_an_error(tmp_path: Path) -> None:
     """`r2s2r ... | head -1` ends quietly."""
     command = f"'{sys.executable}' -m r2s2r_cli doctor --quick | head -1"
     shell = subprocess.run(["bash", "-c", f"set -o pipefail; {command}"], capture_output=True, text=True, cwd=tmp_path)
+    assert shell.returncode == 0
     assert "Traceback" not in shell.stderr
     assert "Exception ignored" not in shell.stderr
 
@@ -145,6 +148,58 @@ def test_an_override_that_would_be_ignored_is_refused(item: str, words: str) -> 
     with pytest.raises(UsageError, match=words) as caught:
         parse_overrides([item], "s")
     assert caught.value.hint.startswith("--set s.")
+
+
+SHELL_CASES = {
+    "deleted directory": ("mkdir gone && cd gone && rmdir ../gone && {r2s2r} status", 4),
+    "forbidden directory": ("{r2s2r} import iterations/001 --project /proc/self/fdinfo", 4),
+    "name of 300 characters": ("{r2s2r} init $(printf 'a%.0s' $(seq 300))", 4),
+    "name that is no text": ("{r2s2r} init $'a\\xff'", 2),
+    "closed stdout": ("{r2s2r} doctor --quick >&-", 0),
+    "closed stderr": ("{r2s2r} doctor --quick 2>&-", 0),
+    "ascii locale": ("PYTHONIOENCODING=ascii {r2s2r} init $'r\\xc3\\xb6bi' && cd r* && {r2s2r} status", 0),
+    "full stdout": ("{r2s2r} doctor --quick > /dev/full", 4),
+    "a pipe as file": ("mkfifo pipe; {r2s2r} inspect pipe", 4),
+    "a pipe to recover": ("mkfifo pipe; {r2s2r} recover pipe", 4),
+    "an iteration of many digits": (
+        "{r2s2r} init p && cd p && {r2s2r} status && {r2s2r} estimate --iteration 99999",
+        2,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", list(SHELL_CASES))
+def test_odd_surroundings_never_end_in_a_traceback(tmp_path: Path, name: str) -> None:
+    """What a shell can do to a program: the documented exit code, no traceback, no hanging."""
+    line, code = SHELL_CASES[name]
+    command = line.format(r2s2r=f"'{sys.executable}' -m r2s2r_cli")
+    shell = subprocess.run(["bash", "-c", command], capture_output=True, text=True, cwd=tmp_path, timeout=60)
+    assert "Traceback" not in shell.stderr
+    assert shell.returncode == code, shell.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments", [("validate",), ("import", "sample.csv", "--force", "--no-draw"), ("doctor", "--quick")]
+)
+def test_a_real_terminal_is_no_trouble(project: Path, arguments: tuple[str, ...]) -> None:
+    """On a terminal, where the progress bar is drawn, commands end as they do in a pipe."""
+    code, output = on_a_terminal(project, arguments)
+    assert "Traceback" not in output
+    assert code == 0, output
+
+
+def on_a_terminal(folder: Path, arguments: tuple[str, ...]) -> tuple[int, str]:
+    """Exit code and output of `r2s2r` on a pseudo terminal."""
+    child, terminal = pty.fork()
+    if child == 0:
+        os.chdir(folder)
+        os.execv(sys.executable, [sys.executable, "-m", "r2s2r_cli", *arguments])
+    output = b""
+    with contextlib.suppress(OSError):  # Linux says EIO once the child has closed its side
+        while part := os.read(terminal, 4096):
+            output += part
+    os.close(terminal)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), output.decode(errors="replace")
 
 
 def test_typer_errors_are_still_of_one_family() -> None:

@@ -102,8 +102,8 @@ def import_(
     show_outcome(result, console)
     for said in report.runs if report is not None else ():
         _show(said, console)
-    if result.state == "done":
-        console.hint("r2s2r estimate")
+    if result.state == "done" and report is not None and all("caps" in said.streams for said in report.runs):
+        console.hint(f"r2s2r estimate --iteration {place.number}")
 
 
 def _refs(project: Project, sources: list[Path], format_: Format) -> list[InputRef]:

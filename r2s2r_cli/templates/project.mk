@@ -11,7 +11,7 @@ ITER   ?= 001
 SOURCE ?=
 
 # ITER=2 and ITER=002 are the same iteration.
-I := iterations/$(shell printf '%03d' "$$((10#$(ITER)))" 2>/dev/null || printf %s '$(ITER)')
+I := iterations/$(shell printf '%03d' "$$(expr '$(ITER)' + 0)" 2>/dev/null || printf '%s' '$(ITER)')
 
 # The artifacts of one iteration, in order. A new stage is one name here and one rule below.
 RECORD   := $(I)/10-record.h5

@@ -100,6 +100,28 @@ def test_a_trajectory_comes_back_as_it_was(estimated: Path) -> None:
     assert before.groups["runs/sample"].attributes == after.groups["runs/sample"].attributes
 
 
+def test_lengths_keep_their_cables(project: Path) -> None:
+    """Lengths of some cables only, and a row that runs backwards: each column comes back under its own cable."""
+    with Path("sample.csv").open() as file:
+        table = list(csv.reader(file))
+    kept = [i for i, name in enumerate(table[0]) if not name.startswith("length") or name in ("length3_m", "length7_m")]
+    rows = [[row[i] for i in kept] for row in table]
+    rows[50], rows[51] = rows[51], rows[50]
+    with Path("some.csv").open("w") as file:
+        csv.writer(file, lineterminator="\n").writerows(rows)
+    Path("some.toml").write_text(Path("sample.toml").read_text())
+    assert invoke("import", "some.csv", "--no-draw").exit_code == 0
+    document("export", RECORD, "--to", "trajectory", "--out", "again")
+    with Path("again/some.csv").open() as file:
+        again = list(csv.DictReader(file))
+    assert sorted(name for name in again[0] if name.startswith("length")) == ["length3_m", "length7_m"]
+    assert invoke("import", "again/some.csv", "--iteration", "2", "--no-draw").exit_code == 0
+    _, before = read_artifact(project / RECORD)
+    _, after = read_artifact(project / "iterations/002/10-record.h5")
+    for name in ("t", "length", "cable"):
+        np.testing.assert_array_equal(before.groups["runs/some/sensors"][name], after.groups["runs/some/sensors"][name])
+
+
 def test_a_policy_holds_the_targets_in_order(estimated: Path) -> None:
     """The targets of a run become a policy file that validates."""
     (name,) = document("export", RECORD, "--to", "policy")["files"]

@@ -6,6 +6,7 @@ out; reading the files, writing the artifact and replacing robot.toml is the com
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 
 from r2s2r_cli.artifact import ArtifactData, Group
@@ -17,7 +18,8 @@ from r2s2r_cli.stages.calibrate.history import read_history
 from r2s2r_cli.stages.calibrate.lines import GOOD
 from r2s2r_cli.stages.calibrate.masses import mass_properties, read_masses
 from r2s2r_cli.stages.calibrate.sensors import Points, SetFit, fit_sets, read_points
-from r2s2r_cli.stages.calibrate.source import Source, near
+from r2s2r_cli.stages.calibrate.source import Source, near, nearest
+from r2s2r_cli.stages.calibrate.tendon_checks import tendon_warnings
 from r2s2r_cli.stages.calibrate.tendons import average, fit_curve, read_curves
 from schemas.config import CalibrateSettings
 from schemas.results_calibrate import (
@@ -103,7 +105,9 @@ def _choose(source: Source, table: Points, use: str | None, warnings: list[str])
     if use is not None and use not in table.sets:
         raise UsageError(
             f"the points table has no set {use!r}" + near(use, table.sets), where="--use", received=use,
-            expected=", ".join(table.sets), hint=f"r2s2r calibrate --points {source.name} --use {table.sets[-1]}",
+            expected=", ".join(table.sets),
+            hint=f"r2s2r calibrate --points {shlex.quote(source.name)} "
+            f"--use {shlex.quote(nearest(use, table.sets) or table.sets[-1])}",
         )  # fmt: skip
     if use is None and len(table.sets) > 1:
         warnings.append(
@@ -173,6 +177,7 @@ def _tendons(sources: Sequence[Source], robot: Robot, groups: dict[str, Group], 
     for fit in fits:
         if not fit.monotone:
             warnings.append(f"tendon curve {fit.name}: its cubic falls somewhere on the measured range")
+    warnings += tendon_warnings(curves, mean, robot)
     rests = [cable.rest_length_m for cable in robot.cables if cable.rest_length_m is not None]
     reach = robot.limits.cable_length_max_m - min(rests) if rests else 0.0
     if reach > mean.x_common:

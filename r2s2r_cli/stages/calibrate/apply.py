@@ -124,7 +124,7 @@ def _validate(text: str, where: str) -> None:
         first = error.errors()[0]
         raise InputError(
             "the robot description is not valid", where=f"{where}, {'.'.join(map(str, first['loc']))}",
-            expected=first["msg"], received=repr(first["input"])[:80], hint="r2s2r validate",
+            expected=first["msg"].removeprefix("Value error, "), received=repr(first["input"])[:80], hint="r2s2r validate",
         ) from None  # fmt: skip
     except (ValueError, RecursionError) as error:
         raise InputError(
@@ -152,7 +152,7 @@ def _set(table: Any, key: str, value: float, source: str) -> None:
             hint="write one [[sensors]] or [[cables]] table per element, as `r2s2r init` does",
         )  # fmt: skip
     old = table[key].trivia.comment.lstrip("# ").rstrip() if key in table else ""
-    if old.startswith(MARK):
+    if old == MARK or old.startswith(f"{MARK}: "):  # ours; "calibrated by hand" is the user's and stays
         old = old.partition(_BEFORE)[2]
     _put(table, key, number)
     _comment(table[key], source, old)

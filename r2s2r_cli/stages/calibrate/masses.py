@@ -79,43 +79,65 @@ def read_masses(source: Source, robot: Robot) -> dict[str, tuple[Lump, ...]]:
             "the masses are not a list of parts", where=source.name, expected="[[part]] tables and nothing else",
             received=", ".join(document) or "no [[part]] table", hint="begin every part with a line [[part]]",
         )  # fmt: skip
-    lines = [i for i, text in enumerate(source.text().splitlines(), 1) if re.match(r"\s*\[\[\s*part\s*\]\]", text)]
+    places = _Places(source, len(tables))
     rods = {rod.name: rod for rod in robot.rods}
     found: dict[str, list[Lump]] = {}
+    numbers: dict[str, list[int]] = {}
     for i, table in enumerate(tables):
-        line = f", line {lines[i]}" if len(lines) == len(tables) else ""
-        where = f"{source.name}{line}, part {i + 1}"
-        part, names = _part(table, where, list(rods))
+        part, names = _part(table, i, places, list(rods))
         for name in names:
-            _check(part, rods[name], where)
+            _check(part, rods[name], i, places)
             if any(other.name == part.name for other in found.setdefault(name, [])):
                 raise InputError(
-                    "two parts of one rod have the same name", where=where, expected="each name once a rod",
+                    "two parts of one rod have the same name", where=places.of(i, "name"),
+                    expected="each name once a rod",
                     received=f"{part.name} again on rod {name}", hint="number the parts: motor 1, motor 2",
                 )  # fmt: skip
             found[name].append(part)
+            numbers.setdefault(name, []).append(i)
     for name, parts in found.items():
-        _check_total(parts, rods[name], source.name)
+        heaviest = max(range(len(parts)), key=lambda j: parts[j].mass_kg)
+        _check_total(parts, rods[name], places.of(numbers[name][heaviest], "mass_kg"))
     return {rod.name: tuple(found[rod.name]) for rod in robot.rods if rod.name in found}
 
 
-def _part(table: Any, where: str, rods: list[str]) -> tuple[Lump, list[str]]:
+class _Places:
+    """Where the parts of a text stand: the line of each `[[part]]`, and of the keys below it."""
+
+    def __init__(self, source: Source, count: int) -> None:
+        self._name = source.name
+        self._text = source.text().splitlines()
+        heads = [i for i, text in enumerate(self._text) if re.match(r"\s*\[\[\s*[\"']?part[\"']?\s*\]\]", text)]
+        self._heads = heads if len(heads) == count else []  # else: parts in one list, or a head in a text
+
+    def of(self, part: int, key: str = "") -> str:
+        """`masses.toml, line 12, part 2, mass_kg`: the line of the key, or of the part where it has no such key."""
+        line = ""
+        if self._heads:
+            first, last = self._heads[part], [*self._heads, len(self._text)][part + 1]
+            own = (i for i in range(first, last) if re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*=", self._text[i]))
+            line = f", line {next(own, first) + 1}"
+        return f"{self._name}{line}, part {part + 1}" + (f", {key}" if key else "")
+
+
+def _part(table: Any, number: int, places: _Places, rods: list[str]) -> tuple[Lump, list[str]]:
     if not isinstance(table, dict):
         raise InputError(
-            "a part is not a table", where=where, expected="[[part]] with name, mass_kg, offset_m, shape",
+            "a part is not a table", where=places.of(number), expected="[[part]] with name, mass_kg, offset_m, shape",
             received=repr(table)[:80], hint="begin every part with a line [[part]]",
         )  # fmt: skip
     for key in table:
         if key not in _KEYS:
             raise InputError(
-                "unknown key" + near(key, _KEYS), where=where, expected=", ".join(_KEYS), received=key[:80],
+                "unknown key" + near(key, _KEYS), where=places.of(number, key[:80]),
+                expected=", ".join(_KEYS), received=key[:80],
                 hint="rename or remove the key; lengths are in m, masses in kg",
             )  # fmt: skip
     rod = table.get("rod")
     if rod is not None and rod not in rods:
         raise InputError(
-            "the robot has no such rod" + near(str(rod), rods), where=f"{where}, rod", expected=", ".join(rods),
-            received=repr(rod)[:80], hint="name a rod of robot.toml, or leave `rod` out for a part of every rod",
+            "the robot has no such rod" + near(str(rod), rods), where=places.of(number, "rod"),
+            expected=", ".join(rods), received=repr(rod)[:80], hint="name a rod of robot.toml, or leave `rod` out for a part of every rod",
         )  # fmt: skip
     try:
         part = Lump.model_validate({key: value for key, value in table.items() if key != "rod"}, strict=True)
@@ -123,33 +145,34 @@ def _part(table: Any, where: str, rods: list[str]) -> tuple[Lump, list[str]]:
         first = error.errors()[0]
         key = ".".join(str(item) for item in first["loc"])
         raise InputError(
-            "a part cannot be used as it is", where=f"{where}, {key}", expected=first["msg"],
+            "a part cannot be used as it is", where=places.of(number, key), expected=first["msg"].removeprefix("Value error, "),
             received="nothing" if first["type"] == "missing" else repr(first["input"])[:80],
             hint=f"correct {key} of this part",
         ) from None  # fmt: skip
     return part, rods if rod is None else [rod]
 
 
-def _check(part: Lump, rod: Rod, where: str) -> None:
+def _check(part: Lump, rod: Rod, number: int, places: _Places) -> None:
     for key in ("radius_m", "length_m", "inner_radius_m"):
         value = getattr(part, key)
         needed = key in _SIZES[part.shape]
         if needed != (value > 0):
             raise InputError(
-                f"a {part.shape} {'needs' if needed else 'has no'} {key}", where=where, received=f"{value:g} m",
-                expected=f"{', '.join(_SIZES[part.shape]) or 'no dimension'} for the shape {part.shape}",
+                f"a {part.shape} {'needs' if needed else 'has no'} {key}", where=places.of(number, key),
+                received=f"{value:g} m", expected=f"{', '.join(_SIZES[part.shape]) or 'no dimension'} for the shape {part.shape}",
                 hint=f"{'add' if needed else 'remove'} {key}, or change the shape",
             )  # fmt: skip
     if part.shape == "tube" and part.inner_radius_m >= part.radius_m:
         raise InputError(
-            "the inside of a tube is wider than its outside", where=where, expected="inner_radius_m below radius_m",
-            received=f"{part.inner_radius_m:g} m in {part.radius_m:g} m", hint="exchange the two radii",
+            "the inside of a tube is wider than its outside", where=places.of(number, "inner_radius_m"),
+            expected="inner_radius_m below radius_m", received=f"{part.inner_radius_m:g} m in {part.radius_m:g} m", hint="exchange the two radii",
         )  # fmt: skip
     tip = rod.length_m / 2 + rod.cap_radius_m
     reach = max(abs(part.offset_m) + part.length_m / 2, abs(part.offset_m))
     if reach > tip * 1.1 or part.radius_m > tip:
         raise InputError(
-            "a part that does not lie on the rod", where=where,
+            "a part that does not lie on the rod",
+            where=places.of(number, "radius_m" if part.radius_m > tip else "offset_m"),
             expected=f"within {tip:.4g} m of the middle of rod {rod.name} (a tenth more is let pass)",
             received=f"{max(reach, part.radius_m):.4g} m", hint="give offset_m, length_m and radius_m in metres",
         )  # fmt: skip

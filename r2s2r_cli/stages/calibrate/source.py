@@ -7,6 +7,7 @@ import difflib
 import io
 import math
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import PurePath
@@ -14,6 +15,8 @@ from typing import Literal
 
 from r2s2r_cli.errors import InputError
 
+_OTHER_DELIMITERS = {";": ("semicolons", ";"), "\t": ("tabs", "\\t"), "|": ("bars", "|")}
+"""What else separates columns: in words, and as `sed` writes it."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
@@ -103,8 +106,13 @@ def read_table(source: Source, columns: Sequence[Column], example: str) -> Table
 
 def near(word: str, known: Sequence[str]) -> str:
     """`, did you mean ...` for a misspelt word, or nothing."""
-    match = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    return f", did you mean {match[0]}?" if match else ""
+    match = nearest(word, known)
+    return f", did you mean {match}?" if match else ""
+
+
+def nearest(word: str, known: Sequence[str]) -> str:
+    """The known word that a misspelt one was probably meant to be; empty where none is near."""
+    return next(iter(difflib.get_close_matches(word, known, n=1, cutoff=0.6)), "")
 
 
 def _rows(source: Source, example: str) -> list[tuple[int, list[str]]]:
@@ -127,7 +135,23 @@ def _rows(source: Source, example: str) -> list[tuple[int, list[str]]]:
             "the table is empty", where=source.name, expected=f"the header {example}", received="no line",
             hint=f"begin the file with the header {example}",
         )  # fmt: skip
+    _refuse_delimiter(source, rows[0][1], rows[1:])
     return rows
+
+
+def _refuse_delimiter(source: Source, header: list[str], rows: Sequence[tuple[int, list[str]]]) -> None:
+    """Refuse a table whose columns are not separated by commas, with the command that makes it one that is."""
+    for delimiter, (word, escaped) in _OTHER_DELIMITERS.items():
+        if len(header) == 1 and delimiter in header[0]:
+            decimal_comma = any(len(row) > 1 for _, row in rows[:1])
+            script = ("s/,/./g; " if decimal_comma else "") + f"s/{escaped}/,/g"
+            raise InputError(
+                f"the columns are separated by {word}" + (" and decimals by commas" if decimal_comma else ""),
+                where=f"{source.name}, line 1",
+                expected="commas between columns, points in decimals",
+                received=word,
+                hint=f"sed -i.bak '{script}' {shlex.quote(source.name)}",
+            )
 
 
 def _match(

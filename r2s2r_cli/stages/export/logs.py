@@ -9,6 +9,7 @@ import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.frames import in_order
 
 _STATED = {"frame_stated": "frame", "start_unix": "start_unix_s"}
 _PID = {
@@ -25,22 +26,36 @@ def trajectory_files(data: ArtifactData, run: str) -> list[tuple[str, bytes]]:
     Raises InputError where the run has no observed end caps on the time of its commands.
     """
     caps, commands = _need(data, run, "caps"), _need(data, run, "commands")
-    if not np.array_equal(caps["t"], commands["t"]):
+    rows = np.arange(len(caps["t"]))
+    if len(commands["t"]) != len(rows):  # rows whose stamps ran backwards have no place among the commands
+        rows = np.flatnonzero(in_order(caps["t"], caps["drop_reason"]))
+    t = caps["t"][rows]
+    if not np.array_equal(t, commands["t"]):
         raise _cannot(run, "end caps and commands on one time axis", "two time axes")
-    columns = [("t_s", caps["t"])]
+    columns = [("t_s", t)]
     for i in range(caps["p_WE"].shape[1]):
-        columns += [(f"cap{i}_{axis}_m", caps["p_WE"][:, i, k]) for k, axis in enumerate("xyz")]
+        columns += [(f"cap{i}_{axis}_m", caps["p_WE"][rows, i, k]) for k, axis in enumerate("xyz")]
     for name in ("target", "control"):
         if name in commands:
             columns += [(f"{name}{i}", commands[name][:, i]) for i in range(commands[name].shape[1])]
-    sensors = data.group(run, "sensors")
-    if sensors is not None and "length" in sensors and np.array_equal(sensors["t"], caps["t"]):
-        columns += [(f"length{i}_m", sensors["length"][:, i]) for i in range(sensors["length"].shape[1])]
+    columns += _lengths(data, run, t)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([name for name, _ in columns])
     writer.writerows([[repr(float(v)) for v in row] for row in zip(*(c for _, c in columns), strict=True)])
     return [(f"{run}.csv", text.getvalue().encode()), (f"{run}.toml", _sidecar(data.groups[f"runs/{run}"], caps))]
+
+
+def _lengths(data: ArtifactData, run: str, t: np.ndarray) -> list[tuple[str, np.ndarray]]:
+    """Columns of the sensor lengths, named by the cable that each sensor measures."""
+    sensors = data.group(run, "sensors")
+    if sensors is None or "length" not in sensors:
+        return []
+    if not np.array_equal(sensors["t"], t):
+        raise _cannot(run, "sensor lengths on the time axis of the end caps", "another time axis")
+    length = sensors["length"]
+    cables = sensors["cable"] if "cable" in sensors else np.arange(length.shape[1])
+    return [(f"length{cable}_m", length[:, i]) for i, cable in enumerate(cables)]
 
 
 def policy_file(data: ArtifactData, run: str) -> tuple[str, bytes]:

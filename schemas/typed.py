@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import CoreSchema, core_schema
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,10 @@ class AtMost:
     trap: str
 
     def check(self, value: float) -> float:
-        """The value itself. Raises ValueError, which pydantic reports."""
+        """The value itself. Raises the error that pydantic reports."""
         if abs(value) > self.limit:
-            raise ValueError(f"at most {self.limit:g}{' ' * bool(self.unit)}{self.unit}: {value:g} {self.trap}")
+            text = f"at most {self.limit:g}{' ' * bool(self.unit)}{self.unit}: {value:g} {self.trap}"
+            raise PydanticCustomError("too_large", "{text}", {"text": text})
         return value
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:

@@ -124,7 +124,8 @@ def _validate(text: str, where: str) -> None:
         first = error.errors()[0]
         raise InputError(
             "the robot description is not valid", where=f"{where}, {'.'.join(map(str, first['loc']))}",
-            expected=first["msg"].removeprefix("Value error, "), received=repr(first["input"])[:80], hint="r2s2r validate",
+            expected=first["msg"].removeprefix("Value error, "), received=repr(first["input"])[:80],
+            hint="r2s2r validate",
         ) from None  # fmt: skip
     except (ValueError, RecursionError) as error:
         raise InputError(

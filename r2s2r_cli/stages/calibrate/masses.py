@@ -137,7 +137,8 @@ def _part(table: Any, number: int, places: _Places, rods: list[str]) -> tuple[Lu
     if rod is not None and rod not in rods:
         raise InputError(
             "the robot has no such rod" + near(str(rod), rods), where=places.of(number, "rod"),
-            expected=", ".join(rods), received=repr(rod)[:80], hint="name a rod of robot.toml, or leave `rod` out for a part of every rod",
+            expected=", ".join(rods), received=repr(rod)[:80],
+            hint="name a rod of robot.toml, or leave `rod` out for a part of every rod",
         )  # fmt: skip
     try:
         part = Lump.model_validate({key: value for key, value in table.items() if key != "rod"}, strict=True)
@@ -145,7 +146,8 @@ def _part(table: Any, number: int, places: _Places, rods: list[str]) -> tuple[Lu
         first = error.errors()[0]
         key = ".".join(str(item) for item in first["loc"])
         raise InputError(
-            "a part cannot be used as it is", where=places.of(number, key), expected=first["msg"].removeprefix("Value error, "),
+            "a part cannot be used as it is", where=places.of(number, key),
+            expected=first["msg"].removeprefix("Value error, "),
             received="nothing" if first["type"] == "missing" else repr(first["input"])[:80],
             hint=f"correct {key} of this part",
         ) from None  # fmt: skip
@@ -159,13 +161,15 @@ def _check(part: Lump, rod: Rod, number: int, places: _Places) -> None:
         if needed != (value > 0):
             raise InputError(
                 f"a {part.shape} {'needs' if needed else 'has no'} {key}", where=places.of(number, key),
-                received=f"{value:g} m", expected=f"{', '.join(_SIZES[part.shape]) or 'no dimension'} for the shape {part.shape}",
+                received=f"{value:g} m",
+                expected=f"{', '.join(_SIZES[part.shape]) or 'no dimension'} for the shape {part.shape}",
                 hint=f"{'add' if needed else 'remove'} {key}, or change the shape",
             )  # fmt: skip
     if part.shape == "tube" and part.inner_radius_m >= part.radius_m:
         raise InputError(
             "the inside of a tube is wider than its outside", where=places.of(number, "inner_radius_m"),
-            expected="inner_radius_m below radius_m", received=f"{part.inner_radius_m:g} m in {part.radius_m:g} m", hint="exchange the two radii",
+            expected="inner_radius_m below radius_m", received=f"{part.inner_radius_m:g} m in {part.radius_m:g} m",
+            hint="exchange the two radii",
         )  # fmt: skip
     tip = rod.length_m / 2 + rod.cap_radius_m
     reach = max(abs(part.offset_m) + part.length_m / 2, abs(part.offset_m))

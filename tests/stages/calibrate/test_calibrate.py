@@ -104,8 +104,9 @@ def test_one_set_is_used_and_several_are_never_guessed(robot: Robot, points_text
 
 def test_a_wrong_choice_is_a_usage_error(robot: Robot, points_text: Make) -> None:
     """An unknown set is named with the nearest known one; --use without a table, and nothing at all, are refused."""
-    with pytest.raises(UsageError, match="did you mean may_3"):
+    with pytest.raises(UsageError, match="did you mean may_3") as caught:
         calibrate(robot=robot, points=source(points_text(sets=("may_3", "june_5"))), use="may3")
+    assert caught.value.hint == "r2s2r calibrate --points points.csv --use may_3"
     with pytest.raises(UsageError, match="--use"):
         calibrate(robot=robot, history=source(HISTORY, "history.json"), use="a")
     with pytest.raises(UsageError, match="nothing to calibrate"):

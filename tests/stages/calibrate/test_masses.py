@@ -114,8 +114,10 @@ def test_a_part_without_rod_belongs_to_all(robot: Robot) -> None:
         ("mass_kg = 0.12\n", "", "cannot be used"),
         ("mass_kg = 0.12", "mass_g = 120", "did you mean mass_kg"),
         ("mass_kg = 0.12", "mass_kg = 120", "weigh too little or too much"),
-        ("offset_m = 0.0", "offset_m = 117.5", "does not lie on the rod"),
-        ("length_m = 0.045", "length_m = 45", "does not lie on the rod"),
+        ("offset_m = 0.0", "offset_m = 117.5", "cannot be used"),
+        ("offset_m = 0.0", "offset_m = 1.175", "does not lie on the rod"),
+        ("length_m = 0.045", "length_m = 45", "cannot be used"),
+        ("length_m = 0.045", "length_m = 4.5", "does not lie on the rod"),
         ("length_m = 0.045\n", "", "needs length_m"),
         ('"tube"', '"sphere"', "has no length_m"),
         ('"tube"', '"cylinder"', "has no inner_radius_m"),
@@ -140,3 +142,35 @@ def test_wrong_masses_are_refused(robot: Robot, old: str, new: str, what: str) -
     error = caught.value
     assert what in error.what
     assert error.where.startswith("masses.toml") and error.expected and error.received and error.hint
+
+
+SECOND = PART.replace("motor", "gear").replace("0.12", "0.02")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("mass_kg = 0.02", "mass_kg = -0.02", "line 13, part 2, mass_kg"),
+        ("offset_m = 0.0", "offset_m = 1.175", "line 14, part 2, offset_m"),
+        ("radius_m = 0.0175", "radius_m = 0.4", "line 16, part 2, radius_m"),
+        ("length_m = 0.045", "lenght_m = 0.045", "line 17, part 2, lenght_m"),
+        ("length_m = 0.045\n", "", "line 11, part 2, length_m"),
+        ("inner_radius_m = 0.0016", "inner_radius_m = 0.02", "line 18, part 2, inner_radius_m"),
+        ('name = "gear"', 'name = "motor"', "line 12, part 2, name"),
+        ("mass_kg = 0.02", "mass_kg = 120", "line 13, part 2, mass_kg"),
+    ],
+)
+def test_the_line_of_the_wrong_key_is_named(robot: Robot, old: str, new: str, place: str) -> None:
+    """Of two parts the second is wrong: its own lines are counted, behind a comment and a blank line."""
+    text = "# weighed by hand\n" + PART + "\n" + SECOND
+    assert set(read(text, robot)) == {"red", "green", "blue"}
+    with pytest.raises(InputError) as caught:
+        read("# weighed by hand\n" + PART + "\n" + SECOND.replace(old, new, 1), robot)
+    assert caught.value.where == f"masses.toml, {place}"
+
+
+def test_parts_in_one_list_have_numbers_only(robot: Robot) -> None:
+    """`part = [{...}]` has no lines to name: the number of the part is the place."""
+    with pytest.raises(InputError) as caught:
+        read('part = [{name = "a", mass_kg = 0.12, offset_m = 0, shape = "box"}]', robot)
+    assert caught.value.where == "masses.toml, part 1, shape"

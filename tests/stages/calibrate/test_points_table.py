@@ -81,7 +81,7 @@ def test_a_sensor_that_never_started_is_dead(points_text: Make, robot: Robot) ->
         (HEADER, "set,sensor_id,length_mm,length_m", "two columns hold the length"),
         (HEADER, "set,sensor_id,sensor,capacitance_pF", "the length is missing"),
         (HEADER, "set,sensor,length_mm,capacitance_pF", "the sensor id is missing"),
-        (HEADER, "set;sensor_id;length_mm;capacitance_pF", "unknown column"),
+        (HEADER, "set;sensor_id;length_mm;capacitance_pF", "separated by semicolons"),
         (HEADER, "set,sensor_id,length_m,capacitance_pF", "a length that this robot's cables cannot have"),
         (HEADER, "set,sensor_id,length_mm,capacitance_F", "a capacitance that no such sensor has"),
         ("19.000000", "nan", "not a number"),

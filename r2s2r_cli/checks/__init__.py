@@ -22,7 +22,7 @@ from r2s2r_cli.checks import (
 from r2s2r_cli.checks.base import Check
 
 CHECKS: tuple[Check, ...] = (
-    files.file_opens, files.version_known, files.content_intact, files.bytes_intact,
+    files.file_opens, files.values_allowed, files.version_known, files.content_intact, files.bytes_intact,
     schema.layout_matches, schema.values_finite, schema.codes_known, schema.text_readable, schema.images_begin_right,
     links.head_matches_body, links.inputs_match, links.source_unchanged, links.robot_is_the_projects,
     links.stage_not_newer, links.name_fits_kind, links.recordings_sealed,

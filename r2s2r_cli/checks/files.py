@@ -2,22 +2,39 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from r2s2r_cli.checks.base import Found, check
 from r2s2r_cli.checks.subjects import Reading
 
+_LIBRARY = re.compile(r"(can't|cannot|unable to|unable) [\w ]+\(.*\)$")
+"""Form of the messages of HDF5: `Can't open object (addr overflow, ...)`."""
+
 
 @check(
     "error",
     Reading,
-    what="the file is there, and is an artifact or a TOML file that its model accepts",
+    what="the file is there, and is an artifact or TOML",
     why="nothing else can be checked, and every other command refuses the file as well",
     fix="ls -la '{file}'",
 )
 def file_opens(reading: Reading) -> Iterator[Found]:
-    """Missing, unreadable, not an artifact, a damaged head, wrong TOML."""
+    """Missing, unreadable, not an artifact, a damaged head, broken TOML."""
     for error in () if reading.newer else reading.refused:
+        yield Found(error.where, error.what, error.expected, in_words(error.received), error.hint)
+
+
+@check(
+    "error",
+    Reading,
+    what="every key of a TOML file is known, none is missing, and the values are allowed",
+    why="every command that needs the file refuses it; a misspelt key would else be a silent default",
+    fix="correct the named key in {file}",
+)
+def values_allowed(reading: Reading) -> Iterator[Found]:
+    """A TOML file that can be read, and that its model does not accept."""
+    for error in reading.wrong:
         yield Found(error.where, error.what, error.expected, error.received, error.hint)
 
 
@@ -44,7 +61,7 @@ def version_known(reading: Reading) -> Iterator[Found]:
 def content_intact(reading: Reading) -> Iterator[Found]:
     """Damage behind an intact head, or together with a damaged one."""
     for place in reading.damage:
-        yield Found(place.where.lstrip("/"), place.what, place.expected, place.received)
+        yield Found(place.where.lstrip("/"), place.what, place.expected, in_words(place.received))
 
 
 @check(
@@ -60,5 +77,13 @@ def bytes_intact(reading: Reading) -> Iterator[Found]:
         yield Found("", "bytes changed that nothing reads; the content hash still holds", "the sealed bytes", "others")
 
 
-ALWAYS = (file_opens, version_known, content_intact, bytes_intact)
+def in_words(received: str) -> str:
+    """The text itself; what the HDF5 library says of damaged bytes in its own terms becomes words."""
+    text = received.lower()
+    if "filter returned failure" in text or "fletcher32" in text:
+        return "bytes that do not match their checksum"
+    return "bytes from which no HDF5 object can be made" if _LIBRARY.match(text) else received
+
+
+ALWAYS = (file_opens, values_allowed, version_known, content_intact, bytes_intact)
 """Run on every file, whatever is selected: what cannot be read cannot be said to have passed."""

@@ -37,6 +37,8 @@ class Reading:
 
     refused: tuple[R2S2RError, ...] = ()
     """Why it cannot be read at all."""
+    wrong: tuple[R2S2RError, ...] = ()
+    """What is not allowed in a TOML file that can be read: keys and values that its model refuses."""
     newer: bool = False
     """`refused` because of its kind or version, not because it is damaged."""
     damage: tuple[Difference, ...] = ()

@@ -119,7 +119,7 @@ def _check(
     with IsolatedReader() as reader, console.progress("files", len(names)) as advance:
         for name in names:
             place = places.of(project or Path(name))
-            for remark in _remarks(place):
+            for remark in _remarks(place, names):
                 if remark not in told:
                     told.add(remark)
                     console.say(remark)
@@ -128,17 +128,22 @@ def _check(
     return found
 
 
-def _remarks(place: Place | None) -> Iterator[str]:
+def _remarks(place: Place | None, names: Sequence[str]) -> Iterator[str]:
+    """What could not be checked. Why is said here only where no finding says it: where that file is not looked at."""
+    from r2s2r_cli.commands.validation import PROJECT_FILE, shown
+
     if place is None:
         yield "no project above these files: checks against the robot and the inputs are left out"
     elif place.robot is None and place.problem is not None:
-        yield f"checks against the robot are left out: {place.problem.what} ({place.problem.where})"
+        culprit = shown(place.project.robot_path if place.project is not None else place.root / PROJECT_FILE)
+        why = "has an error, see below" if culprit in names else f"cannot be used: {place.problem.what}"
+        yield f"checks against the robot are left out: {culprit} {why}"
 
 
 def _result(files: Sequence[str], chosen: Sequence[Check], found: Sequence[Finding]) -> ValidateResult:
-    from r2s2r_cli.checks.files import ALWAYS
+    from r2s2r_cli.checks.files import ALWAYS, values_allowed
 
-    fatal = {entry.name for entry in ALWAYS if entry.importance == "error"}
+    fatal = {entry.name for entry in ALWAYS if entry.importance == "error" and entry is not values_allowed}
     count = {name: sum(finding.importance == name for finding in found) for name in ("error", "warning", "advice")}
     return ValidateResult(
         files=tuple(files), checks=tuple(entry.name for entry in chosen), findings=tuple(found),

@@ -6,6 +6,7 @@ import os
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from shlex import quote
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from r2s2r_cli.checks.subjects import (
     policies_of,
     runs_of,
 )
+from r2s2r_cli.commands.sources import MASSES, is_masses, what_source
 from r2s2r_cli.errors import ArtifactError, InputError, R2S2RError, UsageError
 from r2s2r_cli.store.canonical import source_sha256
 from r2s2r_cli.store.examine import Examined, examine
@@ -77,7 +79,7 @@ class Gathered:
     @property
     def unreadable(self) -> bool:
         """Whether nothing but `reading` could be checked."""
-        return bool(self.reading.refused or self.reading.damage)
+        return bool(self.reading.refused or self.reading.wrong or self.reading.damage)
 
 
 @dataclass
@@ -200,21 +202,16 @@ def _is_toml(path: Path) -> bool:
 
 def _refuse_others(path: Path) -> None:
     """Raises InputError for files that are neither artifacts nor TOML, with the command that takes them."""
-    hints = {
-        ".csv": f"r2s2r import '{path}'",
-        JOURNAL_SUFFIX: f"r2s2r recover '{path}'",
-        ".json": "r2s2r import --help",
-    }
-    hint = hints.get(path.suffix.lower())
-    if hint is not None and path.is_file():
+    source = what_source(path)
+    if source is not None:
         raise InputError("validate does not read files of this kind", where=str(path),
-                         expected="an artifact (.h5) or a TOML file", received=f"a {path.suffix} file",
-                         hint=hint)  # fmt: skip
+                         expected="an artifact (.h5) or a TOML file", received=source.words,
+                         hint=source.command)  # fmt: skip
 
 
 def _gather_artifact(path: Path, found: Examined, place: Place | None) -> Gathered:
     refused = () if found.refused is None else (found.refused,)
-    reading = Reading(refused, found.newer, _differences(found.damage), found.unread_bytes)
+    reading = Reading(refused, newer=found.newer, damage=_differences(found.damage), unread_bytes=found.unread_bytes)
     if found.header is None or found.data is None:
         return Gathered(reading)
     robot = place.robot if place is not None else None
@@ -265,15 +262,33 @@ def _gather_toml(path: Path, place: Place | None) -> Gathered:
     if path.exists() and not path.is_file():
         raise InputError("this is no regular file", where=str(path), expected="a TOML file", hint=f"ls -la '{path}'")
     values = read_toml(path)
+    if is_masses(values):
+        return _gather_masses(path, place)
     kind = _model_of(path, values, place)
     problems = model_problems(values, kind, str(path))
     if problems:
-        return Gathered(Reading(refused=tuple(problems)))
+        return Gathered(Reading(wrong=tuple(problems)))
     model = kind.model_validate(values)
     if isinstance(model, Robot):
         return Gathered(Reading(), subjects=(model,))
     if isinstance(model, PolicyFile):
         return Gathered(Reading(), subjects=(_policy(model, place),))
+    return Gathered(Reading())
+
+
+def _gather_masses(path: Path, place: Place | None) -> Gathered:
+    """Weighed parts: read as `calibrate` reads them, for the robot of the project."""
+    from r2s2r_cli.stages.calibrate.masses import read_masses
+    from r2s2r_cli.stages.calibrate.source import Source
+
+    if place is None or place.robot is None:
+        raise InputError("these are measurements for calibrate, and there is no robot to compare them with",
+                         where=str(path), expected="a project with a robot.toml that can be used", received=MASSES,
+                         hint=f"r2s2r calibrate --masses {quote(str(path))}   # in its project")  # fmt: skip
+    try:
+        read_masses(Source(str(path), path.read_bytes()), place.robot)
+    except InputError as error:
+        return Gathered(Reading(wrong=(error,)))
     return Gathered(Reading())
 
 

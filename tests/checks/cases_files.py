@@ -8,7 +8,7 @@ import numpy as np
 
 from r2s2r_cli.artifact import Blobs
 from r2s2r_cli.checks.subjects import Content, Difference, InputState, Journals, Links, Reading
-from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.errors import ArtifactError, InputError
 from schemas.header import InputRef
 from tests.checks.case import Case, Edge
 from tests.support.check_subjects import SHA, content, edited_content, header, links, put
@@ -18,6 +18,12 @@ SOURCE = InputRef(path="crawl.csv", kind="file", sha256=SHA)
 ARTIFACT = InputRef(path="iterations/001/10-record.h5", kind="recording", schema_version=1, sha256=SHA)
 MISSING = ArtifactError("there is no such file", where="a.h5", expected="an artifact", received="", hint="ls -la '.'")
 NEWER = ArtifactError("this version cannot be read", where="a.h5", expected="version 1", received="7", hint="pip")
+LIBRARY = ArtifactError("the file's structure is damaged", where="a.h5", expected="an intact artifact",
+                        received="Can't open object (addr overflow, addr = 8)", hint="r2s2r validate")  # fmt: skip
+WRONG = InputError("the value is not allowed", where="a.h5, key rods.0.length_m", expected="at most 20 m",
+                   received="325", hint="correct it")  # fmt: skip
+FILTER = Difference("/runs/a/caps/t", "a checksum does not match", "1234",
+                    "Can't synchronously read data (filter returned failure during read)")  # fmt: skip
 DAMAGE = Difference("/runs/a/caps/t", "the data changed after sealing", "1234", "5678")
 
 
@@ -33,6 +39,21 @@ FAILS: tuple[Case, ...] = (
         "file_opens",
         lambda: Reading(refused=(MISSING,)),
         (("", "there is no such file", "an artifact", ""),),
+    ),
+    Case(
+        "file_opens",
+        lambda: Reading(refused=(LIBRARY,)),
+        (("", "the file's structure is damaged", "an intact artifact", "bytes from which no HDF5 object can be made"),),
+    ),
+    Case(
+        "content_intact",
+        lambda: Reading(damage=(FILTER,)),
+        (("runs/a/caps/t", "a checksum does not match", "1234", "bytes that do not match their checksum"),),
+    ),
+    Case(
+        "values_allowed",
+        lambda: Reading(wrong=(WRONG,)),
+        (("key rods.0.length_m", "the value is not allowed", "at most 20 m", "325"),),
     ),
     Case(
         "version_known",

@@ -216,14 +216,18 @@ def test_a_recording_that_was_cut_off_is_a_warning(estimated: Path) -> None:
 
 
 def test_a_misspelt_key_is_found_with_its_neighbour(estimated: Path) -> None:
-    """robot.toml with an unknown key cannot be read; the other files are still checked, without the robot."""
+    """robot.toml with an unknown key has an error; the other files are still checked, without the robot."""
     text = Path("robot.toml").read_text()
     Path("robot.toml").write_text(text.replace("winch_radius_m", "winch_radus_m", 1))
     code, document = outcome()
-    assert (code, document.unreadable) == (4, ("robot.toml",))
+    assert (code, document.unreadable, document.findings[0].check) == (3, (), "values_allowed")
     assert document.findings[0].expected == "winch_radius_m"
     assert len(document.files) == 4
-    assert "checks against the robot are left out" in invoke("validate").stderr
+    said = invoke("validate").stderr
+    assert "checks against the robot are left out: robot.toml has an error, see below" in said
+    assert "1 error in 1 of 4 files" in said
+    alone = invoke("validate", str(RECORDING)).stderr  # no block says it then
+    assert "left out: robot.toml cannot be used: unknown key motors.0.winch_radus_m" in alone
 
 
 def test_a_broken_project_file_is_a_finding(estimated: Path) -> None:
@@ -248,9 +252,9 @@ def policy(**changes: Any) -> str:
         (policy(), 0, []),
         (policy(robot="sixbar"), 3, ["policy_robot_known"]),
         (policy(steps=[[0, 1, 0]]), 3, ["policy_fits_cables"]),
-        (policy(steps=[[0, 1, 0, 1, 0, 95]]), 4, ["file_opens"]),
-        (policy(nam="x"), 4, ["file_opens"]),
-        (policy(steps=[]), 4, ["file_opens"]),
+        (policy(steps=[[0, 1, 0, 1, 0, 95]]), 3, ["values_allowed"]),
+        (policy(nam="x"), 3, ["values_allowed"]),
+        (policy(steps=[]), 3, ["values_allowed"]),
     ],
 )
 def test_policies_are_checked(project: Path, text: str, code: int, found: list[str]) -> None:
@@ -275,7 +279,7 @@ def test_settings_of_an_iteration_are_checked(estimated: Path) -> None:
     """config.toml of an iteration with a misspelt setting."""
     (RECORDING.parent / "config.toml").write_text("[estimate]\ncontact_clearence_m = 0.01\n")
     code, document = outcome("--iteration", "1")
-    assert (code, document.unreadable) == (4, (str(RECORDING.parent / "config.toml"),))
+    assert (code, document.unreadable, checks(document)) == (3, (), ["values_allowed"])
     assert document.files == (str(RECORDING.parent / "config.toml"), str(RECORDING), str(ESTIMATE))
     assert document.findings[0].expected == "contact_clearance_m"
 

@@ -1,6 +1,7 @@
 """`estimate`: from observed end caps to the state of the robot at every kept frame.
 
-Trajectory logs (CSV) bring end caps. Recordings with images alone need the camera tracker, a later stage.
+Trajectory logs (CSV) bring end caps. Runs with images alone need the camera tracker, a later stage: they are left out,
+and a recording that has no others is refused.
 """
 
 from __future__ import annotations
@@ -18,10 +19,11 @@ __all__ = ["estimate"]
 
 
 def estimate(recording: ArtifactData, robot: Robot, settings: EstimateSettings) -> tuple[ArtifactData, EstimateReport]:
-    """Estimate every run of a recording; the layout of the result is `schemas/estimate.py`.
+    """Estimate every run of a recording that has observed end caps; the layout is that of `schemas/estimate.py`.
 
-    Raises InputError for a run without observed end caps, with fewer than five kept frames, of another robot, or
-    with numbers that are not finite; NumericalError where the smoother cannot explain a track.
+    The report of the first estimated run warns of those that were left out. Raises InputError where no run has
+    observed end caps, and for a run with fewer than five kept frames, of another robot, or with numbers that are not
+    finite; NumericalError where the smoother cannot explain a track.
     """
     if recording.kind != "recording" or not recording.runs():
         raise ArtifactError(
@@ -33,8 +35,14 @@ def estimate(recording: ArtifactData, robot: Robot, settings: EstimateSettings) 
         )
     groups: dict[str, Group] = {}
     reports = []
-    for run in recording.runs():
-        state = estimate_run(run, dict(recording.streams(run)), robot, settings)
+    streams = {run: dict(recording.streams(run)) for run in recording.runs()}
+    usable = [run for run in streams if "caps" in streams[run]]
+    left_out = tuple(
+        f"run {run} of the recording is left out: it holds no observed end caps" for run in streams if run not in usable
+    )
+    for run in usable or streams:  # none usable: `estimate_run` refuses the first with what it holds
+        state = estimate_run(run, streams[run], robot, settings)
         groups.update(run_groups(state))
         reports.append(run_report(state))
+    reports[0] = reports[0].model_copy(update={"warnings": (*left_out, *reports[0].warnings)})
     return ArtifactData(kind="estimate", groups=groups), EstimateReport(runs=tuple(reports))

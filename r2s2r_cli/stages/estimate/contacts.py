@@ -33,8 +33,10 @@ def contact_probability(
     """Probability that a cap is lower than `clearance` and moves up or down slower than `lift`, Gaussian in both.
 
     height: of the lowest point of the cap above the ground [m]; speed: of the cap, vertical [m/s]; both with their
-    standard deviation (that of the height with `height_error`); any shape. This says nothing about force: a cap that
-    hovers 1 mm above the floor looks the same as one that carries the robot.
+    standard deviation (that of the height with `height_error`); any shape. The two probabilities are multiplied as if
+    the errors of height and vertical speed were independent. They are not quite: one smoother makes both, and their
+    correlation is left out. This says nothing about force: a cap that hovers 1 mm above the floor looks the same as one
+    that carries the robot.
     """
     from scipy.special import ndtr
 

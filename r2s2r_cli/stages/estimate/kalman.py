@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-PRIOR_SD = (10.0, 10.0, 100.0)
-"""Vague start: m, m/s, m/s^2. So wide that it moves no smoothed state by more than 1e-5 of itself, and narrow
+PRIOR_SD = (10.0, 10.0)
+"""Vague start: m, m/s. So wide that it moves no smoothed state by more than 1e-5 of itself, and narrow
 enough that rounding (1e-16 of the square) stays below every variance that is wanted."""
 
 
@@ -36,20 +36,20 @@ class Filtered:
     density: np.ndarray
     """Spectral density of the process noise, shape (series,)."""
     mean: np.ndarray
-    """Predicted states, shape (frame, series, order)."""
+    """Predicted states, shape (frame, series, 2)."""
     cov: np.ndarray
-    """Their covariance, shape (frame, series, order, order)."""
+    """Their covariance, shape (frame, series, 2, 2)."""
     innovation: np.ndarray
     """Observed minus predicted [m], shape (frame, series); 0 where nothing was used."""
     innovation_var: np.ndarray
     """Variance of the innovation [m^2], shape (frame, series)."""
     gain: np.ndarray
-    """Kalman gain, shape (frame, series, order); 0 where nothing was used."""
+    """Kalman gain, shape (frame, series, 2); 0 where nothing was used."""
 
 
 @dataclass(frozen=True)
 class Smoothed:
-    """Backward pass, shapes (frame, series, order), (frame, series, order, order) and (frame, series)."""
+    """Backward pass, shapes (frame, series, 2), (frame, series, 2, 2) and (frame, series)."""
 
     mean: np.ndarray
     cov: np.ndarray
@@ -59,47 +59,32 @@ class Smoothed:
     """Score of a jump of position just before each frame, over its standard deviation; 0 for the first frame."""
 
 
-def transition(dt: float, order: int) -> np.ndarray:
-    """State transition over `dt` [s] of position, velocity (order 2) and acceleration (order 3)."""
-    step = np.eye(order)
-    step[0, 1] = dt
-    if order == 3:
-        step[0, 2] = 0.5 * dt**2
-        step[1, 2] = dt
-    return step
+def transition(dt: float) -> np.ndarray:
+    """State transition over `dt` [s] of position and velocity."""
+    return np.array([[1.0, dt], [0.0, 1.0]])
 
 
-def process(dt: float, order: int) -> np.ndarray:
-    """Covariance over `dt` [s] of unit white acceleration (order 2) or unit white jerk (order 3)."""
-    if order == 2:
-        return np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
-    return np.array(
-        [
-            [dt**5 / 20, dt**4 / 8, dt**3 / 6],
-            [dt**4 / 8, dt**3 / 3, dt**2 / 2],
-            [dt**3 / 6, dt**2 / 2, dt],
-        ]
-    )
+def process(dt: float) -> np.ndarray:
+    """Covariance over `dt` [s] of unit white acceleration."""
+    return np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
 
 
-def forward(
-    t: np.ndarray, y: np.ndarray, var: np.ndarray, density: np.ndarray, free: Disturbances, order: int
-) -> Filtered:
+def forward(t: np.ndarray, y: np.ndarray, var: np.ndarray, density: np.ndarray, free: Disturbances) -> Filtered:
     """Kalman filter of every series and every process noise of a grid at once.
 
     t: stamps [s], shape (frame,), increasing. y: positions [m], shape (frame, series), NaN where there is none.
-    var: variance of the noise [m^2], shape (frame, series). density: spectral densities of the white acceleration
-    [m^2/s^3] or jerk [m^2/s^5], shape (grid, series) or (grid, 1). order: 2 or 3.
+    var: variance of the noise [m^2], above 0, shape (frame, series). density: spectral densities of the white
+    acceleration [m^2/s^3], shape (grid, series) or (grid, 1).
     """
     n, series = y.shape
     density = np.broadcast_to(density, (len(density), series))
     seen = np.isfinite(y)
-    x = np.zeros((len(density), series, order))
+    x = np.zeros((len(density), series, 2))
     x[:, :, 0] = y[np.argmax(seen, axis=0), np.arange(series)]
-    cov = np.zeros((len(density), series, order, order))
-    cov[:] = np.diag(np.square(PRIOR_SD[:order]))
+    cov = np.zeros((len(density), series, 2, 2))
+    cov[:] = np.diag(np.square(PRIOR_SD))
     loglik = np.zeros(density.shape)
-    means, covs, gains = (np.zeros((n, series, *shape)) for shape in ((order,), (order, order), (order,)))
+    means, covs, gains = (np.zeros((n, series, *shape)) for shape in ((2,), (2, 2), (2,)))
     innovations, variances = np.zeros((n, series)), np.ones((n, series))
     for k in range(n):
         means[k], covs[k] = x[-1], cov[-1]
@@ -109,37 +94,37 @@ def forward(
         innovations[k], variances[k], gains[k] = e[-1], s[-1], gain[-1]
         loglik -= 0.5 * np.where(seen[k], np.log(2 * np.pi * s) + e**2 / s, 0.0)
         if k + 1 < n:
-            step = transition(float(t[k + 1] - t[k]), order)
+            step = transition(float(t[k + 1] - t[k]))
             x = (x + gain * e[:, :, None]) @ step.T
-            cov = step @ update(cov, gain, var[k]) @ step.T + _noise(t, k, density, free, order)
+            cov = step @ update(cov, gain, var[k]) @ step.T + _noise(t, k, density, free)
     return Filtered(loglik, density[-1], means, covs, innovations, variances, gains)
 
 
 def backward(t: np.ndarray, y: np.ndarray, var: np.ndarray, free: Disturbances, run: Filtered) -> Smoothed:
     """Smoothed states and the two scores, from the last grid point of a forward pass."""
-    n, series, order = run.mean.shape
+    n, series, _ = run.mean.shape
     seen = np.isfinite(y)
     mean, cov = np.empty_like(run.mean), np.empty_like(run.cov)
     outlier, jump = np.zeros((n, series)), np.zeros((n, series))
-    r, info = np.zeros((series, order)), np.zeros((series, order, order))
-    eye = np.eye(order)
+    r, info = np.zeros((series, 2)), np.zeros((series, 2, 2))
+    eye = np.eye(2)
     for k in range(n - 1, -1, -1):
         gain = run.gain[k]
         mean[k] = run.mean[k] + gain * run.innovation[k][:, None]
         cov[k] = update(run.cov[k], gain, var[k])
         if k + 1 < n:
-            step = transition(float(t[k + 1] - t[k]), order)
+            step = transition(float(t[k + 1] - t[k]))
             back = cov[k] @ step.T @ np.linalg.inv(run.cov[k + 1])
             rest = eye - back @ step
             mean[k] += np.einsum("sij,sj->si", back, mean[k + 1] - run.mean[k + 1])
-            noise = cov[k + 1] + _noise(t, k, run.density[None], free, order)[0]
+            noise = cov[k + 1] + _noise(t, k, run.density[None], free)[0]
             cov[k] = rest @ cov[k] @ np.swapaxes(rest, 1, 2) + back @ noise @ np.swapaxes(back, 1, 2)
             r, info = r @ step, step.T @ info @ step
         weight = np.where(seen[k], 1.0 / run.innovation_var[k], 0.0)
         spread = weight + np.einsum("si,sij,sj->s", gain, info, gain)
         u = run.innovation[k] * weight - np.sum(gain * r, axis=1)
         outlier[k] = np.where(seen[k], u / np.sqrt(np.where(seen[k], spread, 1.0)), 0.0)
-        keep = np.broadcast_to(eye, (series, order, order)).copy()
+        keep = np.broadcast_to(eye, (series, 2, 2)).copy()
         keep[:, :, 0] -= gain
         r = np.einsum("sji,sj->si", keep, r)
         info = np.swapaxes(keep, 1, 2) @ info @ keep
@@ -157,10 +142,9 @@ def update(cov: np.ndarray, gain: np.ndarray, var: np.ndarray) -> np.ndarray:
     return keep @ cov @ np.swapaxes(keep, -1, -2) + var[:, None, None] * gain[..., :, None] * gain[..., None, :]
 
 
-def _noise(t: np.ndarray, k: int, density: np.ndarray, free: Disturbances, order: int) -> np.ndarray:
-    """Covariance that the gap after frame k adds, shape (grid, series, order, order)."""
+def _noise(t: np.ndarray, k: int, density: np.ndarray, free: Disturbances) -> np.ndarray:
+    """Covariance that the gap after frame k adds, shape (grid, series, 2, 2)."""
     dt = float(t[k + 1] - t[k])
-    noise = density[:, :, None, None] * process(dt, order)
-    noise[:, :, :2, :2] += free.kick[k] / dt * process(dt, 2)
+    noise = (density[:, :, None, None] + free.kick[k] / dt) * process(dt)
     noise[:, :, 0, 0] += free.jump[k]
     return noise

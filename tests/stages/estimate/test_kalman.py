@@ -7,10 +7,12 @@ import pytest
 
 from r2s2r_cli.stages.estimate import kalman
 from r2s2r_cli.stages.estimate.kalman import Disturbances, backward, forward, process, transition
-from r2s2r_cli.stages.estimate.smooth import MIN_NOISE
+from r2s2r_cli.stages.estimate.noise import MIN_NOISE
+from tests.stages.estimate import dense
+from tests.stages.estimate.dense import covariance
 
 N = 9
-NARROW = (0.1, 1.0, 10.0)
+NARROW = (0.1, 1.0)
 """A prior with which one big matrix can still be inverted exactly."""
 
 
@@ -26,51 +28,37 @@ def problem(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, 
     return t, y, var, np.array([[1e-3, 1e-2]]), Disturbances(kick, jump)
 
 
-def dense(
-    t: np.ndarray, y: np.ndarray, var: np.ndarray, density: float, kick: np.ndarray, jump: np.ndarray, order: int
+def solved(
+    t: np.ndarray, y: np.ndarray, var: np.ndarray, density: float, kick: np.ndarray, jump: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Mean and covariance of all states of one series, and the log density of its observations, by one big matrix."""
     n = len(t)
-    cov = np.zeros((n * order, n * order))
-    cov[:order, :order] = np.diag(np.square(NARROW[:order]))
-    for k in range(n - 1):
-        dt = t[k + 1] - t[k]
-        step, noise = transition(dt, order), density * process(dt, order)
-        noise[:2, :2] += kick[k] / dt * process(dt, 2)
-        noise[0, 0] += jump[k]
-        now, nxt = slice(k * order, (k + 1) * order), slice((k + 1) * order, (k + 2) * order)
-        past = slice(0, (k + 1) * order)
-        cov[nxt, past] = step @ cov[now, past]
-        cov[past, nxt] = cov[nxt, past].T
-        cov[nxt, nxt] = step @ cov[now, now] @ step.T + noise
+    cov = covariance(t, density, kick, jump, 2, NARROW)
     seen = np.flatnonzero(np.isfinite(y))
-    mean0 = np.zeros(n * order)
-    mean0[::order] = y[seen[0]]
-    select = np.eye(n * order)[seen * order]
+    mean0 = np.zeros(n * 2)
+    mean0[::2] = y[seen[0]]
+    select = np.eye(n * 2)[seen * 2]
     spread = select @ cov @ select.T + np.diag(var[seen])
     gain = cov @ select.T @ np.linalg.inv(spread)
     rest = y[seen] - select @ mean0
     loglik = -0.5 * (rest @ np.linalg.solve(spread, rest) + np.linalg.slogdet(2 * np.pi * spread)[1])
-    left = np.eye(n * order) - gain @ select
+    left = np.eye(n * 2) - gain @ select
     posterior = left @ cov @ left.T + gain @ np.diag(var[seen]) @ gain.T
-    return (mean0 + gain @ rest).reshape(n, order), posterior, float(loglik)
+    return (mean0 + gain @ rest).reshape(n, 2), posterior, float(loglik)
 
 
-@pytest.mark.parametrize("order", [2, 3])
 @pytest.mark.parametrize("seed", range(3))
-def test_states_and_covariance_are_those_of_least_squares(
-    seed: int, order: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_states_and_covariance_are_those_of_least_squares(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Filter and smoother give the conditional mean, covariance and likelihood that one big Gaussian gives."""
     monkeypatch.setattr(kalman, "PRIOR_SD", NARROW)
     t, y, var, density, free = problem(seed)
-    run = forward(t, y, var, density, free, order)
+    run = forward(t, y, var, density, free)
     state = backward(t, y, var, free, run)
     for s in range(2):
-        mean, cov, loglik = dense(t, y[:, s], var[:, s], density[0, s], free.kick, free.jump[:, s], order)
+        mean, cov, loglik = solved(t, y[:, s], var[:, s], density[0, s], free.kick, free.jump[:, s])
         assert state.mean[:, s] == pytest.approx(mean, rel=1e-6, abs=1e-8)
         for k in range(N):
-            block = slice(k * order, (k + 1) * order)
+            block = slice(2 * k, 2 * k + 2)
             assert state.cov[k, s] == pytest.approx(cov[block, block], rel=1e-3, abs=1e-9)
         assert run.loglik[0, s] == pytest.approx(loglik, rel=1e-6)
 
@@ -78,11 +66,11 @@ def test_states_and_covariance_are_those_of_least_squares(
 def test_outlier_score_is_the_left_out_residual() -> None:
     """The score of a frame equals its distance from the track smoothed without it, over the standard deviation."""
     t, y, var, density, free = problem(1)
-    state = backward(t, y, var, free, forward(t, y, var, density, free, 2))
+    state = backward(t, y, var, free, forward(t, y, var, density, free))
     for k in (1, 4, 7):
         rest = y.copy()
         rest[k] = np.nan
-        left = backward(t, rest, var, free, forward(t, rest, var, density, free, 2))
+        left = backward(t, rest, var, free, forward(t, rest, var, density, free))
         expected = (y[k] - left.mean[k, :, 0]) / np.sqrt(left.cov[k, :, 0, 0] + var[k])
         assert state.outlier[k] == pytest.approx(np.nan_to_num(expected), abs=1e-6)
 
@@ -94,10 +82,10 @@ def test_jump_score_is_the_likelihood_ratio_of_a_free_jump() -> None:
     def loglik(size: float) -> float:
         moved = y.copy()
         moved[6:, 0] -= size
-        return float(forward(t, moved, var, density, still, 2).loglik[0, 0])
+        return float(forward(t, moved, var, density, still).loglik[0, 0])
 
     still = Disturbances(free.kick, np.zeros_like(free.jump))
-    state = backward(t, y, var, still, forward(t, y, var, density, still, 2))
+    state = backward(t, y, var, still, forward(t, y, var, density, still))
     sizes = np.array([-0.01, 0.0, 0.01])
     parabola = np.polyfit(sizes, [loglik(size) for size in sizes], 2)
     gain = parabola[2] - parabola[1] ** 2 / (4 * parabola[0]) - loglik(0.0)
@@ -111,14 +99,18 @@ def test_a_straight_line_without_noise_is_recovered() -> None:
     y = (0.3 + 0.07 * t)[:, None]
     var = np.full(y.shape, MIN_NOISE**2)
     free = Disturbances(np.zeros(39), np.zeros((39, 1)))
-    state = backward(t, y, var, free, forward(t, y, var, np.array([[1e-8]]), free, 2))
+    state = backward(t, y, var, free, forward(t, y, var, np.array([[1e-8]]), free))
     assert state.mean[:, 0, 0] == pytest.approx(y[:, 0], abs=1e-9)
     assert state.mean[:, 0, 1] == pytest.approx(0.07, abs=1e-6)
 
 
 def test_process_noise_adds_up_over_time() -> None:
     """Two gaps one after the other give the covariance of the whole gap: the model does not depend on the stamps."""
-    for order in (2, 3):
-        a, b = 0.07, 0.11
-        both = transition(b, order) @ process(a, order) @ transition(b, order).T + process(b, order)
-        assert both == pytest.approx(process(a + b, order), rel=1e-12)
+    a, b = 0.07, 0.11
+    assert transition(b) @ process(a) @ transition(b).T + process(b) == pytest.approx(process(a + b), rel=1e-12)
+
+
+def test_the_model_is_noise_that_is_integrated_twice() -> None:
+    """Transition and process noise are those of the general formulas for integrated white noise."""
+    assert transition(0.13) == pytest.approx(dense.transition(0.13, 2), rel=1e-12)
+    assert process(0.13) == pytest.approx(dense.process(0.13, 2), rel=1e-12)

@@ -8,7 +8,7 @@ import pytest
 from r2s2r_cli.artifact import Group
 from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.estimate.lengths import cap_distances, sensor_lengths
-from r2s2r_cli.stages.estimate.noise import observation_noise
+from r2s2r_cli.stages.estimate.noise import MIN_NOISE, observation_noise
 from r2s2r_cli.stages.frames import noise_sd
 from schemas.robot import Sensor
 from tests.stages.estimate.builders import threebar
@@ -91,3 +91,11 @@ def test_the_noise_of_the_recording_is_taken() -> None:
     assert not np.any(held)
     with pytest.raises(NumericalError, match="noise"):
         observation_noise(sample.t, sample.observed, Group({"noise_sd": np.full((6, 3), np.nan)}), where="caps")
+
+
+def test_an_exact_log_has_the_least_noise() -> None:
+    """Noise of 0, as a simulated log has it, becomes the floor, and no coordinate counts as held."""
+    sample = planted(0)
+    sd, held = observation_noise(sample.t, sample.p_WE, Group({"noise_sd": np.zeros((6, 3))}), where="caps")
+    assert np.all(sd == MIN_NOISE)
+    assert not np.any(held)

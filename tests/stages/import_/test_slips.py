@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ import pytest
 from r2s2r_cli.control_sign import cable_response
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.import_ import ImportedRun, import_source
+from r2s2r_cli.stages.init.robots import robot_toml
+from schemas.robot import Robot
 from schemas.sidecar import MINIMAL_SIDECAR
 from tests.support.import_samples import SIDECAR, csv_text, glide, sample_robot, small_csv, steps
 
@@ -172,16 +175,20 @@ def test_the_correlation_is_odd_in_the_commands_and_silent_without_motion() -> N
     assert np.isnan(cable_response(t, length, t, np.full_like(control, np.nan)))
 
 
-def test_the_real_crawl_has_the_right_sign(real_dir: Path) -> None:
-    """The authors' crawl: no warning about signs, and its negative has one."""
-    import tomllib
-
-    from r2s2r_cli.stages.init.robots import robot_toml
-    from schemas.robot import Robot
-
+def test_the_real_crawl_has_the_right_sign(real_dir: Path, tmp_path: Path) -> None:
+    """The authors' crawl: no warning about signs; the same with its control columns negated has one."""
     robot = Robot.model_validate(tomllib.loads(robot_toml("threebar")))
-    run = import_source(real_dir / "tribar_crawl" / "crawl.csv", robot=robot)
-    assert not any("reel in" in warning for warning in run.report.warnings)
+    folder = real_dir / "tribar_crawl"
+    header, *rows = (line.split(",") for line in (folder / "crawl.csv").read_text().split())
+    control = [i for i, name in enumerate(header) if name.startswith("control")]
+    for row in rows:
+        for i in control:
+            row[i] = str(-float(row[i]))
+    (tmp_path / "crawl.csv").write_text("\n".join(map(",".join, [header, *rows])) + "\n")
+    (tmp_path / "crawl.toml").write_bytes((folder / "crawl.toml").read_bytes())
+    for path, warned in ((folder / "crawl.csv", False), (tmp_path / "crawl.csv", True)):
+        report = import_source(path, robot=robot).report
+        assert any("+1 must reel in" in warning for warning in report.warnings) is warned
 
 
 def test_an_unknown_robot_is_no_robot_to_make(tmp_path: Path) -> None:

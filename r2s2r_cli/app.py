@@ -99,9 +99,15 @@ def _run_guarded(call: Callable[[], object], as_json: bool) -> int:
 
 def _system_error(error: OSError) -> InputError:
     """The operating system refused something that no command foresaw: a deleted directory, a forbidden one."""
-    place = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else "the working directory"
-    return InputError("the system does not let r2s2r go on", where=place, expected="a file or directory it may use",
-                      received=error.strerror or str(error), hint="cd to the project, look at it with: ls -la")  # fmt: skip
+    named = isinstance(error.filename, str | bytes)
+    place = os.fsdecode(error.filename) if named else "the working directory"
+    return InputError(
+        "the system does not let r2s2r go on",
+        where=place,
+        expected="a file or directory it may use",
+        received=error.strerror or str(error),
+        hint="cd to the project, look at it with: ls -la",
+    )
 
 
 def _text_error(error: UnicodeError) -> UsageError:

@@ -12,7 +12,7 @@ from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError, GateError
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from r2s2r_cli.store.again import command_again
-from r2s2r_cli.store.header import whole_header
+from r2s2r_cli.store.header import sealed_header, whole_header
 from r2s2r_cli.store.project import Iteration, Project
 from r2s2r_cli.store.staleness import reasons
 from schemas.header import Header
@@ -20,7 +20,9 @@ from schemas.results import ArtifactState, StatusResult
 
 
 def status(
-    check: Annotated[bool, typer.Option("--check", help="Leave with exit code 3 unless everything is fresh.")] = False,
+    check: Annotated[
+        bool, typer.Option("--check", help="Compare every byte with its seal; exit code 3 unless everything is fresh.")
+    ] = False,
     project: ProjectOption = None,
     json: JsonOption = False,
     quiet: QuietOption = False,
@@ -33,7 +35,7 @@ def status(
     """
     console = Console(json=json, quiet=quiet)
     here = Project.find(project)
-    result = survey(here)
+    result = survey(here, thorough=check)
     console.document(result)
     console.data(f"project {result.project}   robot {result.robot}   {_size(result.bytes)}")
     rows = [
@@ -55,15 +57,18 @@ def status(
         )
 
 
-def survey(project: Project) -> StatusResult:
-    """The state of every artifact of a project, in the order of the data. Raises InputError for wrong settings."""
+def survey(project: Project, *, thorough: bool = False) -> StatusResult:
+    """The state of every artifact of a project, in the order of the data.
+
+    Heads and sizes are read, with `thorough` every byte. Raises InputError for wrong settings.
+    """
     iterations = {iteration.path: iteration for iteration in project.iterations()}
     journals = project.journals()
     states: list[ArtifactState] = []
     again: list[str] = []
     stale: set[str] = set()
     for path in project.artifacts():
-        state, command = _state(project, iterations.get(path.parent), path, stale)
+        state, command = _state(project, iterations.get(path.parent), path, stale, thorough)
         states.append(state)
         again += [command] if command else []
     states += [_unsealed(project, iterations.get(path.parent), path) for path in journals]
@@ -78,12 +83,14 @@ def survey(project: Project) -> StatusResult:
     )
 
 
-def _state(project: Project, iteration: Iteration | None, path: Path, stale: set[str]) -> tuple[ArtifactState, str]:
+def _state(
+    project: Project, iteration: Iteration | None, path: Path, stale: set[str], thorough: bool
+) -> tuple[ArtifactState, str]:
     """The line of one artifact, and the command that mends it; empty where it is fresh."""
     name = project.relative(path)
     header: Header | None = None
     try:
-        header = whole_header(path)
+        header = sealed_header(path) if thorough else whole_header(path)
     except ArtifactError as error:
         state, why, command = "damaged", [error.what], f"r2s2r recover {shlex.quote(name)}"
     else:

@@ -106,6 +106,7 @@ def test_one_changed_byte_is_noticed(estimated: Path) -> None:
     data = bytearray((estimated / ESTIMATE).read_bytes())
     data[len(data) // 2] ^= 1
     (estimated / ESTIMATE).write_bytes(data)
+    assert invoke("status", "--check").exit_code == 3
     answer = document("estimate", "--no-draw")
     assert (answer["state"], answer["reasons"]) == (
         "done", ["what is there is damaged: bytes of the file changed after it was sealed"],

@@ -7,10 +7,15 @@ import sys
 
 
 def main() -> None:
-    """Load the app and run it. Ctrl-C counts as an interrupt from the first moment, not only once all is loaded."""
+    """Load the app and run it. Ctrl-C counts as an interrupt from the first moment to the last, without a traceback."""
     try:
-        from r2s2r_cli.app import app
+        early: list[int] = []
+        usual = signal.signal(signal.SIGINT, lambda number, _: early.append(number))
+        from r2s2r_cli.app import app  # compiled modules do not take an exception out of the blue while they load
 
+        signal.signal(signal.SIGINT, usual)
+        if early:
+            raise KeyboardInterrupt
         app()
     except KeyboardInterrupt:
         print("interrupted: nothing was done", file=sys.stderr)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 from pydantic import BaseModel
 
+from r2s2r_cli.commands.interrupts import whole_items
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError, InputError, R2S2RError, UsageError
 from r2s2r_cli.store.atomic import sweep, write_bytes
@@ -151,7 +152,7 @@ class StageRun(Generic[Report]):
 
                 with writing(self.project.root, self.stage):
                     _, data = read_artifact(self.target, self.kind, blobs=True)
-                    drawings = self._write_drawings(list(draw(data, report)))
+                    drawings = self._write_drawings(list(whole_items(draw(data, report))))
         return self._result("fresh", header, (), report, drawings), report
 
     def _run_locked(
@@ -171,7 +172,7 @@ class StageRun(Generic[Report]):
         data, report = compute()
         wall_s = time.monotonic() - clock
         self._require_same_inputs()
-        pictures = list(draw(data, report)) if draw is not None else []
+        pictures = list(whole_items(draw(data, report))) if draw is not None else []
         provenance = build_provenance(
             stage=self.stage, stage_version=self.wanted.stage_version, argv=sys.argv, settings=self.wanted.settings,
             overrides=self.overrides, robot=self.wanted.robot, inputs=self.inputs, started=started, wall_s=wall_s,

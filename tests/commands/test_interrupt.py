@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from r2s2r_cli.commands.interrupts import whole_items
 from tests.commands.conftest import invoke
 
 ESTIMATE = "iterations/001/20-estimate.h5"
@@ -48,6 +51,25 @@ def check(project: Path, delays_s: list[float]) -> None:
         assert not list(project.rglob("*.partial"))
     assert 130 in codes
     assert invoke("validate", ESTIMATE).exit_code == 0
+
+
+def test_an_interrupt_waits_for_the_item_in_the_making() -> None:
+    """SIGINT while an item is made is raised once it is there; no further one is begun."""
+    made = []
+
+    def items() -> Iterator[int]:
+        for i in range(3):
+            if i == 1:
+                os.kill(os.getpid(), signal.SIGINT)
+            made.append(i)
+            yield i
+
+    taken = []
+    with pytest.raises(KeyboardInterrupt):
+        for item in whole_items(items()):
+            taken.append(item)
+    assert (made, taken) == ([0, 1], [0])
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_ctrl_c_leaves_everything_whole(estimated: Path) -> None:

@@ -1,0 +1,41 @@
+"""Ctrl-C between pictures, not inside one."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
+
+Item = TypeVar("Item")
+
+
+def whole_items(items: Iterable[Item]) -> Iterator[Item]:
+    """The same items; an interrupt while one is made waits until it is there, then raises KeyboardInterrupt.
+
+    The drawing libraries are C++ that aborts the process where a Python exception comes out of the blue.
+    """
+    iterator = iter(items)
+    done = object()
+    while True:
+        with _deferred():
+            item = next(iterator, done)
+        if item is done:
+            return
+        yield item  # type: ignore[misc]
+
+
+@contextlib.contextmanager
+def _deferred() -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():  # only the main thread may set handlers
+        yield
+        return
+    pending: list[int] = []
+    previous = signal.signal(signal.SIGINT, lambda number, _: pending.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
+    if pending:
+        raise KeyboardInterrupt

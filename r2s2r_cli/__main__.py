@@ -13,7 +13,7 @@ def main() -> None:
         usual = signal.signal(signal.SIGINT, lambda number, _: early.append(number))
         from r2s2r_cli.app import app  # compiled modules do not take an exception out of the blue while they load
 
-        signal.signal(signal.SIGINT, usual)
+        signal.signal(signal.SIGINT, usual or signal.default_int_handler)
         if early:
             raise KeyboardInterrupt
         app()

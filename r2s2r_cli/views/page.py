@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 _TEMPLATE = """\
 <!doctype html>
@@ -20,9 +20,8 @@ _TEMPLATE = """\
   p.verdict { font-size: 1.1rem; }
   p.label { background: #fff3cd; border-left: 4px solid #b58900; padding: .4rem .8rem; }
   table { border-collapse: collapse; } th, td { padding: .2rem .8rem .2rem 0; text-align: left; vertical-align: top; }
-  th { border-bottom: 1px solid #8792a2; } td.number { text-align: right; font-variant-numeric: tabular-nums; }
-  img { max-width: 100%; height: auto; } footer { margin-top: 3rem; color: #5a6675; font-size: .85rem; }
-  code { overflow-wrap: anywhere; }
+  th { border-bottom: 1px solid #8792a2; }
+  img { max-width: 100%; height: auto; }
 </style>
 </head>
 <body>
@@ -43,7 +42,6 @@ _TEMPLATE = """\
 <h2>{{ picture.title }}</h2>
 <img alt="{{ picture.title }}" src="data:image/png;base64,{{ encoded(picture.png) }}">
 {% endfor %}
-<footer>{% for line in page.footer %}<code>{{ line }}</code><br>{% endfor %}</footer>
 </body>
 </html>
 """
@@ -76,7 +74,6 @@ class Page:
     """What a reader must not overlook: a sample without physics, a warning."""
     tables: Sequence[PageTable] = ()
     pictures: Sequence[Picture] = ()
-    footer: Sequence[str] = field(default_factory=tuple)
 
 
 def counted(number: int, what: str) -> str:

@@ -1,0 +1,202 @@
+"""Ground contact by velocity-level impulses with true stiction (contact.md section 2, steps 3 to 8).
+
+Rods touch each other only through cables and, rarely, through rod contact; the ground problem is therefore one problem
+of two contacts a rod: an exact stick solve, projected to the friction cone, then sweeps that know the slip direction.
+Six rows a rod, row 3 c + i: cap c in direction i of the ground frame G; i = 2 is the normal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from r2s2r_cli.engine.body import Bodies, angular_change
+from r2s2r_cli.engine.detach import detach_geometry, detach_impulse
+from r2s2r_cli.engine.hooks import ContactTerms
+from r2s2r_cli.engine.linear import ldl_solve
+from r2s2r_cli.engine.parameters import Parameters
+from r2s2r_cli.engine.structure import Structure
+
+REGULARISATION = 1e-7
+"""Relative, on the stick solve's diagonal. Not 0: axial friction of a rod on both caps is redundant. Not more: 1e-4
+creeps 0.1 mm a minute (contact.md section 6, trap 5)."""
+SATURATED = 0.998
+"""Share of the squared friction limit from which a contact counts as sliding."""
+PAINLEVE_FLOOR = 0.3
+"""Least share of the normal mobility that sliding may leave; keeps friction above 1.3 finite (trap 6)."""
+PUSH_OUT = 0.2
+"""Share of a penetration that one step takes back, in the pose alone."""
+
+
+@dataclass(frozen=True)
+class GroundRows:
+    """The contact problem of all rods. gap [m], (B, rod, 2); arm: angular part of the rows, rod axes, (B, rod, 6, 3);
+    mobility: velocity of row a per impulse on row b [1/kg], (B, rod, 6, 6); free: row velocities if nothing were
+    touched [m/s], (B, rod, 6); target: normal velocity to reach [m/s], (B, rod, 2); active: the cap would be below the
+    ground at the end of the step; toi: share of the step before its impact; friction: (B, rod, 2)."""
+
+    gap: Tensor
+    arm: Tensor
+    mobility: Tensor
+    free: Tensor
+    target: Tensor
+    active: Tensor
+    toi: Tensor
+    friction: Tensor
+
+
+def contact_rows(structure: Structure, theta: Parameters, rods: Bodies, v: Tensor, w: Tensor, h: Tensor) -> GroundRows:
+    """The contact problem at the start of the step, with the free velocities v, w that the step would end with."""
+    gap, arm = _geometry(theta, rods)
+    arm = detach_geometry(arm, structure.detach)
+    mobility = detach_geometry(_mobility(rods, arm), structure.detach)
+    before = row_velocity(arm, rods.v, rods.w)
+    free = row_velocity(arm, v, w)
+    friction = theta.friction.expand(gap.shape)
+    if structure.effects:
+        p_GC = rods.p[:, :, None] + (rods.R_GR[:, :, None] * theta.p_BE[..., None, :]).sum(-1)
+        p_GC = p_GC * p_GC.new_tensor([1.0, 1.0, 0.0])
+        terms = ContactTerms(p_GC, before.unflatten(-1, (2, 3)), gap)
+        for effect in structure.effects:
+            friction = effect.contact(theta.of(effect.name), terms, friction)
+    v0, v1 = before[..., 2::3], free[..., 2::3]
+    # Predicted, not gap < 0: a cap at rest 1e-12 above the ground must stay active.
+    active = gap + h[..., None] * v1 < 0
+    falling = torch.where(v1 < 0, -v1, torch.ones_like(v1))
+    toi = torch.where(active, torch.relu(gap) / (h[..., None] * falling), torch.zeros_like(gap))
+    impact = v0 + toi * (v1 - v0)
+    threshold = theta.impact_speed[..., None]
+    ramp = torch.clamp((-impact - threshold) / threshold, 0.0, 1.0)
+    # The second term is what gravity and cables still do in the rest of the step after the impact.
+    target = torch.relu(theta.restitution[..., None] * ramp * -impact + (1.0 - toi) * (v1 - v0))
+    return GroundRows(gap, arm, mobility, free, target, active, toi, friction)
+
+
+def _geometry(theta: Parameters, rods: Bodies) -> tuple[Tensor, Tensor]:
+    """Gaps (B, rod, 2) and angular rows (B, rod, 6, 3)."""
+    R = rods.R_GR
+    x, y, z = R.unbind(-2)  # axes of G in rod axes, (B, rod, 3)
+    height = rods.p[..., 2, None] + (z[..., None, :] * theta.p_BE).sum(-1)
+    gap = height - theta.cap_radius
+    radius = theta.cap_radius[..., None]
+    p_BE = theta.p_BE.expand(*z.shape[:2], 2, 3)
+
+    def turning(axis: Tensor) -> Tensor:
+        return torch.linalg.cross(p_BE, axis[..., None, :].expand_as(p_BE))
+
+    # The arm of the lowest point: the sphere's own part, -r z x axis, is -r y, +r x and 0.
+    rows = torch.stack([turning(x) - radius * y[..., None, :], turning(y) + radius * x[..., None, :], turning(z)], -2)
+    return gap, rows.flatten(-3, -2)
+
+
+def _mobility(rods: Bodies, arm: Tensor) -> Tensor:
+    turned = angular_change(rods.inverse_inertia[:, :, None], arm)
+    same = torch.eye(3, dtype=arm.dtype, device=arm.device).repeat(2, 2)
+    return torch.einsum("brai,brci->brac", arm, turned) + rods.inverse_mass[..., None] * same
+
+
+def row_velocity(arm: Tensor, v: Tensor, w: Tensor) -> Tensor:
+    """Velocity of every row [m/s], (B, rod, 6)."""
+    return torch.cat([v, v], dim=-1) + (arm * w[..., None, :]).sum(-1)
+
+
+def solve(structure: Structure, theta: Parameters, ground: GroundRows) -> Tensor:
+    """Contact impulses [N s], (B, rod, 6): never pulling, in the friction cone, with stiction."""
+    del theta
+    residual = torch.cat([_aim(ground, 0), _aim(ground, 1)], dim=-1)
+    impulse = _stick(ground, residual)
+    residual = residual + (ground.mobility * impulse[..., None, :]).sum(-1)
+    impulse, _ = sweep(ground, impulse, residual, structure.sweeps)
+    return detach_impulse(impulse, structure.detach)
+
+
+def _aim(ground: GroundRows, cap: int) -> Tensor:
+    free = ground.free[..., 3 * cap : 3 * cap + 3]
+    return torch.cat([free[..., :2], (free[..., 2] - ground.target[..., cap])[..., None]], dim=-1)
+
+
+def _stick(ground: GroundRows, residual: Tensor) -> Tensor:
+    """Impulses that stop every active row, each contact then projected to its friction cone."""
+    mask = ground.active.repeat_interleave(3, dim=-1)
+    both = mask[..., :, None] & mask[..., None, :]
+    diagonal = torch.diagonal(ground.mobility, dim1=-2, dim2=-1)
+    matrix = torch.where(both, ground.mobility, torch.zeros_like(ground.mobility))
+    lower = torch.tril(matrix, -1)
+    full = ldl_solve(lower, diagonal * (1.0 + REGULARISATION), torch.where(mask, -residual, torch.zeros_like(residual)))
+    parts = []
+    for cap in (0, 1):
+        normal = torch.relu(full[..., 3 * cap + 2])
+        parts += [*clip(full[..., 3 * cap], full[..., 3 * cap + 1], ground.friction[..., cap] * normal), normal]
+    return torch.stack(parts, dim=-1)
+
+
+def clip(x: Tensor, y: Tensor, limit: Tensor) -> tuple[Tensor, Tensor]:
+    """The tangential impulse (x, y) scaled back to `limit` where it is longer."""
+    squared = x * x + y * y
+    beyond = squared > limit * limit
+    scale = torch.where(beyond, limit / torch.sqrt(torch.where(beyond, squared, torch.ones_like(squared))), 1.0)
+    return x * scale, y * scale
+
+
+def sweep(ground: GroundRows, impulse: Tensor, residual: Tensor, sweeps: int) -> tuple[Tensor, Tensor]:
+    """Slip-aware Gauss-Seidel sweeps over the two contacts of each rod; residual: row velocity less its target."""
+    rows = list(impulse.unbind(-1))
+    for k in range(sweeps):
+        for cap in (0, 1) if k % 2 == 0 else (1, 0):
+            rows, residual = _relax(ground, cap, rows, residual)
+    return torch.stack(rows, dim=-1), residual
+
+
+def _relax(ground: GroundRows, cap: int, rows: list[Tensor], residual: Tensor) -> tuple[list[Tensor], Tensor]:
+    a, mu, active = ground.mobility, ground.friction[..., cap], ground.active[..., cap]
+    i, j, n = 3 * cap, 3 * cap + 1, 3 * cap + 2
+    x, y, normal = rows[i], rows[j], rows[n]
+    zero = torch.zeros_like(normal)
+    limit, squared = mu * normal, x * x + y * y
+    slipping = squared > SATURATED * limit * limit
+    # Where nothing slips or pushes there is no direction; 1 keeps the division finite.
+    moving = slipping & (squared > 0)
+    inverse = 1.0 / torch.sqrt(torch.where(moving, squared, torch.ones_like(squared)))
+    dx, dy = torch.where(moving, x * inverse, zero), torch.where(moving, y * inverse, zero)
+
+    # Normal: a sliding contact moves along its ray of the cone, so friction takes part in what the normal can do.
+    stiff = a[..., n, n]
+    ray = torch.maximum(stiff + mu * (a[..., i, n] * dx + a[..., j, n] * dy), PAINLEVE_FLOOR * stiff)
+    pushed = torch.relu(normal - residual[..., n] / torch.where(moving, ray, stiff))
+    pushed = torch.where(active, pushed, zero)
+    change = pushed - normal
+    sx, sy = mu * change * dx, mu * change * dy
+    residual = residual + a[..., :, n] * change[..., None] + a[..., :, i] * sx[..., None] + a[..., :, j] * sy[..., None]
+    x, y = x + sx, y + sy
+
+    # Friction: a scalar step, the larger eigenvalue of the 2 x 2 block; its inverse would turn the slip direction.
+    mean, half = 0.5 * (a[..., i, i] + a[..., j, j]), 0.5 * (a[..., i, i] - a[..., j, j])
+    largest = mean + torch.sqrt(half * half + a[..., i, j] * a[..., i, j] + 1e-20)
+    fx, fy = clip(x - residual[..., i] / largest, y - residual[..., j] / largest, mu * pushed)
+    fx, fy = torch.where(active, fx, zero), torch.where(active, fy, zero)
+    residual = residual + a[..., :, i] * (fx - x)[..., None] + a[..., :, j] * (fy - y)[..., None]
+    rows = list(rows)
+    rows[i], rows[j], rows[n] = fx, fy, pushed
+    return rows, residual
+
+
+def applied(rods: Bodies, ground: GroundRows, impulse: Tensor, v: Tensor, w: Tensor) -> tuple[Tensor, Tensor]:
+    """Velocities after the ground impulses (B, rod, 6)."""
+    linear = impulse[..., :3] + impulse[..., 3:]
+    angular = (ground.arm * impulse[..., None]).sum(-2)
+    return v + rods.inverse_mass * linear, w + angular_change(rods.inverse_inertia, angular)
+
+
+def pose_velocity(
+    rods: Bodies, ground: GroundRows, impulse: Tensor, v: Tensor, w: Tensor, h: Tensor
+) -> tuple[Tensor, Tensor]:
+    """What moves the pose: the new velocities v, w less the share of each impulse before its time of impact, plus the
+    push-out of penetrations. Both act on the pose alone and bring in no energy."""
+    normal = torch.diagonal(ground.mobility, dim1=-2, dim2=-1)[..., 2::3]
+    push = (PUSH_OUT / h)[..., None] * torch.relu(-ground.gap) / normal
+    late = torch.repeat_interleave(ground.toi, 3, dim=-1) * impulse
+    zero = torch.zeros_like(push[..., 0])
+    correction = torch.stack([zero, zero, push[..., 0], zero, zero, push[..., 1]], dim=-1) - late
+    return applied(rods, ground, correction, v, w)

@@ -1,0 +1,131 @@
+"""Where an effect can act: one method a channel, each the identity unless an effect says otherwise.
+
+The step calls the hooks of `Structure.effects` in order. They are torch code on the same tensors, batch first, so that
+the tracer compiles them with the rest; hooks that depend on parameters only are hoisted out of the loop. An effect at
+its off value must return bitwise what it received.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+from torch import Tensor
+
+if TYPE_CHECKING:
+    from r2s2r_cli.engine.parameters import Parameters
+    from r2s2r_cli.engine.structure import Structure
+
+Values = Mapping[str, Tensor]
+"""An effect's own parameters or states by name, each (B, n)."""
+
+
+class Channel(StrEnum):
+    """The channels of the design, section 5: hooks, probes and verdicts all use these words."""
+
+    COMMAND = "command"
+    MOTOR = "motor"
+    CABLE = "cable"
+    MASS = "mass"
+    CONTACT = "contact"
+    WORLD = "world"
+    SENSING = "sensing"
+    OBSERVATION = "observation"
+
+
+@dataclass(frozen=True)
+class CableTerms:
+    """All cables at the start of a step. stretch: beyond the rest length [m], (B, cable); negative: slack.
+    rate: of the length between the attachment points [m/s]. force: of the spring [N], 0 where slack."""
+
+    stretch: Tensor
+    rate: Tensor
+    force: Tensor
+
+
+@dataclass(frozen=True)
+class ContactTerms:
+    """All caps at the start of a step, frame G. p_GC: ground point below each cap centre [m], (B, rod, 2, 3);
+    v_GC: velocity of the cap's lowest point [m/s], same shape; gap: its height [m], (B, rod, 2)."""
+
+    p_GC: Tensor
+    v_GC: Tensor
+    gap: Tensor
+
+
+@dataclass(frozen=True)
+class WorldTerms:
+    """All rods at the start of a step, frame G. p_GB, v_GB: centre of mass [m], [m/s], (B, rod, 3);
+    R_GR: (B, rod, 3, 3); w_R: angular velocity in rod axes [rad/s], (B, rod, 3)."""
+
+    p_GB: Tensor
+    v_GB: Tensor
+    R_GR: Tensor
+    w_R: Tensor
+
+
+class Hooks:
+    """Base of everything that plugs into the step. `x`: own parameters, `z`: own states, `h`: step [s], (B, 1)."""
+
+    name: str = ""
+
+    def structure(self, structure: Structure) -> Structure:
+        """Switch on the laws that this effect parametrises."""
+        return structure
+
+    def sizes(self, structure: Structure) -> Mapping[str, int]:
+        """Own parameters and how many numbers each has."""
+        del structure
+        return {}
+
+    def off(self, structure: Structure) -> Mapping[str, float]:
+        """Off value of each own parameter: with these the effect is not there."""
+        del structure
+        return {}
+
+    def state_sizes(self, structure: Structure) -> Mapping[str, int]:
+        """Own states and how many numbers each has; they start at 0."""
+        del structure
+        return {}
+
+    def parameters(self, x: Values, theta: Parameters) -> Parameters:
+        """Channels mass, motor, cable, contact, world: change the numbers of the nominal laws. Hoisted out of the loop."""
+        del x
+        return theta
+
+    def command(self, x: Values, z: Values, u: Tensor, h: Tensor) -> tuple[Tensor, Values]:
+        """Channel command: what the winches receive of the motor command u (B, actuated)."""
+        del x, h
+        return u, z
+
+    def motor(self, x: Values, z: Values, rate: Tensor, tension: Tensor, h: Tensor) -> tuple[Tensor, Values]:
+        """Channel motor: winding rate [m/s], + shortens, (B, actuated), of winches under `tension` [N]."""
+        del x, tension, h
+        return rate, z
+
+    def cable(self, x: Values, z: Values, terms: CableTerms, h: Tensor) -> tuple[Tensor, Values]:
+        """Channel cable: spring force [N], (B, cable), before damping."""
+        del x, h
+        return terms.force, z
+
+    def contact(self, x: Values, terms: ContactTerms, friction: Tensor) -> Tensor:
+        """Channel contact: friction coefficient of each cap, (B, rod, 2)."""
+        del x, terms
+        return friction
+
+    def world(self, x: Values, terms: WorldTerms, force: Tensor, torque: Tensor) -> tuple[Tensor, Tensor]:
+        """Channel world: force [N], frame G, and torque [N m], rod axes, on each rod, (B, rod, 3)."""
+        del x, terms
+        return force, torque
+
+    def sensing(self, x: Values, length: Tensor) -> Tensor:
+        """Channel sensing: cable lengths [m], (B, cable), as the controller reads them."""
+        del x
+        return length
+
+    def observation(self, x: Values, t: Tensor, p_WE: Tensor) -> Tensor:
+        """Channel observation: end caps [m], (B, frame, cap, 3), as the camera sees them at times t [s], (frame,)."""
+        del x, t
+        return p_WE

@@ -1,0 +1,79 @@
+"""One step of the engine: cables, free motion, ground impulses, rod contact, winches. Pure torch, batch first.
+
+The order follows contact.md section 2: everything is taken from the state at the start of the step; velocities change
+by impulses, and positions follow the new velocities, less the part of the step before each impact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import torch
+from torch import Tensor
+
+from r2s2r_cli.engine.body import angular_change, bodies, gyroscopic, moved
+from r2s2r_cli.engine.cable import cable_rows, pulled, rest_lengths, spring_force, tension_impulse
+from r2s2r_cli.engine.contact import contact_rows, pose_velocity, solve
+from r2s2r_cli.engine.hooks import WorldTerms
+from r2s2r_cli.engine.parameters import Parameters
+from r2s2r_cli.engine.rod_contact import collide
+from r2s2r_cli.engine.state import State
+from r2s2r_cli.engine.structure import Structure
+from r2s2r_cli.engine.winch import commanded_rate, lagged, wound
+
+
+def step(structure: Structure, theta: Parameters, state: State, u: Tensor, h: Tensor) -> State:
+    """The state after one step of h seconds.
+
+    theta: batch B or 1. u: motor commands in [-1, 1], +1 reels in, (B, actuated). h: (B, 1) or (1, 1) [s].
+    Frame G throughout: z up from the ground plane. Differentiable; `Structure.detach` says what of.
+    """
+    for effect in structure.effects:
+        theta = effect.parameters(theta.of(effect.name), theta)
+    memory = {effect.name: state.of(effect.name) for effect in structure.effects}
+    rods = bodies(theta, state, axial=structure.axial)
+
+    for effect in structure.effects:
+        u, memory[effect.name] = effect.command(theta.of(effect.name), memory[effect.name], u, h)
+
+    rows = cable_rows(structure, theta, rods)
+    terms = spring_force(structure, theta, rows, rest_lengths(structure, theta, state.rest))
+    force = terms.force
+    for effect in structure.effects:
+        force, memory[effect.name] = effect.cable(
+            theta.of(effect.name), memory[effect.name], replace(terms, force=force), h
+        )
+    impulse = tension_impulse(structure, theta, rows, terms, force, h)
+    dv, dw = pulled(structure, rods, rows, impulse)
+
+    v = rods.v + h[..., None] * theta.gravity[:, None] + dv
+    w = rods.w + gyroscopic(theta, rods.inverse_inertia, rods.w, h) + dw
+    if structure.effects:
+        v, w = _pushed_by_the_world(structure, theta, rods, v, w, h)
+
+    ground = contact_rows(structure, theta, rods, v, w, h)
+    contact = solve(structure, theta, ground)
+    v, w, contact = collide(structure, theta, rods, ground, contact, v, w, h)
+    p_GB, q_GR = moved(state, *pose_velocity(rods, ground, contact, v, w, h), h)
+
+    winding = commanded_rate(structure, theta, u, impulse[:, list(structure.actuated)] / h)
+    for effect in structure.effects:
+        winding, memory[effect.name] = effect.motor(
+            theta.of(effect.name), memory[effect.name], winding, impulse[:, list(structure.actuated)] / h, h
+        )
+    if structure.lag:
+        winding = lagged(theta, state.winding, winding, h)
+    rest = wound(theta, state.rest, winding, h)
+    extra = {f"{name}.{key}": value for name, values in memory.items() for key, value in values.items()}
+    return State(p_GB, q_GR, v, w, rest, winding, extra)
+
+
+def _pushed_by_the_world(
+    structure: Structure, theta: Parameters, rods, v: Tensor, w: Tensor, h: Tensor
+) -> tuple[Tensor, Tensor]:
+    terms = WorldTerms(rods.p, v, rods.R_GR, w)
+    force, torque = torch.zeros_like(v), torch.zeros_like(w)
+    for effect in structure.effects:
+        force, torque = effect.world(theta.of(effect.name), terms, force, torque)
+    dv = h[..., None] * rods.inverse_mass * force
+    return v + dv, w + angular_change(rods.inverse_inertia, h[..., None] * torque)

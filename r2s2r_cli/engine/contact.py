@@ -17,7 +17,7 @@ from r2s2r_cli.engine.detach import detach_geometry, detach_impulse
 from r2s2r_cli.engine.hooks import ContactTerms
 from r2s2r_cli.engine.linear import ldl_solve
 from r2s2r_cli.engine.parameters import Parameters
-from r2s2r_cli.engine.structure import Structure
+from r2s2r_cli.engine.structure import Detach, Structure
 
 REGULARISATION = 1e-7
 """Relative, on the stick solve's diagonal. Not 0: axial friction of a rod on both caps is redundant. Not more: 1e-4
@@ -50,8 +50,8 @@ class GroundRows:
 def contact_rows(structure: Structure, theta: Parameters, rods: Bodies, v: Tensor, w: Tensor, h: Tensor) -> GroundRows:
     """The contact problem at the start of the step, with the free velocities v, w that the step would end with."""
     gap, arm = _geometry(theta, rods)
-    arm = detach_geometry(arm, structure.detach)
-    mobility = detach_geometry(_mobility(rods, arm), structure.detach)
+    arm = detach_geometry(arm, structure.detach == Detach.GEOMETRY)
+    mobility = detach_geometry(_mobility(rods, arm), structure.detach == Detach.GEOMETRY)
     before = row_velocity(arm, rods.v, rods.w)
     free = row_velocity(arm, v, w)
     friction = theta.friction.expand(gap.shape)
@@ -102,14 +102,14 @@ def row_velocity(arm: Tensor, v: Tensor, w: Tensor) -> Tensor:
     return torch.cat([v, v], dim=-1) + (arm * w[..., None, :]).sum(-1)
 
 
-def solve(structure: Structure, theta: Parameters, ground: GroundRows) -> Tensor:
+def solve(structure: Structure, ground: GroundRows) -> Tensor:
     """Contact impulses [N s], (B, rod, 6): never pulling, in the friction cone, with stiction."""
-    del theta
     residual = torch.cat([_aim(ground, 0), _aim(ground, 1)], dim=-1)
     impulse = _stick(ground, residual)
     residual = residual + (ground.mobility * impulse[..., None, :]).sum(-1)
-    impulse, _ = sweep(ground, impulse, residual, structure.sweeps)
-    return detach_impulse(impulse, structure.detach)
+    problem = (ground.mobility, ground.friction, ground.active)
+    impulse = sweep(*problem, impulse, residual, sweeps=structure.sweeps)
+    return detach_impulse(impulse, structure.detach == Detach.IMPULSE)
 
 
 def _aim(ground: GroundRows, cap: int) -> Tensor:
@@ -140,17 +140,23 @@ def clip(x: Tensor, y: Tensor, limit: Tensor) -> tuple[Tensor, Tensor]:
     return x * scale, y * scale
 
 
-def sweep(ground: GroundRows, impulse: Tensor, residual: Tensor, sweeps: int) -> tuple[Tensor, Tensor]:
-    """Slip-aware Gauss-Seidel sweeps over the two contacts of each rod; residual: row velocity less its target."""
+def sweep(
+    mobility: Tensor, friction: Tensor, active: Tensor, impulse: Tensor, residual: Tensor, *, sweeps: int
+) -> Tensor:
+    """Impulses (..., 6) after slip-aware Gauss-Seidel sweeps over the two contacts of a rod.
+
+    residual: row velocities less their targets at `impulse`, (..., 6); the rest as in GroundRows.
+    """
     rows = list(impulse.unbind(-1))
     for k in range(sweeps):
         for cap in (0, 1) if k % 2 == 0 else (1, 0):
-            rows, residual = _relax(ground, cap, rows, residual)
-    return torch.stack(rows, dim=-1), residual
+            rows, residual = _relax(mobility, friction[..., cap], active[..., cap], cap, rows, residual)
+    return torch.stack(rows, dim=-1)
 
 
-def _relax(ground: GroundRows, cap: int, rows: list[Tensor], residual: Tensor) -> tuple[list[Tensor], Tensor]:
-    a, mu, active = ground.mobility, ground.friction[..., cap], ground.active[..., cap]
+def _relax(
+    a: Tensor, mu: Tensor, active: Tensor, cap: int, rows: list[Tensor], residual: Tensor
+) -> tuple[list[Tensor], Tensor]:
     i, j, n = 3 * cap, 3 * cap + 1, 3 * cap + 2
     x, y, normal = rows[i], rows[j], rows[n]
     zero = torch.zeros_like(normal)

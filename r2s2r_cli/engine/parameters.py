@@ -114,11 +114,16 @@ def check_parameters(structure: Structure, theta: Parameters) -> None:
     """Raises EngineInputError for a number that no robot has, or a wrong shape; names the field."""
     for name, shape in shapes(structure).items():
         if "." in name and name not in theta.extra:
-            raise EngineInputError(name, "a parameter of an effect is missing", expected=f"(B, {shape[0]})", received="none")
+            raise EngineInputError(
+                name, "a parameter of an effect is missing", expected=f"(B, {shape[0]})", received="none"
+            )
         tensor = value(theta, name)
         if tuple(tensor.shape[1:]) != shape or tensor.ndim != len(shape) + 1:
             raise EngineInputError(
-                name, "wrong shape", expected="(B, " + ", ".join(map(str, shape)) + ")", received=str(tuple(tensor.shape))
+                name,
+                "wrong shape",
+                expected="(B, " + ", ".join(map(str, shape)) + ")",
+                received=str(tuple(tensor.shape)),
             )
         if not torch.isfinite(tensor).all():
             raise EngineInputError(name, "not a finite number", expected="finite numbers", received=_where(tensor))
@@ -140,7 +145,10 @@ def _require(theta: Parameters, name: str, rule: str, good: Tensor) -> None:
         tensor = getattr(theta, name)
         index = tuple(int(i) for i in torch.nonzero(~good)[0])
         raise EngineInputError(
-            f"{name}.{'.'.join(map(str, index[1:]))}", "out of its range", expected=rule, received=f"{float(tensor[index]):g}"
+            f"{name}.{'.'.join(map(str, index[1:]))}",
+            "out of its range",
+            expected=rule,
+            received=f"{float(tensor[index]):g}",
         )
 
 

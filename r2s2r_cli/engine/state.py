@@ -62,10 +62,15 @@ def check_state(structure: Structure, state: State) -> None:
     for name, shape in state_shapes(structure).items():
         tensor = state.extra.get(name) if "." in name else getattr(state, name)
         if tensor is None:
-            raise EngineInputError(name, "a state of an effect is missing", expected=f"(B, {shape[0]})", received="none")
+            raise EngineInputError(
+                name, "a state of an effect is missing", expected=f"(B, {shape[0]})", received="none"
+            )
         if tuple(tensor.shape[1:]) != shape or tensor.ndim != len(shape) + 1:
             raise EngineInputError(
-                name, "wrong shape", expected="(B, " + ", ".join(map(str, shape)) + ")", received=str(tuple(tensor.shape))
+                name,
+                "wrong shape",
+                expected="(B, " + ", ".join(map(str, shape)) + ")",
+                received=str(tuple(tensor.shape)),
             )
         if not torch.isfinite(tensor).all():
             index = tuple(int(i) for i in torch.nonzero(~torch.isfinite(tensor))[0])
@@ -75,7 +80,9 @@ def check_state(structure: Structure, state: State) -> None:
             )  # fmt: skip
     norm = torch.linalg.vector_norm(state.q_WR, dim=-1)
     if not bool(((norm - 1).abs() < 1e-3).all()):
-        raise EngineInputError("q_WR", "not a unit quaternion", expected="norm 1", received=f"norm {float(norm.min()):g}")
+        raise EngineInputError(
+            "q_WR", "not a unit quaternion", expected="norm 1", received=f"norm {float(norm.min()):g}"
+        )
 
 
 def end_caps(theta: Parameters, state: State) -> Tensor:

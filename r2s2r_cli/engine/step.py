@@ -52,9 +52,10 @@ def step(structure: Structure, theta: Parameters, state: State, u: Tensor, h: Te
         v, w = _pushed_by_the_world(structure, theta, rods, v, w, h)
 
     ground = contact_rows(structure, theta, rods, v, w, h)
-    contact = solve(structure, theta, ground)
-    v, w, contact = collide(structure, theta, rods, ground, contact, v, w, h)
-    p_GB, q_GR = moved(state, *pose_velocity(rods, ground, contact, v, w, h), h)
+    contact = solve(structure, ground)
+    after = collide(structure, theta, rods, ground, contact, v, w, h)
+    along, turning = pose_velocity(rods, ground, after.impulse, after.v, after.w, h)
+    p_GB, q_GR = moved(state, along + after.shift, turning + after.turn, h)
 
     winding = commanded_rate(structure, theta, u, impulse[:, list(structure.actuated)] / h)
     for effect in structure.effects:
@@ -65,7 +66,7 @@ def step(structure: Structure, theta: Parameters, state: State, u: Tensor, h: Te
         winding = lagged(theta, state.winding, winding, h)
     rest = wound(theta, state.rest, winding, h)
     extra = {f"{name}.{key}": value for name, values in memory.items() for key, value in values.items()}
-    return State(p_GB, q_GR, v, w, rest, winding, extra)
+    return State(p_GB, q_GR, after.v, after.w, rest, winding, extra)
 
 
 def _pushed_by_the_world(

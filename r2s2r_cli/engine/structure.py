@@ -110,7 +110,9 @@ def _check(structure: Structure) -> None:
         raise EngineInputError("sweeps", "too few sweeps", expected="at least 1", received=str(structure.sweeps))
     names = [effect.name for effect in structure.effects]
     if len(set(names)) < len(names):
-        raise EngineInputError("effects", "an effect is plugged in twice", expected="each once", received=", ".join(names))
+        raise EngineInputError(
+            "effects", "an effect is plugged in twice", expected="each once", received=", ".join(names)
+        )
 
 
 def _ascending(numbers: Sequence[int]) -> bool:

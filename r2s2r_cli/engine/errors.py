@@ -25,5 +25,5 @@ class NonFiniteError(EngineError, ArithmeticError):
     def __init__(self, *, step: int, time: float, environment: int, body: str, term: str) -> None:
         self.step, self.time, self.environment, self.body, self.term = step, time, environment, body, term
         super().__init__(
-            f"the simulation is not finite any more: step {step} ({time:g} s), environment {environment}, {body}, {term}"
+            f"the simulation left the finite numbers: step {step} ({time:g} s), environment {environment}, {body}, {term}"
         )

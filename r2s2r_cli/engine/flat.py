@@ -24,7 +24,7 @@ FlatStep = Callable[[Tensor, Tensor, Tensor, Tensor], Tensor]
 
 @dataclass(frozen=True)
 class Slot:
-    """Where a field lies in the vector: `size` numbers from `start`; `kept` are their places in the field, flattened."""
+    """Where a field lies in the vector: `size` numbers from `start`; `kept`: their places in the flattened field."""
 
     start: int
     size: int

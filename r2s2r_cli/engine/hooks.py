@@ -91,7 +91,7 @@ class Hooks:
         return {}
 
     def parameters(self, x: Values, theta: Parameters) -> Parameters:
-        """Channels mass, motor, cable, contact, world: change the numbers of the nominal laws. Hoisted out of the loop."""
+        """Every channel: change the numbers of the nominal laws. Machine code computes it once a rollout."""
         del x
         return theta
 

@@ -7,7 +7,7 @@ from torch import Tensor
 
 
 def ldl_solve(lower: Tensor, diagonal: Tensor, rhs: Tensor) -> Tensor:
-    """x with A x = rhs for positive definite A, by LDL^T without pivoting.
+    """Solve A x = rhs for positive definite A, by LDL^T without pivoting.
 
     lower: (..., n, n), read strictly below the diagonal; diagonal, rhs: (..., n). Returns (..., n).
     Entry by entry on purpose: the tracer makes straight-line code of it, and its order of operations is the same in

@@ -84,9 +84,10 @@ class Parameters:
         named = {f.name: function(getattr(self, f.name)) for f in fields(self) if f.name != "extra"}
         return Parameters(**named, extra={name: function(value) for name, value in self.extra.items()})
 
-    def with_extra(self, **values: Tensor) -> Parameters:
-        """The same with effect parameters set; double underscores stand for the dot: motor_lag__tau_s."""
-        return replace(self, extra={**self.extra, **{k.replace("__", "."): v for k, v in values.items()}})
+    def with_values(self, values: Mapping[str, Tensor]) -> Parameters:
+        """The same with fields or effect parameters (`motor_lag.tau_s`) replaced; tensors with a batch axis."""
+        own = {name: value for name, value in values.items() if "." not in name}
+        return replace(self, **own, extra={**self.extra, **{k: v for k, v in values.items() if "." in k}})
 
 
 def shapes(structure: Structure) -> dict[str, tuple[int, ...]]:

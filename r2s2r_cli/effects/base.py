@@ -1,0 +1,85 @@
+"""The base of every effect of the catalogue: what it is called, where it acts, which numbers it has.
+
+An effect is a physical law that the nominal simulator lacks, and the identity at its off value. To add one, copy the
+shortest file beside this one, fill in the headings of its docstring and add the class to `CATALOGUE`.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import torch
+
+from r2s2r_cli.engine.hooks import Channel, Hooks
+from r2s2r_cli.engine.parameters import Parameters
+from r2s2r_cli.engine.structure import Structure
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    """One number of an effect, or one per element. scale: of its prior, half-normal from the off value."""
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    off: float
+    scale: float
+    what: str
+    per: str = "robot"
+    """robot | rod | cap | cable | actuated: how many there are."""
+
+    def count(self, structure: Structure) -> int:
+        """How many numbers it has on a robot."""
+        return {
+            "robot": 1, "rod": structure.n_rods, "cap": 2 * structure.n_rods, "cable": structure.n_cables,
+            "actuated": structure.n_actuated,
+        }[self.per]  # fmt: skip
+
+
+class Effect(Hooks):
+    """An entry of the catalogue. Concrete effects are final: they set the class attributes and override hooks.
+
+    name: the id of design.md section 5. channel: where it acts. look_alikes: ids it is confused with.
+    """
+
+    channel: ClassVar[Channel]
+    title: ClassVar[str]
+    own: ClassVar[tuple[EffectParameter, ...]]
+    look_alikes: ClassVar[tuple[str, ...]] = ()
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}()"
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is type(self)
+
+    def __hash__(self) -> int:
+        return hash(type(self))
+
+    def sizes(self, structure: Structure) -> Mapping[str, int]:
+        """Own parameters and how many numbers each has."""
+        return {parameter.name: parameter.count(structure) for parameter in self.own}
+
+    def off(self, structure: Structure) -> Mapping[str, float]:
+        """Off value of each own parameter."""
+        del structure
+        return {parameter.name: parameter.off for parameter in self.own}
+
+    @classmethod
+    @abstractmethod
+    def signature(cls) -> str:
+        """What it looks like in data, in one sentence."""
+
+
+def with_off_values(structure: Structure, theta: Parameters) -> Parameters:
+    """Parameters with those of all effects of `structure` that they lack set to their off values."""
+    values = dict(theta.extra)
+    for effect in structure.effects:
+        off = effect.off(structure)
+        for name, n in effect.sizes(structure).items():
+            values.setdefault(f"{effect.name}.{name}", torch.full((1, n), off[name], dtype=theta.mass.dtype))
+    return theta.with_values(values)

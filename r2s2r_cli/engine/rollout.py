@@ -1,0 +1,218 @@
+"""Many steps: the simulator of one structure, in machine code where it can be compiled, in torch elsewhere."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from r2s2r_cli.engine.errors import EngineInputError
+from r2s2r_cli.engine.flat import (
+    flat_step,
+    pack_parameters,
+    pack_state,
+    parameter_slots,
+    size,
+    state_slots,
+    unpack_state,
+)
+from r2s2r_cli.engine.ground import Ground
+from r2s2r_cli.engine.native import NativeStep, rollout
+from r2s2r_cli.engine.nonfinite import require_finite
+from r2s2r_cli.engine.parameters import Parameters, check_parameters
+from r2s2r_cli.engine.reading import longest_step
+from r2s2r_cli.engine.state import State, check_state, end_caps
+from r2s2r_cli.engine.structure import Detach, Structure
+
+IMPULSE_WINDOW = 0.5
+"""[s] beyond it the tangent with detached impulses has left every bound (contact.md section 5: 22 after 1 s)."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """States at regular times. t: (frame,) [s]; states: fields (B, frame, ...); substeps: engine steps a `step`."""
+
+    structure: Structure
+    theta: Parameters
+    t: Tensor
+    states: State
+    step: float
+    substeps: int
+
+    def at(self, frame: int) -> State:
+        """The state at one frame, batch first."""
+        return unpack_state(self.structure, pack_state_frames(self.structure, self.states)[:, frame])
+
+    def end_caps(self) -> Tensor:
+        """End-cap centres p_WE [m], (B, frame, cap, 3)."""
+        flat = pack_state_frames(self.structure, self.states)
+        batch, frames = flat.shape[:2]
+        merged = unpack_state(self.structure, flat.flatten(0, 1))
+        theta = self.theta.map(lambda x: x.expand(batch, *x.shape[1:]).repeat_interleave(frames, dim=0))
+        return end_caps(theta, merged).unflatten(0, (batch, frames))
+
+
+def pack_state_frames(structure: Structure, states: State) -> Tensor:
+    """Flat states (B, frame, NS) of a State whose fields are (B, frame, ...)."""
+    parts = [
+        (states.extra[name] if "." in name else getattr(states, name)).flatten(2) for name in state_slots(structure)
+    ]
+    return torch.cat(parts, dim=2)
+
+
+class Simulator:
+    """Rollouts of one structure. Keep it: it holds the compiled kernels.
+
+    cache_dir: where machine code is kept between processes; None: nowhere. native: None, machine code where llvmlite
+    and the tensors allow it (else torch, with one warning); False, always torch. threads: for batches.
+    """
+
+    def __init__(
+        self, structure: Structure, *, cache_dir: Path | None = None, native: bool | None = None, threads: int = 1
+    ) -> None:
+        self.structure = structure
+        self.threads = threads
+        self.native = native is not False
+        self.kernels = NativeStep(
+            flat_step(structure), size(state_slots(structure)), structure.n_actuated, size(parameter_slots(structure)),
+            key=trace_key(structure), cache_dir=cache_dir,
+        )  # fmt: skip
+
+    def rollout(
+        self,
+        theta: Parameters,
+        state0: State,
+        commands: Tensor,
+        *,
+        step: float = 1e-3,
+        hold: int = 1,
+        every: int = 1,
+        ground: Ground | None = None,
+        substeps: int | None = None,
+    ) -> Trajectory:
+        """Command replay: simulate `commands` (B, row, actuated), each row held for `hold` steps of `step` seconds.
+
+        theta, state0: batch B or 1; gravity and state in frame W, which is G without a `ground`. Frames every `every`
+        steps, the start included. Differentiable with respect to parameters, state and commands (`Structure.detach`
+        says how contacts count). substeps: engine steps a `step`; None: as many as stiff cables need.
+        Raises EngineInputError for wrong inputs, NonFiniteError where the simulation leaves the finite numbers.
+        """
+        batch = max(len(commands), len(state0.p_WB), len(theta.mass))
+        self._check(theta, state0, commands, step, hold, every)
+        if ground is not None:
+            theta, state0 = ground.parameters(theta), ground.to_ground(state0)
+        n = substeps or self.substeps(theta, state0, step)
+        if self.structure.detach == Detach.IMPULSE and commands.shape[1] * hold * step > IMPULSE_WINDOW:
+            _warn_of_impulse(commands.shape[1] * hold * step)
+        s0 = pack_state(self.structure, state0).expand(batch, -1)
+        u = commands.expand(batch, -1, -1)
+        p = pack_parameters(self.structure, theta)
+        frames = self.advance(s0, u, p, h=step / n, hold=hold * n, every=every * n)
+        require_finite(self.structure, self.kernels.fn, frames, u, p, h=step / n, hold=hold * n, every=every * n)
+        states = unpack_state(self.structure, frames)
+        t = torch.arange(frames.shape[1], dtype=frames.dtype, device=frames.device) * (step * every)
+        return Trajectory(self.structure, theta, t, ground.to_world(states) if ground else states, step, n)
+
+    def advance(self, s0: Tensor, u: Tensor, p: Tensor, *, h: float, hold: int, every: int) -> Tensor:
+        """Frames (B, F, NS) of flat vectors, unchecked: s0 (B, NS), u (B, K, A), p (B or 1, NP), h [s]."""
+        if not self.native:
+            return self.kernels.torch_rollout(s0, u, p, h, hold, every)
+        return rollout(self.kernels, s0, u, p, h, hold, every, threads=self.threads)
+
+    def substeps(self, theta: Parameters, state: State, step: float) -> int:
+        """Engine steps per `step` that keep explicit stiff cables stable at this state (see `longest_step`)."""
+        return max(1, math.ceil(step / longest_step(self.structure, theta, state) - 1e-9))
+
+    def jvp(
+        self,
+        theta: Parameters,
+        state0: State,
+        commands: Tensor,
+        *,
+        d_parameters: Tensor | None = None,
+        d_state: Tensor | None = None,
+        d_commands: Tensor | None = None,
+        step: float = 1e-3,
+        hold: int = 1,
+        every: int = 1,
+        substeps: int | None = None,
+    ) -> tuple[Trajectory, Tensor]:
+        """A rollout and its forward sensitivities along D directions in one pass; frame G.
+
+        d_parameters: (NP, D), the Jacobian of `pack_parameters` with respect to what is differentiated; d_state:
+        (NS, D) likewise of `pack_state`; d_commands: (row, actuated, D). None: zero. Returns the trajectory and the
+        tangents of its flat states (B, frame, NS, D).
+        """
+        batch = max(len(commands), len(state0.p_WB), len(theta.mass))
+        self._check(theta, state0, commands, step, hold, every)
+        n = substeps or self.substeps(theta, state0, step)
+        s0 = pack_state(self.structure, state0).expand(batch, -1).contiguous()
+        u, p = commands.expand(batch, -1, -1).contiguous(), pack_parameters(self.structure, theta)
+
+        def spread(x: Tensor | None) -> Tensor | None:
+            return None if x is None else x.expand(batch, *x.shape)
+
+        frames, tangents = self.kernels.jvp(
+            s0, u, p, step / n, hold * n, every * n,
+            ds0=spread(d_state), du=spread(d_commands), dp=spread(d_parameters),
+        )  # fmt: skip
+        require_finite(self.structure, self.kernels.fn, frames, u, p, h=step / n, hold=hold * n, every=every * n)
+        t = torch.arange(frames.shape[1], dtype=frames.dtype) * (step * every)
+        return Trajectory(self.structure, theta, t, unpack_state(self.structure, frames), step, n), tangents
+
+    def _check(self, theta: Parameters, state0: State, commands: Tensor, step: float, hold: int, every: int) -> None:
+        check_parameters(self.structure, theta)
+        check_state(self.structure, state0)
+        if commands.ndim != 3 or commands.shape[2] != self.structure.n_actuated or commands.shape[1] < 1:
+            raise EngineInputError(
+                "commands", "wrong shape", expected=f"(B, rows, {self.structure.n_actuated})",
+                received=str(tuple(commands.shape)),
+            )  # fmt: skip
+        if not bool(torch.isfinite(commands).all()):
+            raise EngineInputError("commands", "not a finite number", expected="finite numbers", received="NaN or inf")
+        if not (math.isfinite(step) and step > 0):
+            raise EngineInputError("step", "no step", expected="above 0 s", received=f"{step:g}")
+        if hold < 1 or every < 1 or (commands.shape[1] * hold) % every:
+            raise EngineInputError(
+                "every", "frames do not fit", expected="a divisor of all steps, rows x hold",
+                received=f"every {every}, rows {commands.shape[1]}, hold {hold}",
+            )  # fmt: skip
+        sizes = {len(x) for x in (commands, state0.p_WB, theta.mass)} - {1}
+        if len(sizes) > 1:
+            raise EngineInputError("batch", "different batches", expected="one size, or 1", received=str(sorted(sizes)))
+
+
+def trace_key(structure: Structure) -> str:
+    """What a compiled step depends on: the structure, the engine's sources, and those of its effects."""
+    plain = replace(structure, effects=())
+    digest = hashlib.sha256(repr(plain).encode())
+    digest.update(_sources())
+    for effect in structure.effects:
+        digest.update(repr(effect).encode())
+        digest.update(Path(inspect.getfile(type(effect))).read_bytes())
+    return digest.hexdigest()
+
+
+@lru_cache(maxsize=1)
+def _sources() -> bytes:
+    digest = hashlib.sha256(torch.__version__.encode())
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.digest()
+
+
+def _warn_of_impulse(duration: float) -> None:
+    import warnings
+
+    warnings.warn(
+        f"detach='impulse' over {duration:g} s: without the constraint the tangent grows without bound; use windows "
+        f"below {IMPULSE_WINDOW:g} s, detach='geometry' or 'none'",
+        RuntimeWarning,
+        stacklevel=3,
+    )

@@ -1,0 +1,237 @@
+"""Initial states from observed end caps: rigid rods, roll, tensions, and gravity that brings the lowest caps to the
+ground (paper, section "System Identification": both cable lengths and end caps at t = 0, then gravity).
+
+Two cases. `settled`: the robot rests; the simulation relaxes until it does. `window_state`: the robot moves; roll and
+winches are carried over from the window before, tensions are made consistent with the observed pose, nothing relaxes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import roma
+import torch
+from torch import Tensor
+
+from r2s2r_cli.engine.balance import balance
+from r2s2r_cli.engine.errors import EngineInputError
+from r2s2r_cli.engine.flat import pack_parameters, pack_state, unpack_state
+from r2s2r_cli.engine.parameters import Parameters
+from r2s2r_cli.engine.reading import cap_lengths, read
+from r2s2r_cli.engine.rollout import Simulator
+from r2s2r_cli.engine.state import State, end_caps, pose_state
+from r2s2r_cli.engine.structure import Structure
+
+SPELL = 0.01
+"""[s] of simulation between two looks at the kinetic energy."""
+HEAVY = 1e9
+"""Factor that pins a rod in place while only its roll relaxes."""
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A resting state. p_WE: observed caps [m], (B, cap, 3); shift: of each cap from there [m], (B, cap);
+    tension: (B, cable) [N]; speed: fastest cap motion left [m/s], (B,); spells: how long it took, in SPELL seconds."""
+
+    state: State
+    shift: Tensor
+    tension: Tensor
+    speed: Tensor
+    spells: int
+
+
+def settled(
+    simulator: Simulator,
+    theta: Parameters,
+    p_WE: Tensor,
+    R_WR: Tensor,
+    cable_caps: tuple[tuple[int, int], ...],
+    *,
+    lengths: Tensor | None = None,
+    step: float = 1e-3,
+    spells: int = 400,
+    still: float = 1e-5,
+) -> Settled:
+    """The state at rest nearest to observed caps p_WE (B, cap, 3) [m], frame G, with the observed cable lengths.
+
+    R_WR: frames of the rods (B, rod, 3, 3); their roll is a first guess (the attachment heuristic), which tensions
+    then correct. cable_caps: end caps of each cable. lengths: cap distances of all cables [m], (B, cable); None: those
+    of p_WE. The winches are turned until the winched ones have these lengths; velocities are cleared whenever the
+    kinetic energy has passed a peak. The result is shifted and turned about the vertical back on to the observation.
+    """
+    structure = simulator.structure
+    wanted = cap_lengths(cable_caps, p_WE) if lengths is None else lengths
+    state = pose_state(structure, theta, p_WE, along(p_WE, R_WR), rest=p_WE.new_zeros(len(p_WE), structure.n_actuated))
+    state = consistent(structure, theta, roll_relaxed(simulator, theta, lowered(theta, state)))
+    winched = list(structure.actuated)
+    p, h = pack_parameters(structure, theta), step / simulator.substeps(theta, state, step)
+    count = max(1, round(SPELL / h))
+    idle = torch.zeros(len(p_WE), 1, structure.n_actuated, dtype=p_WE.dtype)
+    before = torch.zeros(len(p_WE), dtype=p_WE.dtype)
+    speed, used = before, 0
+    for used in range(1, spells + 1):
+        flat = simulator.advance(pack_state(structure, state), idle, p, h=h, hold=count, every=count)[:, -1]
+        state = unpack_state(structure, flat)
+        kinetic = (state.v_WB**2).sum((1, 2)) + 0.01 * (state.w_R**2).sum((1, 2))
+        speed = torch.sqrt(kinetic)
+        if bool((speed < still).all()):
+            break
+        calm = (kinetic < before)[:, None, None]
+        state = replace(
+            state, v_WB=torch.where(calm, 0.0, state.v_WB), w_R=torch.where(calm, 0.0, state.w_R),
+            rest=_wound(theta, state, wanted[:, winched] - cap_lengths(cable_caps, end_caps(theta, state))[:, winched]),
+        )  # fmt: skip
+        before = torch.where(calm[:, 0, 0], torch.zeros_like(kinetic), kinetic)
+    state = _back(theta, resting(state), p_WE)
+    shift = torch.linalg.vector_norm(end_caps(theta, state) - p_WE, dim=-1)
+    return Settled(state, shift, read(structure, theta, state, h).tension, speed, used)
+
+
+def _wound(theta: Parameters, state: State, missing: Tensor) -> Tensor:
+    """Winches turned by part of what the cap distances lack."""
+    return torch.minimum(torch.maximum(state.rest + 0.3 * missing, theta.rest_min), theta.rest_max)
+
+
+def window_state(
+    simulator: Simulator,
+    theta: Parameters,
+    p_WE: Tensor,
+    carried: State,
+    *,
+    v_WE: Tensor | None = None,
+    relax_roll: bool = False,
+) -> State:
+    """The state at the start of a window from observed caps (B, cap, 3) [m] and a simulated state at that time.
+
+    carried: gives roll (turned by the smallest rotation on to the observed axes), the rest lengths of slack winched
+    cables, effect states, and velocities where v_WE (B, cap, 3) [m/s] is None. Tensions balance the observed pose.
+    """
+    structure = simulator.structure
+    R_WR = along(p_WE, roma.unitquat_to_rotmat(carried.q_WR).expand(len(p_WE), -1, -1, -1))
+    rest = carried.rest.expand(len(p_WE), -1)
+    state = pose_state(structure, theta, p_WE, R_WR, rest=rest)
+    state = lowered(theta, state, only_up=True)
+    if relax_roll:
+        state = roll_relaxed(simulator, theta, state)
+    state = consistent(structure, theta, state, slack=rest)
+    v, w = (carried.v_WB, carried.w_R) if v_WE is None else _velocities(theta, state, v_WE)
+    return replace(
+        state, v_WB=v.expand_as(state.v_WB), w_R=w.expand_as(state.w_R),
+        winding=carried.winding.expand_as(state.rest), extra=dict(carried.extra),
+    )  # fmt: skip
+
+
+def along(p_WE: Tensor, R_WR: Tensor) -> Tensor:
+    """Frames turned by the smallest rotation that puts z along the observed rods, (B, rod, 3, 3): roll is kept."""
+    axis = p_WE[:, 1::2] - p_WE[:, 0::2]
+    length = torch.linalg.vector_norm(axis, dim=-1, keepdim=True)
+    if not bool((length > 0).all()):
+        raise EngineInputError(
+            "p_WE", "a rod of zero length", expected="two different caps", received=str(length.min())
+        )
+    z, old = axis / length, R_WR[..., 2].expand_as(axis)
+    cross, dot = torch.linalg.cross(old, z), (old * z).sum(-1, keepdim=True)
+    # Half-angle form; opposite axes (dot = -1) turn about x of the old frame.
+    quaternion = torch.cat([cross, 1.0 + dot], dim=-1)
+    flip = torch.cat([R_WR[..., 0].expand_as(axis), torch.zeros_like(dot)], dim=-1)
+    quaternion = torch.where(dot < -1 + 1e-9, flip, quaternion)
+    turn = roma.unitquat_to_rotmat(quaternion / torch.linalg.vector_norm(quaternion, dim=-1, keepdim=True))
+    return turn @ R_WR.expand(len(p_WE), -1, -1, -1)
+
+
+def lowered(theta: Parameters, state: State, *, only_up: bool = False) -> State:
+    """Moved along the vertical until the lowest cap touches the ground; only_up: only where it is below it."""
+    lowest = (end_caps(theta, state)[..., 2] - theta.cap_radius.flatten(1)).min(dim=1).values
+    by = torch.clamp(lowest, max=0.0) if only_up else lowest
+    down = torch.stack([torch.zeros_like(by), torch.zeros_like(by), by], dim=-1)
+    return replace(state, p_WB=state.p_WB - down[:, None])
+
+
+def resting(state: State) -> State:
+    """The same pose at rest."""
+    zero = torch.zeros_like(state.v_WB)
+    return replace(state, v_WB=zero, w_R=zero.clone(), winding=torch.zeros_like(state.winding))
+
+
+def consistent(structure: Structure, theta: Parameters, state: State, slack: Tensor | None = None) -> State:
+    """The state with rest lengths under which the winched cables have the balancing tensions.
+
+    slack: rest lengths that slack cables keep where they are long enough (a winch that paid out).
+    """
+    tension = balance(structure, theta, state).tension[:, list(structure.actuated)]
+    reading = read(structure, theta, resting(state))
+    length = reading.length[:, list(structure.actuated)]
+    stretched = length - tension / theta.stiffness[:, list(structure.actuated)]
+    if slack is not None:
+        stretched = torch.where(tension > 0, stretched, torch.maximum(slack, length))
+    return replace(state, rest=torch.minimum(torch.maximum(stretched, theta.rest_min), theta.rest_max))
+
+
+def roll_relaxed(simulator: Simulator, theta: Parameters, state: State, *, rounds: int = 3) -> State:
+    """Each rod turned about its own axis to where the balancing tensions leave no torque; axes and places stay.
+
+    The engine does it: rods so heavy that only the axial turn moves, cables of constant tension, no ground.
+    """
+    structure = simulator.structure
+    winched = list(structure.actuated)
+    pinned = replace(
+        theta, mass=theta.mass * HEAVY, gravity=torch.zeros_like(theta.gravity), damping=torch.zeros_like(theta.damping),
+        inertia=theta.inertia * theta.inertia.new_tensor([[HEAVY] * 3, [HEAVY] * 3, [HEAVY, HEAVY, 1.0]]),
+    )  # fmt: skip
+    soft = theta.stiffness.clone()
+    soft[:, winched] = 1.0
+    high = state.p_WB + state.p_WB.new_tensor([0.0, 0.0, 10.0])
+    for _ in range(rounds):
+        tension = balance(structure, theta, state).tension[:, winched]
+        length = read(structure, theta, resting(state)).length[:, winched]
+        free = replace(
+            pinned, stiffness=soft, rest_min=torch.full_like(theta.rest_min, -HEAVY),
+            rest_max=torch.full_like(theta.rest_max, HEAVY),
+        )  # fmt: skip
+        moving = replace(resting(state), p_WB=high, rest=length - tension)
+        moving = _rolled(simulator, free, moving)
+        state = replace(state, q_WR=moving.q_WR)
+    return state
+
+
+def _rolled(simulator: Simulator, theta: Parameters, state: State) -> State:
+    structure = simulator.structure
+    p = pack_parameters(structure, theta)
+    idle = torch.zeros(len(state.p_WB), 1, structure.n_actuated, dtype=state.p_WB.dtype)
+    before = torch.zeros(len(state.p_WB), dtype=state.p_WB.dtype)
+    for _ in range(60):
+        flat = simulator.advance(pack_state(structure, state), idle, p, h=5e-4, hold=10, every=10)[:, -1]
+        state = unpack_state(structure, flat)
+        kinetic = (state.w_R[..., 2] ** 2).sum(1)
+        calm = (kinetic < before)[:, None, None]
+        state = replace(state, w_R=torch.where(calm, 0.0, state.w_R))
+        before = torch.where(calm[:, 0, 0], torch.zeros_like(kinetic), kinetic)
+    return resting(state)
+
+
+def _velocities(theta: Parameters, state: State, v_WE: Tensor) -> tuple[Tensor, Tensor]:
+    """Velocities of rods from those of their caps; the spin about a rod's own axis is not observable and taken as 0."""
+    ends = v_WE.unflatten(1, (-1, 2))
+    R_WR = roma.unitquat_to_rotmat(state.q_WR)
+    axis = R_WR[..., 2]
+    length = (theta.p_BE[..., 1, 2] - theta.p_BE[..., 0, 2])[..., None]
+    w_W = torch.linalg.cross(axis, (ends[:, :, 1] - ends[:, :, 0]) / length)
+    p_middle = theta.p_BE.mean(2).expand_as(w_W)
+    v = ends.mean(2) - torch.linalg.cross(w_W, torch.einsum("brij,brj->bri", R_WR, p_middle))
+    return v, torch.einsum("brij,bri->brj", R_WR, w_W)
+
+
+def _back(theta: Parameters, state: State, p_WE: Tensor) -> State:
+    """Shifted over the ground and turned about the vertical to the least squared distance from the observed caps."""
+    here = end_caps(theta, state)
+    a, b = here[..., :2] - here[..., :2].mean(1, keepdim=True), p_WE[..., :2] - p_WE[..., :2].mean(1, keepdim=True)
+    angle = torch.atan2((a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]).sum(1), (a * b).sum((1, 2)))
+    zero = torch.zeros_like(angle)
+    turn = roma.rotvec_to_rotmat(torch.stack([zero, zero, angle], dim=-1))
+    centre, goal = here.mean(1, keepdim=True), p_WE.mean(1, keepdim=True)
+    goal = torch.cat([goal[..., :2], centre[..., 2:]], dim=-1)
+    quaternion = roma.rotmat_to_unitquat(turn)[:, None].expand_as(state.q_WR)
+    return replace(
+        state, p_WB=torch.einsum("bij,brj->bri", turn, state.p_WB - centre) + goal,
+        q_WR=roma.quat_product(quaternion, state.q_WR),
+    )  # fmt: skip

@@ -85,7 +85,8 @@ def pack_parameters(structure: Structure, theta: Parameters) -> Tensor:
 
 def unpack_parameters(structure: Structure, p: Tensor) -> Parameters:
     """Parameters from the flat vector. Fields that the structure does not read are zero."""
-    named, extra = {}, {}
+    named: dict[str, Tensor] = {}
+    extra: dict[str, Tensor] = {}
     for name, slot in parameter_slots(structure).items():
         part = p[:, slot.start : slot.start + slot.size]
         if slot.size == prod(slot.shape):
@@ -111,7 +112,8 @@ def pack_state(structure: Structure, state: State) -> Tensor:
 
 def unpack_state(structure: Structure, s: Tensor) -> State:
     """State from the flat vector (..., NS); leading axes stay."""
-    named, extra = {}, {}
+    named: dict[str, Tensor] = {}
+    extra: dict[str, Tensor] = {}
     for name, slot in state_slots(structure).items():
         part = s[..., slot.start : slot.start + slot.size].reshape(*s.shape[:-1], *slot.shape)
         (extra if "." in name else named)[name] = part

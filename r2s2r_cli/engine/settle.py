@@ -69,7 +69,8 @@ def settled(
     idle = torch.zeros(len(p_WE), 1, structure.n_actuated, dtype=p_WE.dtype)
     before = torch.zeros(len(p_WE), dtype=p_WE.dtype)
     speed, used = before, 0
-    for used in range(1, spells + 1):
+    while used < spells:
+        used += 1
         flat = simulator.advance(pack_state(structure, state), idle, p, h=h, hold=count, every=count)[:, -1]
         state = unpack_state(structure, flat)
         kinetic = (state.v_WB**2).sum((1, 2)) + 0.01 * (state.w_R**2).sum((1, 2))

@@ -50,7 +50,8 @@ def state_shapes(structure: Structure) -> dict[str, tuple[int, ...]]:
     """Shape of every field of State without the batch axis, effect states included, in the order of the flat vector."""
     rods, winches = structure.n_rods, structure.n_actuated
     named: dict[str, tuple[int, ...]] = {
-        "p_WB": (rods, 3), "q_WR": (rods, 4), "v_WB": (rods, 3), "w_R": (rods, 3), "rest": (winches,), "winding": (winches,),
+        "p_WB": (rods, 3), "q_WR": (rods, 4), "v_WB": (rods, 3), "w_R": (rods, 3),
+        "rest": (winches,), "winding": (winches,),
     }  # fmt: skip
     for effect in structure.effects:
         named.update({f"{effect.name}.{key}": (n,) for key, n in effect.state_sizes(structure).items()})
@@ -125,7 +126,7 @@ def angular_velocities(state: State) -> Tensor:
 
 
 def pose_state(structure: Structure, theta: Parameters, p_WE: Tensor, R_WR: Tensor, *, rest: Tensor) -> State:
-    """The state at rest of rods with frames R_WR (B, rod, 3, 3) whose middles lie between the caps p_WE (B, cap, 3) [m].
+    """The state at rest of rods with frames R_WR (B, rod, 3, 3), their middles between the caps p_WE (B, cap, 3) [m].
 
     The rods keep their own length. rest: rest lengths of the winched cables [m], (B, actuated). Effects start at 0.
     """

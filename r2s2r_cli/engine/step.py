@@ -11,10 +11,10 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
-from r2s2r_cli.engine.body import angular_change, bodies, gyroscopic, moved
+from r2s2r_cli.engine.body import Bodies, angular_change, bodies, gyroscopic, moved
 from r2s2r_cli.engine.cable import cable_rows, pulled, rest_lengths, spring_force, tension_impulse
 from r2s2r_cli.engine.contact import contact_rows, pose_velocity, solve
-from r2s2r_cli.engine.hooks import WorldTerms
+from r2s2r_cli.engine.hooks import Values, WorldTerms
 from r2s2r_cli.engine.parameters import Parameters
 from r2s2r_cli.engine.rod_contact import collide
 from r2s2r_cli.engine.state import State
@@ -30,7 +30,7 @@ def step(structure: Structure, theta: Parameters, state: State, u: Tensor, h: Te
     """
     for effect in structure.effects:
         theta = effect.parameters(theta.of(effect.name), theta)
-    memory = {effect.name: state.of(effect.name) for effect in structure.effects}
+    memory: dict[str, Values] = {effect.name: state.of(effect.name) for effect in structure.effects}
     rods = bodies(theta, state, axial=structure.axial)
 
     for effect in structure.effects:
@@ -70,7 +70,7 @@ def step(structure: Structure, theta: Parameters, state: State, u: Tensor, h: Te
 
 
 def _pushed_by_the_world(
-    structure: Structure, theta: Parameters, rods, v: Tensor, w: Tensor, h: Tensor
+    structure: Structure, theta: Parameters, rods: Bodies, v: Tensor, w: Tensor, h: Tensor
 ) -> tuple[Tensor, Tensor]:
     terms = WorldTerms(rods.p, v, rods.R_GR, w)
     force, torque = torch.zeros_like(v), torch.zeros_like(w)

@@ -1,0 +1,272 @@
+"""Scalar programs: a graph of numbers that folds constants and never holds the same operation twice.
+
+A node is an integer; its arguments always have smaller integers, so the order of creation is a valid order of
+evaluation. Folding drops what is multiplied by the constant zero: where torch would make NaN of 0 * inf, the program
+makes 0. That is the only liberty it takes with special values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+COMMUTATIVE = frozenset({"add", "mul", "min", "max", "eq", "and", "or"})
+BOOLEAN = frozenset({"true", "lt", "le", "eq", "and", "or", "not"})
+"""Operations whose value is a truth value; "true" is the constant."""
+
+_FOLD = {
+    "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "tan": np.tan, "exp": np.exp, "log": np.log, "tanh": np.tanh,
+    "sinh": np.sinh, "cosh": np.cosh, "asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "abs": np.abs,
+    "floor": np.floor, "ceil": np.ceil, "trunc": np.trunc, "round": np.round, "expm1": np.expm1, "log1p": np.log1p,
+    "atan2": np.arctan2, "pow": np.power, "min": np.minimum, "max": np.maximum, "div": np.divide,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Subroutine:
+    """A program that other programs call: `tangents` of its inputs "x" come with as many inputs "dx" when it is dual,
+    and then its outputs are values followed by their tangents."""
+
+    graph: Graph
+    outputs: tuple[int, ...]
+    n_inputs: int
+    dual: bool = False
+
+
+@dataclass
+class Graph:
+    """Nodes by number: `ops[i]` and `args[i]`.
+
+    Arguments are nodes, but for "const" (a float), "true" (a bool), "in" (kind, index), "get" (call, index) and "call"
+    (number of the subroutine, flag, inputs, otherwise). `derived` tells which subroutine is another's derivative.
+    """
+
+    ops: list[str] = field(default_factory=list)
+    args: list[tuple[Any, ...]] = field(default_factory=list)
+    subroutines: list[Subroutine] = field(default_factory=list)
+    derived: dict[tuple[int, str], int] = field(default_factory=dict)
+    _known: dict[tuple[Any, ...], int] = field(default_factory=dict)
+
+    def node(self, op: str, *args: Any) -> int:
+        """The node of this operation, new if there is none; nothing is folded."""
+        if op in COMMUTATIVE and args[0] > args[1]:
+            args = (args[1], args[0])
+        key = (op, *args)
+        found = self._known.get(key)
+        if found is None:
+            found = self._known[key] = len(self.ops)
+            self.ops.append(op)
+            self.args.append(args)
+        return found
+
+    def const(self, value: float) -> int:
+        """A number. Not-a-number is one node, and so are both zeros."""
+        value = float(value)
+        key = ("const", "nan") if value != value else ("const", value)
+        found = self._known.get(key)
+        if found is None:
+            found = self._known[key] = len(self.ops)
+            self.ops.append("const")
+            self.args.append((value + 0.0,))
+        return found
+
+    def true(self, value: bool) -> int:
+        """A constant truth value."""
+        return self.node("true", bool(value))
+
+    def value(self, i: int) -> float | None:
+        """The number of a constant node, else None."""
+        return self.args[i][0] if self.ops[i] == "const" else None
+
+    def truth(self, i: int) -> bool | None:
+        """The truth of a constant node, else None."""
+        return self.args[i][0] if self.ops[i] == "true" else None
+
+    def boolean(self, i: int) -> bool:
+        """Whether the node is a truth value."""
+        return self.ops[i] in BOOLEAN
+
+    def arguments(self, i: int) -> tuple[int, ...]:
+        """The nodes that node i reads."""
+        op, args = self.ops[i], self.args[i]
+        if op in ("const", "true", "in"):
+            return ()
+        if op == "call":
+            return (args[1], *args[2], *args[3])
+        if op == "get":
+            return (args[0],)
+        return args
+
+    def add(self, a: int, b: int) -> int:
+        """a + b."""
+        x, y = self.value(a), self.value(b)
+        if x is not None and y is not None:
+            return self.const(x + y)
+        if x == 0:
+            return b
+        if y == 0:
+            return a
+        if self.ops[b] == "neg":
+            return self.sub(a, self.args[b][0])
+        if self.ops[a] == "neg":
+            return self.sub(b, self.args[a][0])
+        return self.node("add", a, b)
+
+    def sub(self, a: int, b: int) -> int:
+        """a - b."""
+        x, y = self.value(a), self.value(b)
+        if x is not None and y is not None:
+            return self.const(x - y)
+        if y == 0:
+            return a
+        if x == 0:
+            return self.neg(b)
+        if self.ops[b] == "neg":
+            return self.add(a, self.args[b][0])
+        return self.node("sub", a, b)
+
+    def neg(self, a: int) -> int:
+        """-a."""
+        x = self.value(a)
+        if x is not None:
+            return self.const(-x)
+        if self.ops[a] == "neg":
+            return int(self.args[a][0])
+        if self.ops[a] == "sub":
+            return self.node("sub", self.args[a][1], self.args[a][0])
+        return self.node("neg", a)
+
+    def mul(self, a: int, b: int) -> int:
+        """a b."""
+        x, y = self.value(a), self.value(b)
+        if x is not None and y is not None:
+            return self.const(x * y)
+        if x is not None:
+            return self._scale(x, b)
+        if y is not None:
+            return self._scale(y, a)
+        if self.ops[a] == "neg":
+            return self.neg(self.mul(self.args[a][0], b))
+        if self.ops[b] == "neg":
+            return self.neg(self.mul(a, self.args[b][0]))
+        return self.node("mul", a, b)
+
+    def _scale(self, x: float, b: int) -> int:
+        if x == 0:
+            return self.const(0.0)
+        if x == 1:
+            return b
+        if x == -1:
+            return self.neg(b)
+        if self.ops[b] == "neg":
+            return self._scale(-x, self.args[b][0])
+        if self.ops[b] == "mul":
+            y = self.value(self.args[b][0])
+            if y is not None:
+                return self._scale(x * y, self.args[b][1])
+            y = self.value(self.args[b][1])
+            if y is not None:
+                return self._scale(x * y, self.args[b][0])
+        return self.node("mul", self.const(x), b)
+
+    def div(self, a: int, b: int) -> int:
+        """a / b; a constant divisor becomes a factor, good to one rounding."""
+        x, y = self.value(a), self.value(b)
+        if x is not None and y is not None:
+            return self.apply("div", a, b)
+        if y is not None and y != 0:
+            return self._scale(1.0 / y, a)
+        if x == 0:
+            return a
+        if self.ops[b] == "neg":
+            return self.neg(self.div(a, self.args[b][0]))
+        return self.node("div", a, b)
+
+    def reciprocal(self, a: int) -> int:
+        """1 / a."""
+        return self.div(self.const(1.0), a)
+
+    def apply(self, op: str, *args: int) -> int:
+        """Any operation that has no rule of folding but that of constants."""
+        values = [self.value(i) for i in args]
+        if op in _FOLD and None not in values:
+            with np.errstate(all="ignore"):
+                return self.const(float(_FOLD[op](*[np.float64(v) for v in values])))
+        if op == "det" and (values[0] is not None or self.ops[args[0]] == "det"):
+            return args[0]
+        return self.node(op, *args)
+
+    def compare(self, op: str, a: int, b: int) -> int:
+        """Truth of a < b ("lt"), a <= b ("le") or a == b ("eq"); false beside a NaN."""
+        x, y = self.value(a), self.value(b)
+        if x is not None and y is not None:
+            return self.true({"lt": x < y, "le": x <= y, "eq": x == y}[op])
+        return self.node(op, a, b)
+
+    def negation(self, a: int) -> int:
+        """not a."""
+        x = self.truth(a)
+        if x is not None:
+            return self.true(not x)
+        return int(self.args[a][0]) if self.ops[a] == "not" else self.node("not", a)
+
+    def both(self, a: int, b: int) -> int:
+        """a and b."""
+        for x, other in ((self.truth(a), b), (self.truth(b), a)):
+            if x is not None:
+                return other if x else self.true(False)
+        return a if a == b else self.node("and", a, b)
+
+    def either(self, a: int, b: int) -> int:
+        """a or b."""
+        return self.negation(self.both(self.negation(a), self.negation(b))) if a != b else a
+
+    def select(self, condition: int, a: int, b: int) -> int:
+        """a where the condition holds, else b; for numbers and truth values."""
+        known = self.truth(condition)
+        if known is not None:
+            return a if known else b
+        if self.ops[condition] == "not":
+            condition, a, b = self.args[condition][0], b, a
+        if self.ops[a] == "select" and self.args[a][0] == condition:
+            a = self.args[a][1]
+        if self.ops[b] == "select" and self.args[b][0] == condition:
+            b = self.args[b][2]
+        if a == b:
+            return a
+        if self.boolean(a):
+            return self.either(self.both(condition, a), self.both(self.negation(condition), b))
+        return self.node("select", condition, a, b)
+
+    def sum(self, terms: Iterable[int]) -> int:
+        """Sum; in pairs when long, so that the processor need not wait for each addition."""
+        terms = [i for i in terms if self.value(i) != 0]
+        if not terms:
+            return self.const(0.0)
+        while len(terms) > 4:
+            half = (len(terms) + 1) // 2
+            terms = [self.add(*terms[k : k + 2]) if k + 1 < len(terms) else terms[k] for k in range(0, 2 * half, 2)]
+        total = terms[0]
+        for term in terms[1:]:
+            total = self.add(total, term)
+        return total
+
+    def call(self, number: int, flag: int, inputs: Sequence[int], otherwise: Sequence[int]) -> list[int]:
+        """Outputs of subroutine `number` where the flag holds, else `otherwise`."""
+        known = self.truth(flag)
+        if known is False:
+            return list(otherwise)
+        call = self.node("call", number, flag, tuple(inputs), tuple(otherwise))
+        return [self.node("get", call, k) for k in range(len(otherwise))]
+
+    def subroutine(self, new: Subroutine) -> int:
+        """Number of the subroutine; one that is already there, node for node, is shared."""
+        for number, old in enumerate(self.subroutines):
+            same = old.outputs == new.outputs and old.n_inputs == new.n_inputs and old.dual == new.dual
+            if same and old.graph.ops == new.graph.ops and old.graph.args == new.graph.args:
+                return number
+        self.subroutines.append(new)
+        return len(self.subroutines) - 1

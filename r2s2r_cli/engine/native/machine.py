@@ -52,8 +52,8 @@ def vector_bytes() -> int:
     return 64 if "+avx512f" in features else 32 if "+avx2" in features else 16
 
 
-@lru_cache(maxsize=4)
-def _machine(level: int) -> Any:
+def _machine(level: int = 2) -> Any:
+    """A new target machine: an execution engine takes the one that it is given, and frees it."""
     llvm = binding()
     name, features = host()
     return llvm.Target.from_default_triple().create_target_machine(cpu=name, features=features, opt=level, jit=True)
@@ -74,8 +74,9 @@ def loaded(code: bytes, n_arrays: int) -> Callable[..., None]:
     """The function `kernel` of the object code: n_arrays addresses, then four integers. It keeps its code alive."""
     llvm = binding()
     empty = llvm.parse_assembly("")
-    empty.triple = _machine(2).triple
-    engine = llvm.create_mcjit_compiler(empty, _machine(2))
+    target = _machine()
+    empty.triple = target.triple
+    engine = llvm.create_mcjit_compiler(empty, target)
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
     kind = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * n_arrays, *[ctypes.c_int64] * 4)

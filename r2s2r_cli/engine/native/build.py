@@ -90,8 +90,13 @@ class Builder:
         function = machine.loaded(code, n_arrays)
         self.log.append(
             Build(
-                kernel.kind, REAL[kernel.dtype], kernel.lanes, operations, **times,
-                load_s=perf_counter() - start, from_cache=stored is not None,
+                kernel.kind,
+                REAL[kernel.dtype],
+                kernel.lanes,
+                operations,
+                **times,
+                load_s=perf_counter() - start,
+                from_cache=stored is not None,
             )  # fmt: skip
         )
         return function

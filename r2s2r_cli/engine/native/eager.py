@@ -25,7 +25,9 @@ def runs_native(s0: Tensor) -> bool:
     reason = (
         f"the tensors are on {s0.device}"
         if s0.device.type != "cpu"
-        else "llvmlite cannot be loaded" if not machine.available() else None
+        else "llvmlite cannot be loaded"
+        if not machine.available()
+        else None
     )
     if reason and not _warned:
         _warned = True
@@ -77,7 +79,7 @@ def jvp(
     for k in range(ds0.shape[-1]):
         with forward_ad.dual_level():
             pairs = ((s0, ds0[..., k]), (u, du[..., k]), (p, dp[..., k]))
-            a, b, c = (forward_ad.make_dual(x.detach(), dx.contiguous()) for x, dx in pairs)
+            a, b, c = (forward_ad.make_dual(x.detach().clone(), dx.clone()) for x, dx in pairs)
             frames, tangent = forward_ad.unpack_dual(rollout(fn, a, b, c, h=h, hold=hold, every=every))
             columns.append(torch.zeros_like(frames) if tangent is None else tangent)
     return frames, torch.stack(columns, dim=-1)

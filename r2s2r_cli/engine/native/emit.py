@@ -139,7 +139,9 @@ class Body:
             return
         if op == "true":
             kind = self.type(i)
-            self.values[i] = ("splat (i1 true)" if args[0] else "zeroinitializer") if "<" in kind else str(args[0]).lower()
+            self.values[i] = (
+                ("splat (i1 true)" if args[0] else "zeroinitializer") if "<" in kind else str(args[0]).lower()
+            )
             return
         vector = self.vector(i)
         if op == "det":
@@ -216,5 +218,7 @@ def subroutine_text(module: Module, sub: Subroutine, number: int) -> None:
     for k, i in enumerate(sub.outputs):
         wide = body.vector(i) if not sub.dual else 2 * k >= len(sub.outputs)
         body.store(body.value(i, vector=wide), body.element("%results", k, vector=True), vector=wide)
-    head = f"define internal void @subroutine{number}(ptr noalias %arguments, ptr noalias %results) noinline nounwind {{"
+    head = (
+        f"define internal void @subroutine{number}(ptr noalias %arguments, ptr noalias %results) noinline nounwind {{"
+    )
     module.functions.append("\n".join([head, *body.lines, "ret void", "}"]))

@@ -195,5 +195,7 @@ def _frames(target: Target, copies: list[tuple[str, str, int]]) -> str:
         size = n * target.size * (target.lanes if wide else 1)
         lines.append(f"%{to}0 = mul i64 %number, {size}\n%{to}1 = getelementptr i8, ptr %{to}, i64 %{to}0")
         lines.append(f"call void @llvm.memcpy.p0.p0.i64(ptr %{to}1, ptr %{source}, i64 {size}, i1 false)")
-    lines.append("br label %next\nnext:\n%done = icmp uge i64 %t1, %end\nbr i1 %done, label %finish, label %loop\nfinish:")
+    lines.append(
+        "br label %next\nnext:\n%done = icmp uge i64 %t1, %end\nbr i1 %done, label %finish, label %loop\nfinish:"
+    )
     return "\n".join([*lines, "ret void"])

@@ -12,6 +12,7 @@ LIBRARY = (
 )  # fmt: skip
 """Functions of the C library, called lane by lane."""
 
+
 @dataclass(frozen=True)
 class Target:
     """How numbers are held. real: "double" or "float". lanes: of vectors. dual: whether only tangents are vectors."""

@@ -111,7 +111,9 @@ def backward_program(forward: Forward) -> Backward:
     found = adjoints(g, order, seeds, wanted, stop=before)
     zero = g.const(0.0)
     kept = [i for i in order if i in before and i in found]
-    after = adjoints(g, [i for i in order if i in before], {i: g.node("in", "q", k) for k, i in enumerate(kept)}, wanted)
+    after = adjoints(
+        g, [i for i in order if i in before], {i: g.node("in", "q", k) for k, i in enumerate(kept)}, wanted
+    )
     groups = [
         [found.get(i, zero) for i in sources["s"]],
         [found.get(i, zero) for i in sources["u"]],
@@ -150,4 +152,3 @@ def tangent_program(forward: Forward, active: Active) -> Tangent:
     graph, nodes = fused(new, [*values, *tangents])
     n = len(forward.state)
     return Tangent(graph, tuple(nodes[:n]), tuple(nodes[n:]), forward.n_input)
-

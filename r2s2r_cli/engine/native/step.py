@@ -121,9 +121,7 @@ class NativeStep:
             grads = self._vjp(s0, u, p, g_frames.to(s0.dtype), Schedule(h, hold, every, threads))
         return grads[0], grads[1].sum_to_size(given[0]), grads[2].sum_to_size(given[1])
 
-    def _vjp(
-        self, s0: Tensor, u: Tensor, p: Tensor, g_frames: Tensor, plan: Schedule
-    ) -> tuple[Tensor, Tensor, Tensor]:
+    def _vjp(self, s0: Tensor, u: Tensor, p: Tensor, g_frames: Tensor, plan: Schedule) -> tuple[Tensor, Tensor, Tensor]:
         batch, rows = u.shape[:2]
         lanes = self._lanes(batch, s0.dtype)
         forward = self._builder.kernel(Kernel("forward", s0.dtype, lanes))
@@ -213,12 +211,24 @@ class NativeStep:
         def run(task: int) -> None:
             k, part = divmod(task, passes)
             chosen = slice(part * lanes, (part + 1) * lanes)
-            d_state, d_inputs, d_parameters = (x[k, ..., chosen].clone(memory_format=torch.contiguous_format) for x in (ds, du, dp))
+            d_state, d_inputs, d_parameters = (
+                x[k, ..., chosen].clone(memory_format=torch.contiguous_format) for x in (ds, du, dp)
+            )
             now = state[k].clone()
             tangent_frames = d_frames.new_empty((*frames.shape[1:], lanes))
             tangent_frames[0] = d_state
             if n:
-                arrays = (now, d_state, frames[k], tangent_frames, inputs[k], d_inputs, parameters[k], d_parameters, step)
+                arrays = (
+                    now,
+                    d_state,
+                    frames[k],
+                    tangent_frames,
+                    inputs[k],
+                    d_inputs,
+                    parameters[k],
+                    d_parameters,
+                    step,
+                )
                 kernel(*(x.data_ptr() for x in arrays), 0, n, plan.hold, plan.every)
             d_frames[k, ..., chosen] = tangent_frames
 

@@ -20,7 +20,7 @@ from torch import Tensor
 from torch.utils._python_dispatch import TorchDispatchMode
 
 from r2s2r_cli.engine.errors import EngineError
-from r2s2r_cli.engine.native.graph import Graph
+from r2s2r_cli.engine.native.graph import Graph, Subroutine
 
 Nodes = npt.NDArray[np.int64]
 Operation = Callable[..., Any]
@@ -37,10 +37,11 @@ class TracingError(EngineError):
 
 @dataclass(frozen=True)
 class Trace:
-    """Where symbolic tensors record, and the floating-point type that they stand for."""
+    """Where symbolic tensors record, and the floating-point type that they stand for. inner: of a guarded function."""
 
     graph: Graph
     dtype: torch.dtype
+    inner: bool = False
 
     def tensor(self, nodes: Nodes) -> Symbolic:
         """A symbolic tensor of these nodes; truth values if the first node is one."""
@@ -168,3 +169,34 @@ def run(trace: Trace, fn: Callable[[], Any]) -> Any:
     """Call `fn` while the trace records."""
     with torch.no_grad(), _Recording(trace):
         return fn()
+
+
+def guarded_call(
+    when: Tensor, fn: Callable[..., tuple[Tensor, ...]], inputs: tuple[Tensor, ...], otherwise: tuple[Tensor, ...]
+) -> tuple[Tensor, ...]:
+    """Record a call of `fn` as one node, its code as a subroutine; see engine/guarded.py."""
+    from r2s2r_cli.engine.native.elementwise import real
+
+    outer = next(x.trace for x in (when, *inputs, *otherwise) if isinstance(x, Symbolic))
+    g = outer.graph
+    if outer.inner:
+        raise TracingError(f"{_where()}: a guarded function cannot call another")
+    given, kept = [outer.nodes(x) for x in inputs], [outer.nodes(x) for x in otherwise]
+    inner = Trace(Graph(), outer.dtype, inner=True)
+    flat = [real(g, i) for nodes in given for i in nodes.ravel().tolist()]
+    places = iter(range(len(flat)))
+    arguments = []
+    for x, nodes in zip(inputs, given, strict=True):
+        places_of = np.array([inner.graph.node("in", "x", next(places)) for _ in range(nodes.size)], dtype=np.int64)
+        tensor = inner.tensor(places_of.reshape(nodes.shape))
+        arguments.append(tensor if x.dtype != torch.bool else run(inner, lambda tensor=tensor: tensor != 0))
+    results = [inner.nodes(x) for x in run(inner, lambda: fn(*arguments))]
+    shapes = [[nodes.shape for nodes in group] for group in (results, kept)]
+    if shapes[0] != shapes[1]:
+        raise TracingError(f"{_where()}: the guarded function returns shapes {shapes[0]}, `otherwise` has {shapes[1]}")
+    outputs = tuple(i for nodes in results for i in nodes.ravel().tolist())
+    number = g.subroutine(Subroutine(inner.graph, outputs, len(flat)))
+    flag = int(outer.nodes(when).reshape(-1)[0])
+    called = g.call(number, flag, flat, [i for nodes in kept for i in nodes.ravel().tolist()])
+    split = np.split(np.array(called, dtype=np.int64), np.cumsum([nodes.size for nodes in kept])[:-1])
+    return tuple(outer.tensor(part.reshape(nodes.shape)) for part, nodes in zip(split, kept, strict=True))

@@ -58,9 +58,7 @@ def _tangent(g: Graph, op: str, y: int, args: Sequence[int], tangents: Sequence[
 def _dual_call(new: Graph, args: tuple, to: dict[int, int], tangent: dict[int, int]) -> int:
     number, flag, inputs, otherwise = args
     zero = new.const(0.0)
-    both = [
-        (*(to[i] for i in nodes), *(tangent.get(i, zero) for i in nodes)) for nodes in (inputs, otherwise)
-    ]
+    both = [(*(to[i] for i in nodes), *(tangent.get(i, zero) for i in nodes)) for nodes in (inputs, otherwise)]
     return new.node("call", dual_subroutine(new, number), to[flag], *both)
 
 

@@ -74,4 +74,4 @@ def moved(state: State, v: Tensor, w: Tensor, h: Tensor) -> tuple[Tensor, Tensor
     spin = roma.quat_product(state.q_WR, torch.cat([half, torch.zeros_like(half[..., :1])], dim=-1))
     q = state.q_WR + spin
     # q is near unit length by construction: no guard against zero is needed.
-    return p, q / torch.sqrt((q * q).sum(-1, keepdim=True))
+    return p, q * (1.0 / torch.sqrt((q * q).sum(-1, keepdim=True)))

@@ -67,8 +67,7 @@ def contact_rows(structure: Structure, theta: Parameters, rods: Bodies, v: Tenso
     falling = torch.where(v1 < 0, -v1, torch.ones_like(v1))
     toi = torch.where(active, torch.relu(gap) / (h[..., None] * falling), torch.zeros_like(gap))
     impact = v0 + toi * (v1 - v0)
-    threshold = theta.impact_speed[..., None]
-    ramp = torch.clamp((-impact - threshold) / threshold, 0.0, 1.0)
+    ramp = torch.clamp(-impact * (1.0 / theta.impact_speed)[..., None] - 1.0, 0.0, 1.0)
     # The second term is what gravity and cables still do in the rest of the step after the impact.
     target = torch.relu(theta.restitution[..., None] * ramp * -impact + (1.0 - toi) * (v1 - v0))
     return GroundRows(gap, arm, mobility, free, target, active, toi, friction)
@@ -94,7 +93,9 @@ def _geometry(theta: Parameters, rods: Bodies) -> tuple[Tensor, Tensor]:
 def _mobility(rods: Bodies, arm: Tensor) -> Tensor:
     turned = angular_change(rods.inverse_inertia[:, :, None], arm)
     same = torch.eye(3, dtype=arm.dtype, device=arm.device).repeat(2, 2)
-    return torch.einsum("brai,brci->brac", arm, turned) + rods.inverse_mass[..., None] * same
+    whole = torch.einsum("brai,brci->brac", arm, turned) + rods.inverse_mass[..., None] * same
+    # Symmetric by construction, so that the tracer computes one half only.
+    return torch.tril(whole) + torch.tril(whole, -1).mT
 
 
 def row_velocity(arm: Tensor, v: Tensor, w: Tensor) -> Tensor:
@@ -179,8 +180,8 @@ def _relax(
 
     # Friction: a scalar step, the larger eigenvalue of the 2 x 2 block; its inverse would turn the slip direction.
     mean, half = 0.5 * (a[..., i, i] + a[..., j, j]), 0.5 * (a[..., i, i] - a[..., j, j])
-    largest = mean + torch.sqrt(half * half + a[..., i, j] * a[..., i, j] + 1e-20)
-    fx, fy = clip(x - residual[..., i] / largest, y - residual[..., j] / largest, mu * pushed)
+    rate = 1.0 / (mean + torch.sqrt(half * half + a[..., i, j] * a[..., i, j] + 1e-20))
+    fx, fy = clip(x - residual[..., i] * rate, y - residual[..., j] * rate, mu * pushed)
     fx, fy = torch.where(active, fx, zero), torch.where(active, fy, zero)
     residual = residual + a[..., :, i] * (fx - x)[..., None] + a[..., :, j] * (fy - y)[..., None]
     rows = list(rows)

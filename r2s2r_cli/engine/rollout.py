@@ -122,8 +122,8 @@ class Simulator:
     def advance(self, s0: Tensor, u: Tensor, p: Tensor, *, h: float, hold: int, every: int) -> Tensor:
         """Frames (B, F, NS) of flat vectors, unchecked: s0 (B, NS), u (B, K, A), p (B or 1, NP), h [s]."""
         if not self.native:
-            return self.kernels.torch_rollout(s0, u, p, h, hold, every)
-        return rollout(self.kernels, s0, u, p, h, hold, every, threads=self.threads)
+            return self.kernels.torch_rollout(s0, u, p, h=h, hold=hold, every=every)
+        return rollout(self.kernels, s0, u, p, h=h, hold=hold, every=every, threads=self.threads)
 
     def substeps(self, theta: Parameters, state: State, step: float) -> int:
         """Engine steps per `step` that keep explicit stiff cables stable at this state (see `longest_step`)."""
@@ -159,9 +159,9 @@ class Simulator:
             return None if x is None else x.expand(batch, *x.shape)
 
         frames, tangents = self.kernels.jvp(
-            s0, u, p, step / n, hold * n, every * n,
+            s0, u, p, h=step / n, hold=hold * n, every=every * n,
             ds0=spread(d_state), du=spread(d_commands), dp=spread(d_parameters),
-        )  # fmt: skip
+        )
         require_finite(self.structure, self.kernels.fn, frames, u, p, h=step / n, hold=hold * n, every=every * n)
         t = torch.arange(frames.shape[1], dtype=frames.dtype) * (step * every)
         return Trajectory(self.structure, theta, t, unpack_state(self.structure, frames), step, n), tangents

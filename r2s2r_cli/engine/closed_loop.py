@@ -1,0 +1,112 @@
+"""Closed loop: the robot's controller inside the simulation, one tick of it at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from r2s2r_cli.engine.errors import EngineInputError
+from r2s2r_cli.engine.flat import pack_parameters, pack_state, unpack_state
+from r2s2r_cli.engine.nonfinite import require_finite
+from r2s2r_cli.engine.parameters import Parameters, check_parameters
+from r2s2r_cli.engine.pid import LatchedPid, advance, start_progress, steps_a_tick, ticks
+from r2s2r_cli.engine.reading import cap_lengths
+from r2s2r_cli.engine.rollout import Simulator, Trajectory
+from r2s2r_cli.engine.state import State, check_state, end_caps
+
+
+@dataclass(frozen=True)
+class ClosedLoopRun:
+    """One policy, executed. Frames of the trajectory are the control ticks, and the end.
+
+    u: motor commands (B, tick, actuated); index: number of the target at each tick, S where the policy is through,
+    (B, tick); done: latched, after the tick, (B, tick, actuated); length: of all cables as the controller read them
+    [m], (B, tick, cable); ticks: how many each environment needed, (B,); timed_out: targets given up, (B, S).
+    """
+
+    trajectory: Trajectory
+    u: Tensor
+    index: Tensor
+    done: Tensor
+    length: Tensor
+    ticks: Tensor
+    timed_out: Tensor
+
+    def duration(self, period: float) -> Tensor:
+        """Time until the last target was reached or given up [s], (B,)."""
+        return self.ticks.to(self.u.dtype) * period
+
+
+def closed_loop(
+    simulator: Simulator,
+    theta: Parameters,
+    state0: State,
+    pid: LatchedPid,
+    targets: Tensor,
+    holds: Tensor,
+    timeouts: Tensor,
+    *,
+    step: float = 1e-3,
+    tail: float = 0.0,
+    progress: Callable[[float], None] | None = None,
+) -> ClosedLoopRun:
+    """Run a policy from state0 (frame G): targets (S, actuated) in positions, holds and timeouts (S,) [s].
+
+    step: engine step [s], must divide the controller's period. tail: what is simulated after the last target [s].
+    progress: called with the simulated seconds of every tick. Differentiable in everything but the decisions (`done`,
+    the times of transitions). Environments that are through wait for the others, motors off.
+    Raises EngineInputError, NonFiniteError.
+    """
+    structure = simulator.structure
+    check_parameters(structure, theta)
+    check_state(structure, state0)
+    if targets.ndim != 2 or targets.shape[1] != structure.n_actuated or not len(targets):
+        raise EngineInputError("targets", "wrong shape", expected=f"(S, {structure.n_actuated}), S at least 1",
+                               received=str(tuple(targets.shape)))  # fmt: skip
+    batch = max(len(state0.p_WB), len(theta.mass))
+    whole = steps_a_tick(pid.period, step)
+    n = simulator.substeps(theta, state0, step)
+    h, count = step / n, whole * n
+    wide = theta.map(lambda x: x.expand(batch, *x.shape[1:]))
+    p, s = pack_parameters(structure, theta), pack_state(structure, state0).expand(batch, -1)
+    hold_ticks, timeout_ticks, tail_ticks = ticks(holds, pid.period), ticks(timeouts, pid.period), round(tail / pid.period)
+    most = int((hold_ticks + timeout_ticks).sum()) + tail_ticks + len(targets)
+
+    at = start_progress(batch)
+    memory = pid.start(s.new_zeros(batch, structure.n_cables))
+    given_up = torch.zeros(batch, len(targets), dtype=torch.bool)
+    needed = torch.zeros(batch, dtype=torch.long)
+    frames, us, indices, dones, lengths = [s], [], [], [], []
+    after = 0
+    for _ in range(most):
+        state = unpack_state(structure, s)
+        length = cap_lengths(pid.cable_caps, end_caps(wide, state))
+        for effect in structure.effects:
+            length = effect.sensing(wide.of(effect.name), length)
+        running = ~at.finished(len(targets))
+        u, memory = pid.tick(memory, length, at.target(targets))
+        u = torch.where(running[:, None], u, torch.zeros_like(u))
+        us.append(u), indices.append(at.index), dones.append(memory.done), lengths.append(length)
+        before, (at, moved) = at, advance(at, memory.done, hold_ticks, timeout_ticks)
+        given_up[moved.timed_out, before.index[moved.timed_out]] = True
+        memory = memory.restarted(moved.changed)
+        needed = needed + running.long()
+        s = simulator.advance(s, u[:, None], p, h=h, hold=count, every=count)[:, -1]
+        frames.append(s)
+        if progress is not None:
+            progress(pid.period)
+        if bool(at.finished(len(targets)).all()):
+            after += 1
+            if after > tail_ticks:
+                break
+    flat, commands = torch.stack(frames, dim=1), torch.stack(us, dim=1)
+    require_finite(structure, simulator.kernels.fn, flat.detach(), commands.detach(), p.detach(), h=h, hold=count, every=count)
+    t = torch.arange(flat.shape[1], dtype=flat.dtype) * pid.period
+    trajectory = Trajectory(structure, theta, t, unpack_state(structure, flat), step, n)
+    return ClosedLoopRun(
+        trajectory, commands, torch.stack(indices, dim=1), torch.stack(dones, dim=1), torch.stack(lengths, dim=1),
+        needed, given_up,
+    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""`r2s2r export`: an artifact as CSV tables, npz, a trajectory log or a policy file."""
+"""`r2s2r export`: an artifact as CSV tables, npz, a trajectory log or a policy file; a robot as a MuJoCo model."""
 
 from __future__ import annotations
 
@@ -27,15 +27,24 @@ class Format(StrEnum):
     NPZ = "npz"
     TRAJECTORY = "trajectory"
     POLICY = "policy"
+    MJCF = "mjcf"
 
 
 def export(
-    path: Annotated[Path, typer.Argument(help="The artifact.")],
+    path: Annotated[Path, typer.Argument(help="The artifact; for mjcf a robot.toml or a project.")],
     to: Annotated[
         Format,
-        typer.Option("--to", help="csv: tables and images; npz: arrays; trajectory: a log that import reads; policy."),
+        typer.Option(
+            "--to",
+            help="csv: tables and images; npz: arrays; trajectory: a log that import reads; policy; "
+            "mjcf: a MuJoCo model of a robot.toml.",
+        ),
     ] = Format.CSV,
     run: Annotated[str | None, typer.Option("--run", help="Only this run (trajectory, policy); default: all.")] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="mjcf: another value for a key of robot.toml; repeatable."),
+    ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Directory to write into.")] = Path(),
     force: ForceOption = False,
     json: JsonOption = False,
@@ -45,14 +54,32 @@ def export(
 
     Example: r2s2r export iterations/001/20-estimate.h5 --to csv --out exported
     """
-    from r2s2r_cli.store.read import read_artifact
-
     console = Console(json=json, quiet=quiet)
-    header, data = read_artifact(path, blobs=to == Format.CSV)
-    written = [_write(out / name, content, force) for name, content in _files(path, to, run, header, data)]
+    if set_ and to != Format.MJCF:
+        raise UsageError("only a robot has values to set; an artifact holds what was measured", where="--set",
+                         expected="--to mjcf", received=f"--to {to}",
+                         hint=f"r2s2r export '{path}' --to {to}")  # fmt: skip
+    if run and to not in (Format.TRAJECTORY, Format.POLICY):
+        raise UsageError("only trajectory and policy take one run", where="--run", expected="--to trajectory | policy",
+                         received=f"--to {to}", hint=f"r2s2r export '{path}' --to {to}")  # fmt: skip
+    files = _robot_files(path, set_ or []) if to == Format.MJCF else _artifact_files(path, to, run)
+    written = [_write(out / name, content, force) for name, content in files]
     console.document(ExportResult(source=str(path), format=to, files=tuple(map(str, written))))
     for name in written:
         console.data(str(name))
+
+
+def _robot_files(path: Path, overrides: list[str]) -> Iterable[tuple[str, bytes]]:
+    from r2s2r_cli.commands.export_mjcf import mjcf_file
+
+    return [mjcf_file(path, overrides)]
+
+
+def _artifact_files(path: Path, to: Format, run: str | None) -> Iterable[tuple[str, bytes]]:
+    from r2s2r_cli.store.read import read_artifact
+
+    header, data = read_artifact(path, blobs=to == Format.CSV)
+    return _files(path, to, run, header, data)
 
 
 def _files(path: Path, to: Format, run: str | None, header: Header, data: ArtifactData) -> Iterable[tuple[str, bytes]]:

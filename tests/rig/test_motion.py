@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -154,11 +155,14 @@ def test_readings_hang_together() -> None:
     np.testing.assert_allclose(w, b.w_R, atol=1e-4)
 
 
-def test_divergence_is_an_error() -> None:
-    """MuJoCo starts anew in silence when its numbers explode; here that is an error that says so."""
+def test_divergence_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """MuJoCo starts anew in silence when its numbers explode; here that is an error that says so, and no log file."""
+    monkeypatch.chdir(tmp_path)
     sim = MujocoSim(known(), Options(timestep_s=0.2, integrator="Euler"))
-    with pytest.raises(NumericalError, match="diverged"):
+    with pytest.raises(NumericalError, match="went wrong") as caught:
         sim.step(sim.rest - 0.1, count=2000)
+    assert "unstable" in caught.value.received
+    assert not Path("MUJOCO_LOG.TXT").exists()
 
 
 @pytest.mark.parametrize(

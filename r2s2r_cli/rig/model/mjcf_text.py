@@ -1,8 +1,9 @@
 """`robot.toml` -> MJCF text: what MuJoCo, and people, read. Needs no MuJoCo.
 
 Every cable is a spatial tendon between two sites with an actuator that can only pull (`forcerange` ends at 0):
-force = clip(stiffness (rest - length) - damping rate, -inf, 0), so a cable never pushes. A winched cable's control is
-its rest length; a passive cable's is built in (`gainprm` 0) and its control entry is not read. What MuJoCo cannot:
+force = clip(stiffness (rest - length) - damping rate, -inf, 0), so a cable never pushes. The control of a winched cable
+is what it has reeled in since the rest pose of `robot.toml` [m], so that all zero, MuJoCo's default, is that pose; the
+control of a passive cable (`gainprm` 0) is not read. What MuJoCo cannot:
 
 - a slack cable that lengthens faster than stiffness / damping times its slack still pulls (its damper does not know);
 - a cubic law has no actuator. Passive cubic cables are springs with a dead band instead, whose damping acts on slack
@@ -41,7 +42,7 @@ def mjcf(robot: Robot, options: Options | None = None) -> str:
         *_head(robot, options),
         *_world(robot, options, pose),
         *_tendons(robot),
-        *_actuators(robot),
+        *_actuators(robot, pose),
         *_keyframe(robot, pose),
         "</mujoco>",
     ]
@@ -78,7 +79,7 @@ def _head(robot: Robot, options: Options) -> Iterator[str]:
     yield f"<!-- {escape(_comment(robot.title))}"
     yield "     Written from robot.toml. SI units: metre, kilogram, second, newton, radian; world z up."
     yield "     Body axes: z along the rod towards its odd cap, x upwards in the rest pose."
-    yield "     Controls: rest length [m] of each winched cable, between its attachment points. -->"
+    yield "     Controls: length [m] that each winch has reeled in since the rest pose; below 0: paid out. -->"
     yield f"<mujoco model={quoteattr(robot.name)}>"
     yield '  <compiler angle="radian" autolimits="true"/>'
     yield (
@@ -166,31 +167,36 @@ def _spatial(name: str, k: int, cable: Cable, spring: str) -> str:
     return f'    <spatial name="{name}" class="cable"{spring}>{sites}</spatial>'
 
 
-def _actuators(robot: Robot) -> Iterator[str]:
+def _actuators(robot: Robot, pose: Pose) -> Iterator[str]:
     yield ""
     yield "  <!-- force [N] = gainprm control [m] + biasprm (1, length, rate), at most 0: cables only pull -->"
     yield "  <actuator>"
-    limits = dict(zip(robot.actuated, winch_range(robot), strict=True))
+    # Reeled in by c, a winched cable pulls with stiffness (length - (rest - c)).
+    winched = {
+        k: (rest, rest - limits[::-1])
+        for k, rest, limits in zip(robot.actuated, pose.rest, winch_range(robot), strict=True)
+    }
     for k in (*robot.actuated, *(k for k, cable in enumerate(robot.cables) if cable.kind == "passive")):
         cable = robot.cables[k]
         if _cubic(cable):
             continue
         stiffness, damping = cable.stiffness_n_per_m, cable.damping_n_s_per_m
-        if k in limits:
-            law = f'ctrlrange="{_n(*limits[k])}" gainprm="{_n(stiffness)}" biasprm="{_n(0, -stiffness, -damping)}"'
+        if k in winched:
+            rest, travel = winched[k]
+            bias = _n(stiffness * rest, -stiffness, -damping)
+            law = f'ctrlrange="{_n(*travel)}" gainprm="{_n(-stiffness)}" biasprm="{bias}"'
         else:
             law = f'gainprm="0" biasprm="{_n(stiffness * _rest(k, cable), -stiffness, -damping)}"'
-        name = "winch" if k in limits else "passive"
+        name = "winch" if k in winched else "passive"
         yield f'    <general name="{name}{k}" tendon="cable{k}" biastype="affine" forcerange="-1e6 0" {law}/>'
     yield "  </actuator>"
 
 
 def _keyframe(robot: Robot, pose: Pose) -> Iterator[str]:
     qpos = [_n(*p, *wxyz(q)) for p, q in zip(pose.p_WR, pose.q_WR, strict=True)]
-    unread = sum(cable.kind == "passive" and not _cubic(cable) for cable in robot.cables)
     yield ""
     yield "  <keyframe>"
-    yield f'    <key name="rest" qpos="{" ".join(qpos)}" ctrl="{_n(*pose.rest, *(0.0,) * unread)}"/>'
+    yield f'    <key name="rest" qpos="{" ".join(qpos)}"/>'
     yield "  </keyframe>"
 
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from r2s2r_cli.errors import UsageError
 
 Vector = tuple[float, float, float]
+Cone = Literal["elliptic", "pyramidal"]
+Integrator = Literal["Euler", "implicitfast"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,8 +35,8 @@ class Options:
     """Rods collide: shafts as capsules, caps as spheres."""
     rod_friction: float = 0.3
     """Coulomb coefficient between rods."""
-    cone: Literal["elliptic", "pyramidal"] = "elliptic"
-    integrator: Literal["Euler", "implicitfast"] = "Euler"
+    cone: Cone = "elliptic"
+    integrator: Integrator = "Euler"
     """`implicitfast` leaves out of its implicit damping what couples two free bodies: cables then brake their rods
     against the world, and the falling robot is 5 per cent too slow at 1 ms (tests/rig/test_motion.py)."""
     impratio: float = 1.0
@@ -52,6 +54,11 @@ class Options:
             _require(name, value, "at least 0", value is None or value >= 0)
         e = self.restitution
         _require("restitution", e, "from 0 to 1", e is None or 0 <= e <= 1)
+        for name, known in (("cone", get_args(Cone)), ("integrator", get_args(Integrator))):
+            _require(name, getattr(self, name), " | ".join(known), getattr(self, name) in known)
+        near, far, depth = self.impedance
+        _require("impedance", self.impedance, "two shares above 0 and below 1, and a depth above 0",
+                 0 < near < 1 and 0 < far < 1 and depth > 0)  # fmt: skip
         length = float(np.linalg.norm(self.ground_normal))
         _require("ground_normal", self.ground_normal, "a direction", length > 0)
         _require("gravity", self.gravity, "finite numbers", bool(np.isfinite(self.gravity).all()))

@@ -13,7 +13,8 @@ from r2s2r_cli.rig.model.mjcf_text import mjcf, winch_range, winch_speed
 from r2s2r_cli.rig.model.options import Options
 from schemas.robot import Robot
 
-_DIVERGED = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
+# MuJoCo would write its warnings into a file in the working directory. They are read from its counters instead.
+mujoco.set_mju_user_warning(lambda message: None)
 _UNIT = 1e-6
 """How far the length of a quaternion may be from 1."""
 
@@ -63,6 +64,7 @@ class MujocoSim:
         self.data = mujoco.MjData(self.model)
         self._scratch = mujoco.MjData(self.model)
         self._speed, self._range = winch_speed(robot), winch_range(robot)
+        self._zero = rest_pose(robot).rest
         self._half = np.array([rod.length_m / 2 for rod in robot.rods])
         self._caps = np.array([cable.caps for cable in robot.cables])
         self._ground = self.model.geom("ground").id
@@ -78,7 +80,7 @@ class MujocoSim:
     @property
     def rest(self) -> np.ndarray:
         """Rest lengths of the winched cables [m], (actuated,)."""
-        return np.array(self.data.ctrl[: len(self._speed)])
+        return self._zero - self.data.ctrl[: len(self._zero)]
 
     def reset(self, pose: Pose | None = None, v_WR: np.ndarray | None = None, w_R: np.ndarray | None = None) -> None:
         """Start anew from `pose` (default: the rest pose of `robot.toml`), by default at rest.
@@ -166,15 +168,16 @@ class MujocoSim:
         return tension
 
     def _set(self, rest: np.ndarray) -> None:
-        self.data.ctrl[: len(rest)] = np.clip(rest, *self._range.T)
+        self.data.ctrl[: len(rest)] = self._zero - np.clip(rest, *self._range.T)
 
     def _check(self) -> None:
-        for kind in _DIVERGED:
-            # MuJoCo notes the divergence, starts anew from its default pose, and goes on as if nothing had been.
-            if self.data.warning[kind].number:
+        for kind, warning in enumerate(self.data.warning):
+            # MuJoCo notes a divergence, starts anew from its default pose, and goes on as if nothing had been.
+            if warning.number:
+                text = mujoco.mju_warningText(kind, warning.lastinfo)
                 raise NumericalError(
-                    "MuJoCo's simulation diverged", where=f"{self.robot.name}, {kind.name}",
-                    expected="finite numbers", received="values that are not finite, or huge",
+                    "MuJoCo's simulation went wrong", where=f"{self.robot.name}, t = {self.t:.3f} s",
+                    expected="finite numbers", received=text.strip(),
                     hint="use a smaller timestep_s, or softer cables in robot.toml",
                 )  # fmt: skip
 

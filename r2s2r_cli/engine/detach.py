@@ -1,6 +1,6 @@
 """Detached contact: the paper's Algorithms 1 to 3 to the letter, their corrected forms, and what the step uses.
 
-`Tensor.detach` is called in this file and nowhere else in the engine. Source: the paper, section "Detachment Approach
+`Tensor.detach` is called in this file and nowhere else in the physics. Source: the paper, section "Detachment Approach
 for Contact Gradients" (Algorithms 1, 2) and the appendix (Algorithm 3, the rule of actuated bodies). The idea: a
 passive contact force answers every push with an equal and opposite one, so the derivative of a body that cannot move
 is zero and an optimiser stops; without the derivative of the response, the *trend* of the push remains.

@@ -28,12 +28,28 @@ class CalibrateSettings(Frozen):
     """A recalibration that moves a length by more than this is reported as a swapped sensor."""
 
 
+class SimulateSettings(Frozen):
+    """Settings of `simulate`."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
+    step_s: Annotated[float, Field(strict=True, gt=0, le=0.01)] = 0.001
+    """Step of the engine [s]; must divide the controller's period. Where cables are stiff it is divided further."""
+    frame_rate_hz: Annotated[float, Field(strict=True, gt=0, le=1000)] = 50.0
+    """Stored frames a second; at most one a control tick is kept."""
+    tail_s: Annotated[float, Field(strict=True, ge=0, le=600)] = 0.0
+    """What is simulated after the last target, motors off [s]."""
+    rod_contact: Annotated[bool, Field(strict=True)] = True
+    """Whether rods collide with each other."""
+
+
 class RunConfig(Frozen):
     """The settings of every stage; a stage stores its own section in what it writes."""
 
     imports: ImportSettings = Field(default=ImportSettings(), alias="import")
     calibrate: CalibrateSettings = CalibrateSettings()
     estimate: EstimateSettings = EstimateSettings()
+    simulate: SimulateSettings = SimulateSettings()
 
 
 class ProjectFile(RunConfig):

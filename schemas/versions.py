@@ -53,5 +53,5 @@ def chain(
     return steps
 
 
-STAGE_VERSIONS: dict[str, int] = {"import": 1, "calibrate": 1, "estimate": 1}
+STAGE_VERSIONS: dict[str, int] = {"import": 1, "calibrate": 1, "estimate": 1, "simulate": 1}
 """Raised by hand when a stage computes something else from the same input; `status` then calls its results stale."""

@@ -19,6 +19,7 @@ from r2s2r_cli.commands.init import init
 from r2s2r_cli.commands.inspect import inspect
 from r2s2r_cli.commands.migrate import migrate
 from r2s2r_cli.commands.recover import recover
+from r2s2r_cli.commands.simulate import simulate
 from r2s2r_cli.commands.status import status
 from r2s2r_cli.commands.validate import validate
 
@@ -27,6 +28,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "calibrate": calibrate,
     "import": import_,
     "estimate": estimate,
+    "simulate": simulate,
     "status": status,
     "inspect": inspect,
     "validate": validate,

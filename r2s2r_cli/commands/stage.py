@@ -37,6 +37,8 @@ ROBOT_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
                   "cables": ("caps", "kind", "rest_length_m"), "pid": (), "limits": ()},
     "estimate": {"name": (), "rods": ("length_m", "cap_radius_m"), "cables": ("caps", "kind"),
                  "sensors": ("cable", "slope_f_per_m", "offset_f")},
+    "simulate": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),
+                 "sensors": ("cable", "stiffness_n_per_m", "rest_length_m"), "rest_caps_m": ()},
 }  # fmt: skip
 """Which part of robot.toml each stage uses; a change elsewhere does not make its results stale."""
 

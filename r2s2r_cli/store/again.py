@@ -23,6 +23,11 @@ def command_again(made: Provenance, artifact: Path, *, force: bool = False) -> s
     elif made.stage == "calibrate":
         words += [word for part in _PARTS for path in flags.get(part, ()) for word in (f"--{part}", path)]
         words += ["--use", flags["use"]] if "use" in flags else []
+    elif made.stage == "simulate":
+        words += flags.get("policies", ())
+        words += [word for option in ("random", "seed", "from") if flags.get(option) is not None
+                  for word in (f"--{option}", str(flags[option]))]  # fmt: skip
+        words += [word for run in flags.get("replay", ()) for word in ("--replay", run)]
     if artifact.parent.name.isdigit():
         words += ["--iteration", str(int(artifact.parent.name))]
     return shlex.join([*words, "--force"] if force else words)

@@ -11,9 +11,7 @@ from pathlib import Path
 
 from r2s2r_cli.errors import ArtifactError, UsageError
 from r2s2r_cli.store.atomic import disk_error
-from r2s2r_cli.store.project import root_of
-
-STATE_DIR = ".r2s2r"
+from r2s2r_cli.store.project import STATE_DIR, root_of
 
 
 @contextlib.contextmanager

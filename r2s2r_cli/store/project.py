@@ -16,6 +16,8 @@ from schemas.versions import KINDS
 
 PROJECT_FILE = "project.toml"
 CONFIG_FILE = "config.toml"
+STATE_DIR = ".r2s2r"
+"""What r2s2r keeps for itself: the write lock, compiled code. May be deleted while nothing runs."""
 MAX_ITERATION = 9999
 """A larger number is a slip of the finger that would become "the latest"."""
 ITERATIONS = "iterations"
@@ -70,6 +72,11 @@ class Project:
     def robot(self) -> Robot:
         """The robot description, checked. Raises InputError."""
         return load_model(self.robot_path, Robot)
+
+    @property
+    def cache(self) -> Path:
+        """Compiled steps of the engine, kept between commands; made again where they are missing."""
+        return self.root / STATE_DIR / "cache"
 
     def iterations(self) -> list[Iteration]:
         """All iterations, in order."""

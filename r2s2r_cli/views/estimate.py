@@ -46,7 +46,7 @@ def _picture(data: ArtifactData, run: str, robot: Robot) -> bytes:
     figure.suptitle(f"run {run}: estimated states ({stated(nature)})")
     top, bottom = np.asarray(figure.subfigures(2, 1, height_ratios=(1, 1.05)))
     grid = top.add_gridspec(2, 2, width_ratios=(1, 1.5))
-    _path(top.add_subplot(grid[:, 0]), frames, data, run, robot)
+    draw_path(top.add_subplot(grid[:, 0]), frames, data, run, robot)
     heights, speeds = top.add_subplot(grid[0, 1]), top.add_subplot(grid[1, 1])
     for axes in (heights, speeds):
         draw_bands(axes, intervals)
@@ -62,7 +62,8 @@ def _picture(data: ArtifactData, run: str, robot: Robot) -> bytes:
     return png_bytes(figure)
 
 
-def _path(axes: Axes, frames: Group, data: ArtifactData, run: str, robot: Robot) -> None:
+def draw_path(axes: Axes, frames: Group, data: ArtifactData, run: str, robot: Robot) -> None:
+    """From above: caps and centre of mass of an estimated or simulated run, segments by shade and number."""
     p_WE, com = frames["p_WE"], centre_of_mass(frames, robot)
     for cap in range(p_WE.shape[1]):
         axes.plot(p_WE[:, cap, 0], p_WE[:, cap, 1], CAP_STYLE[cap % 2], color=rod_color(cap), lw=0.7, alpha=0.6)

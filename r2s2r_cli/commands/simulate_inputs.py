@@ -1,0 +1,154 @@
+"""What `simulate` was asked for: policy files and artifacts, recorded runs, starts; as inputs, flags and requests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from r2s2r_cli.commands.stage import require_input
+from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.store.project import Iteration, Project
+from schemas.header import InputRef
+
+if TYPE_CHECKING:
+    from r2s2r_cli.artifact import ArtifactData
+    from r2s2r_cli.stages.simulate import Request, Start
+    from schemas.policy import PolicyFile
+
+REST = "rest"
+ARTIFACT = ".h5"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The request of one command line. policies: as typed, relative to the working directory."""
+
+    project: Project
+    iteration: Iteration
+    policies: tuple[str, ...]
+    random: int | None
+    seed: int
+    replay: tuple[str, ...]
+    start: str | None
+
+    def flags(self) -> dict[str, Any]:
+        """What else than settings and inputs decides the result, for the provenance."""
+        places = [split_name(text) for text in self.policies]
+        return {
+            "policies": [self.project.relative(path) + (f":{name}" if name else "") for path, name in places],
+            "random": self.random,
+            "seed": None if self.random is None else self.seed,
+            "replay": list(self.replay),
+            "from": self.start,
+        }
+
+    def refs(self) -> list[InputRef]:
+        """The inputs: policy files, artifacts. Raises InputError or ArtifactError where one cannot be read."""
+        from r2s2r_cli.store.header import whole_header
+        from r2s2r_cli.store.staleness import artifact_ref, source_ref
+
+        refs: dict[str, InputRef] = {}
+        for path, _ in map(split_name, self.policies):
+            try:
+                artifact = path.suffix == ARTIFACT
+                ref = (
+                    artifact_ref(self.project, path, whole_header(path)) if artifact else source_ref(self.project, path)
+                )
+            except OSError as error:
+                raise InputError("the policy cannot be read", where=str(path), expected="a policy file or an artifact",
+                                 received=error.strerror or str(error), hint="ls policies") from error  # fmt: skip
+            refs[ref.path] = ref
+        if self._recorded is not None:
+            ref = artifact_ref(self.project, self._recorded, whole_header(self._recorded))
+            refs[ref.path] = ref
+        return list(refs.values())
+
+    def requests(self) -> list[Request]:
+        """The runs to simulate, in the order of the command line. Raises InputError, UsageError."""
+        from r2s2r_cli.stages.simulate import Request
+        from r2s2r_cli.stages.simulate.policies import random_policy
+        from r2s2r_cli.stages.simulate.replay import recorded_commands
+
+        robot = self.project.robot()
+        found = [Request(policy, self._start(None)) for text in self.policies for policy in read_policies(text)]
+        if self.random is not None:
+            found.append(Request(random_policy(robot, self.random, self.seed), self._start(None)))
+        for run in self.replay:
+            commands = recorded_commands(self._data(run, "--replay"), run, len(robot.actuated))
+            found.append(Request(commands, self._start(run)))
+        return found
+
+    def _start(self, run: str | None) -> Start | None:
+        """The start of a replay of `run`, or of a policy; None: the rest state."""
+        from r2s2r_cli.stages.simulate import Start
+
+        name = self.start or run
+        if name is None or name == REST:
+            return None
+        frames = self._data(name, "--from").group(name, "frames")
+        if frames is None:
+            if self.start is None:  # a replay of a recording without estimated states
+                return None
+            raise InputError(f"run {name} has no estimated states to start from", where="--from",
+                             expected="a run of 20-estimate.h5", received="a recording",
+                             hint=f"r2s2r estimate --iteration {self.iteration.number}")  # fmt: skip
+        return Start(name, frames["p_WE"][0])
+
+    def _data(self, run: str, option: str) -> ArtifactData:
+        data = self._recording
+        if run not in data.runs():
+            raise UsageError("there is no such run", where=option, expected=" | ".join(data.runs()), received=run,
+                             hint=f"r2s2r inspect '{self._recorded}'")  # fmt: skip
+        return data
+
+    @cached_property
+    def _recorded(self) -> Path | None:
+        """The artifact with the recorded runs: estimated where that was done. None where none is asked for."""
+        if not self.replay and self.start in (None, REST):
+            return None
+        estimate = self.iteration.artifact("estimate")
+        if estimate.exists():
+            return estimate
+        recording = self.iteration.artifact("recording")
+        require_input(recording, f"r2s2r import run.csv --iteration {self.iteration.number}")
+        return recording
+
+    @cached_property
+    def _recording(self) -> ArtifactData:
+        from r2s2r_cli.store.read import read_artifact
+
+        if self._recorded is None:
+            raise AssertionError("no recorded run was asked for")
+        return read_artifact(self._recorded)[1]
+
+
+def split_name(text: str) -> tuple[Path, str]:
+    """`10-record.h5:crawl` -> the path and the name behind it; a path that exists is taken as it is."""
+    head, colon, name = text.rpartition(":")
+    if Path(text).exists() or not colon or Path(head).suffix != ARTIFACT:
+        return Path(text), ""
+    return Path(head), name
+
+
+def read_policies(text: str) -> Iterator[PolicyFile]:
+    """The policies of a TOML file (one) or an artifact (all, or the one named). Raises InputError, UsageError."""
+    from r2s2r_cli.stages.simulate.policies import stored_policies
+    from r2s2r_cli.store.read import read_artifact
+    from r2s2r_cli.store.toml import load_model
+    from schemas.policy import PolicyFile
+
+    path, name = split_name(text)
+    if path.suffix != ARTIFACT:
+        yield load_model(path, PolicyFile)
+        return
+    found = stored_policies(read_artifact(path)[1])
+    if not found or (name and name not in found):
+        raise UsageError(
+            "there is no such policy" if name else "the artifact holds no policy", where=str(path),
+            expected=" | ".join(found) or "a policy, or runs with targets", received=name or "none",
+            hint=f"r2s2r inspect '{path}'",
+        )  # fmt: skip
+    yield from [found[name]] if name else found.values()

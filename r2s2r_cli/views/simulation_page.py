@@ -1,0 +1,51 @@
+"""The report of `simulate` as tables for the terminal, and its page with the player."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.views.page import Page, PageTable, counted
+from r2s2r_cli.views.simulation_playback import playback_page
+from schemas.results_simulate import SimulateReport, SimulateRun
+from schemas.robot import Robot
+
+
+def report_tables(report: SimulateReport) -> Iterator[PageTable]:
+    """What was simulated: one row a run, and how often each cable was slack."""
+    yield PageTable(
+        "simulated runs",
+        ["run", "control", "from", "time [s]", "targets", "given up", "moved x, y [mm]", "way [mm]", "turned [deg]",
+         "highest cap [mm]", "strongest tension [N]", "deepest [mm]"],
+        [_row(run) for run in report.runs],
+    )  # fmt: skip
+    cables = len(report.runs[0].slack_share)
+    yield PageTable(
+        "share of the time that a cable is slack",
+        ["run", *(f"cable {k}" for k in range(cables))],
+        [[run.run, *(f"{share:.0%}" for share in run.slack_share)] for run in report.runs],
+    )
+
+
+def simulation_page(report: SimulateReport, data: ArtifactData, robot: Robot) -> bytes:
+    """The HTML page of a simulation: the player, the tables, the warnings."""
+    seconds = sum(run.duration_s for run in report.runs)
+    page = Page(
+        title=f"Simulation of {robot.title}",
+        sentence=f"{counted(len(report.runs), 'run')}, {seconds:.1f} s of the robot, simulated: not a measurement.",
+        labels=[f"{run.run}: {text}" for run in report.runs for text in run.warnings],
+        tables=list(report_tables(report)),
+    )
+    return playback_page(page, data, robot)
+
+
+def _row(run: SimulateRun) -> list[str]:
+    x, y, _ = run.com_displacement_m
+    turned = "-" if run.heading_change_rad is None else f"{math.degrees(run.heading_change_rad):+.1f}"
+    return [
+        run.run, run.control, run.start, f"{run.duration_s:.2f}", str(run.targets) if run.targets else "-",
+        str(len(run.timed_out)), f"{1e3 * x:+.0f}, {1e3 * y:+.0f}", f"{1e3 * run.com_path_m:.0f}", turned,
+        f"{1e3 * run.cap_height_max_m:.0f}", f"{run.tension_max_n:.1f} (cable {run.tension_max_cable})",
+        f"{1e3 * run.penetration_max_m:.2f}",
+    ]  # fmt: skip

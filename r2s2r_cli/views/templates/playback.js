@@ -1,0 +1,202 @@
+"use strict";
+// The page around the scene: run, play, scrub, orbit, zoom, and what cables and motors do.
+
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
+
+function startPlayback(document, window, data) {
+  const find = (id) => document.getElementById(id), robot = data.robot;
+  const scene = find("scene"), panel = find("panel"), bar = find("timeline"), play = find("play"), clock = find("clock");
+  const runs = data.runs.map(unpackRun);
+  const home = {azimuth: -1.12, elevation: 0.42, distance: 4.2 * robot.size, target: [0, 0, 0.25 * robot.size]};
+  const state = {run: runs[0], time: 0, speed: 1, playing: false, view: {...home, target: [...home.target]}, before: 0};
+  const options = () => ({trail: find("trail").checked, contacts: find("contacts").checked, numbers: find("numbers").checked});
+  const end = () => state.run.t[state.run.t.length - 1];
+
+  function fit(canvas) {
+    const ratio = window.devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
+    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
+    }
+    const context = canvas.getContext("2d");
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    return [context, width, height];
+  }
+
+  function draw() {
+    if (find("follow").checked) {
+      const com = poseAt(robot, state.run, state.time).com;
+      state.view.target[0] = com[0];
+      state.view.target[1] = com[1];
+    }
+    const [context, width, height] = fit(scene);
+    const pose = drawScene(context, robot, state.run, state.time, state.view, width, height, options());
+    drawPanel(...fit(panel), robot, state.run, pose, state.time);
+    drawTimeline(...fit(bar), state.run, state.time);
+    const first = poseAt(robot, state.run, state.run.t[0]).com;
+    const gone = 1000 * Math.hypot(pose.com[0] - first[0], pose.com[1] - first[1]);
+    clock.textContent = `${state.time.toFixed(2)} s of ${end().toFixed(2)} s    centre of mass ${gone.toFixed(0)} mm from the start`;
+    play.textContent = state.playing ? "Pause" : "Play";
+  }
+
+  function tick(now) {
+    if (!state.playing) return;
+    state.time = Math.min(end(), state.time + state.speed * (now - state.before) / 1000);
+    state.before = now;
+    if (state.time >= end()) state.playing = false;
+    draw();
+    window.requestAnimationFrame(tick);
+  }
+
+  function setPlaying(on) {
+    state.playing = on;
+    if (on && state.time >= end()) state.time = state.run.t[0];
+    state.before = window.performance.now();
+    if (on) window.requestAnimationFrame(tick);
+    draw();
+  }
+
+  function seek(time) {
+    state.time = Math.min(end(), Math.max(state.run.t[0], time));
+    draw();
+  }
+
+  const choose = find("run");
+  runs.forEach((run, i) => choose.add(new window.Option(run.title, String(i))));
+  choose.hidden = runs.length < 2;
+  choose.addEventListener("change", () => {
+    state.run = runs[Number(choose.value)];
+    state.view.target = [...home.target];
+    seek(state.run.t[0]);
+  });
+  const pace = find("speed");
+  SPEEDS.forEach((speed) => pace.add(new window.Option(`${speed} x`, String(speed), speed === 1, speed === 1)));
+  pace.addEventListener("change", () => (state.speed = Number(pace.value)));
+  play.addEventListener("click", () => setPlaying(!state.playing));
+  for (const id of ["trail", "contacts", "numbers", "follow"]) find(id).addEventListener("change", draw);
+  find("reset").addEventListener("click", () => {
+    state.view = {...home, target: [...home.target]};
+    draw();
+  });
+
+  // One pointer turns, with shift or the other button it moves the ground; two pointers and the wheel zoom.
+  const pointers = new Map();
+  const apart = () => {
+    const [a, b] = [...pointers.values()];
+    return Math.hypot(a.x - b.x, a.y - b.y);
+  };
+  const zoom = (factor) => (state.view.distance = Math.min(20 * robot.size, Math.max(0.8 * robot.size, state.view.distance * factor)));
+  scene.addEventListener("pointerdown", (event) => {
+    scene.setPointerCapture(event.pointerId);
+    pointers.set(event.pointerId, {x: event.clientX, y: event.clientY});
+  });
+  for (const gone of ["pointerup", "pointercancel"]) scene.addEventListener(gone, (event) => pointers.delete(event.pointerId));
+  scene.addEventListener("pointermove", (event) => {
+    const old = pointers.get(event.pointerId);
+    if (!old) return;
+    const before = pointers.size === 2 ? apart() : 0, dx = event.clientX - old.x, dy = event.clientY - old.y;
+    pointers.set(event.pointerId, {x: event.clientX, y: event.clientY});
+    if (pointers.size === 2) zoom(before / Math.max(1, apart()));
+    else if (event.shiftKey || event.buttons === 2) moveTarget(dx, dy);
+    else {
+      state.view.azimuth -= 0.008 * dx;
+      state.view.elevation = Math.min(1.55, Math.max(0.02, state.view.elevation + 0.008 * dy));
+    }
+    draw();
+  });
+  function moveTarget(dx, dy) {
+    find("follow").checked = false;
+    const metres = state.view.distance / (1.9 * Math.min(scene.clientWidth, 1.3 * scene.clientHeight));
+    const {azimuth, target} = state.view, c = Math.cos(azimuth), s = Math.sin(azimuth);
+    target[0] += metres * (s * dx - c * dy);
+    target[1] += metres * (-c * dx - s * dy);
+  }
+  scene.addEventListener("contextmenu", (event) => event.preventDefault());
+  scene.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    zoom(Math.exp(0.001 * event.deltaY));
+    draw();
+  }, {passive: false});
+
+  const scrub = (event) => seek(state.run.t[0] + (end() - state.run.t[0]) * event.offsetX / bar.clientWidth);
+  bar.addEventListener("pointerdown", (event) => {
+    bar.setPointerCapture(event.pointerId);
+    scrub(event);
+  });
+  bar.addEventListener("pointermove", (event) => event.buttons && scrub(event));
+  document.addEventListener("keydown", (event) => {
+    if (event.target.tagName === "SELECT") return;
+    const jump = {ArrowLeft: -0.04, ArrowRight: 0.04, PageUp: -1, PageDown: 1}[event.key];
+    if (event.key === " ") setPlaying(!state.playing);
+    else if (event.key === "Home") seek(0);
+    else if (event.key === "End") seek(end());
+    else if (jump) seek(state.time + jump);
+    else return;
+    event.preventDefault();
+  });
+  window.addEventListener("resize", draw);
+  draw();
+}
+
+// One row a cable: tension, and for winched ones position, target with tolerance, and what the motor does.
+function drawPanel(context, width, height, robot, run, pose, time) {
+  const ink = "#1c2430", pale = "#8792a2", row = Math.min(52, (height - 22) / robot.cables.length);
+  const left = 8, track = width - 16;
+  context.clearRect(0, 0, width, height);
+  context.textBaseline = "alphabetic";
+  context.font = "12px system-ui, sans-serif";
+  context.fillStyle = pale;
+  context.textAlign = "left";
+  context.fillText("cable (caps): tension; below: position and target", left, 13);
+  const interval = run.intervals.find((one) => time <= one.end) || run.intervals[run.intervals.length - 1];
+  robot.cables.forEach((cable, k) => {
+    const y = 22 + k * row, now = pose.cables[k], slim = Math.max(4, 0.16 * row);
+    context.fillStyle = ink;
+    context.textAlign = "left";
+    context.fillText(`${k} (${cable.caps.join("-")})${cable.motor < 0 ? " passive" : ""}`, left, y + 12);
+    context.textAlign = "right";
+    context.fillStyle = now.slack ? pale : ink;
+    context.fillText(now.slack ? "slack" : `${now.newton.toFixed(1)} N`, left + track, y + 12);
+    context.fillStyle = "#e9ecf0";
+    context.fillRect(left, y + 16, track, slim);
+    context.fillStyle = tensionColor(now.level);
+    context.fillRect(left, y + 16, track * now.level, slim);
+    if (cable.motor < 0) return;
+    const x = (position) => left + track * Math.min(1, Math.max(0, (position + 0.25) / 1.5)), line = y + 22 + slim;
+    context.fillStyle = "#f1eee8";
+    context.fillRect(x(0), line, x(1) - x(0), slim);
+    if (interval) {
+      const target = interval.target[cable.motor];
+      context.fillStyle = "#c9d3c4";
+      context.fillRect(x(target - robot.pid.tolerance), line, x(target + robot.pid.tolerance) - x(target - robot.pid.tolerance), slim);
+      context.fillStyle = ink;
+      context.fillRect(x(target) - 1, line - 2, 2, slim + 4);
+    }
+    const at = x((lengthOf(robot, pose, k) - robot.pid.min) / robot.pid.range), drive = pose.control[cable.motor];
+    context.fillStyle = drive === 0 ? pale : "#d4380d";
+    context.beginPath();
+    context.arc(at, line + slim / 2, 0.8 * slim, 0, 2 * Math.PI);
+    context.fill();
+    if (drive !== 0) context.fillRect(Math.min(at, at - 22 * drive), line + slim / 2 - 1, Math.abs(22 * drive), 2);
+  });
+}
+
+// Target intervals as bands with their numbers, seconds below, the present time as a line.
+function drawTimeline(context, width, height, run, time) {
+  const last = run.t[run.t.length - 1] || 1, x = (t) => width * t / last;
+  context.clearRect(0, 0, width, height);
+  context.font = "11px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  run.intervals.forEach((one, i) => {
+    context.fillStyle = i % 2 ? "#cfd9e6" : "#e4eaf2";
+    context.fillRect(x(one.start), 0, x(one.end) - x(one.start), height - 14);
+    context.fillStyle = "#5a6675";
+    if (x(one.end) - x(one.start) > 16) context.fillText(String(i + 1), (x(one.start) + x(one.end)) / 2, (height - 14) / 2);
+  });
+  const step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 30, 60, 300].find((s) => x(s) > 50) || 600;
+  context.fillStyle = "#5a6675";
+  for (let t = 0; t <= last; t += step) context.fillText(`${Number(t.toFixed(1))} s`, Math.max(10, x(t)), height - 6);
+  context.fillStyle = "#d4380d";
+  context.fillRect(x(time) - 1, 0, 2, height - 12);
+}

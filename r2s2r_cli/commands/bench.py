@@ -1,4 +1,4 @@
-"""`r2s2r bench`: speeds on this machine, as ratios measured in one run. So far: start-up."""
+"""`r2s2r bench`: speeds on this machine, as ratios measured in one run: start-up, and the engine."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from r2s2r_cli.commands.bench_engine import engine
 from r2s2r_cli.console import Console
 from r2s2r_cli.options import JsonOption, QuietOption
 from schemas.results import BenchResult
@@ -35,6 +36,9 @@ def bench() -> None:
 
     Example: r2s2r bench startup
     """
+
+
+bench_app.command("engine")(engine)
 
 
 @bench_app.command("startup")

@@ -185,7 +185,8 @@ def test_a_winched_cubic_cable_is_refused() -> None:
     [
         ("timestep_s", 0.0), ("impratio", -1.0), ("contact_time_s", 0.0), ("friction", -0.1), ("rod_friction", -0.1),
         ("restitution", 1.5), ("ground_normal", (0.0, 0.0, 0.0)), ("ground_offset_m", float("inf")),
-        ("gravity", (0.0, 0.0, float("nan"))), ("timestep_s", float("nan")), ("cone", "round"), ("integrator", "RK4"), ("impedance", (0.9, 1.5, 0.001)),
+        ("gravity", (0.0, 0.0, float("nan"))), ("timestep_s", float("nan")),
+        ("cone", "round"), ("integrator", "RK4"), ("impedance", (0.9, 1.5, 0.001)),
     ],
 )  # fmt: skip
 def test_options_that_cannot_be_are_refused(name: str, value: Any) -> None:

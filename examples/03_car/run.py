@@ -146,7 +146,7 @@ def figure(path: Path, reading: Reading, iterations: int) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    sheet = Figure(figsize=(9, 7), dpi=72, layout="constrained")
+    sheet = Figure(figsize=(9, 7), dpi=64, layout="constrained")
     FigureCanvasAgg(sheet)
     axes: Any = sheet.subplots(3, 2)
     shown = ["naive", "MS2", "MS3", "MS4", "KFL"]

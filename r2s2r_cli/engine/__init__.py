@@ -1,5 +1,7 @@
 """The differentiable tensegrity engine: tensors in, tensors out. Knows no project, no file and no command line."""
 
+from r2s2r_cli.engine.balance import Balance as Balance, balance as balance
+from r2s2r_cli.engine.closed_loop import ClosedLoopRun as ClosedLoopRun, closed_loop as closed_loop
 from r2s2r_cli.engine.errors import (
     EngineError as EngineError,
     EngineInputError as EngineInputError,
@@ -12,8 +14,20 @@ from r2s2r_cli.engine.flat import (
     unpack_parameters as unpack_parameters,
     unpack_state as unpack_state,
 )
+from r2s2r_cli.engine.ground import Ground as Ground, tilted as tilted
 from r2s2r_cli.engine.hooks import Channel as Channel, Hooks as Hooks
 from r2s2r_cli.engine.parameters import Parameters as Parameters, check_parameters as check_parameters
+from r2s2r_cli.engine.pid import LatchedPid as LatchedPid
+from r2s2r_cli.engine.reading import (
+    Reading as Reading,
+    cap_lengths as cap_lengths,
+    energy as energy,
+    longest_step as longest_step,
+    momentum as momentum,
+    read as read,
+)
+from r2s2r_cli.engine.rollout import Simulator as Simulator, Trajectory as Trajectory
+from r2s2r_cli.engine.settle import Settled as Settled, settled as settled, window_state as window_state
 from r2s2r_cli.engine.state import (
     State as State,
     angular_velocities as angular_velocities,

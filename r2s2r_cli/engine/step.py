@@ -47,7 +47,8 @@ def step(structure: Structure, theta: Parameters, state: State, u: Tensor, h: Te
     dv, dw = pulled(structure, rods, rows, impulse)
 
     v = rods.v + h[..., None] * theta.gravity[:, None] + dv
-    w = rods.w + gyroscopic(theta, rods.inverse_inertia, rods.w, h) + dw
+    spin = gyroscopic(theta, rods.inverse_inertia, rods.w, h)
+    w = rods.w + spin + dw
     if structure.effects:
         v, w = _pushed_by_the_world(structure, theta, rods, v, w, h)
 
@@ -55,7 +56,8 @@ def step(structure: Structure, theta: Parameters, state: State, u: Tensor, h: Te
     contact = solve(structure, ground)
     after = collide(structure, theta, rods, ground, contact, v, w, h)
     along, turning = pose_velocity(rods, ground, after.impulse, after.v, after.w, h)
-    p_GB, q_GR = moved(state, along + after.shift, turning + after.turn, h)
+    # The pose turns with the mean of w over what the gyroscopic torque does: angular momentum to second order.
+    p_GB, q_GR = moved(state, along + after.shift, turning + after.turn - 0.5 * spin, h)
 
     winding = commanded_rate(structure, theta, u, impulse[:, list(structure.actuated)] / h)
     for effect in structure.effects:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import torch
 from torch import Tensor
 
 from r2s2r_cli.engine.native.symbolic import Symbolic, guarded_call

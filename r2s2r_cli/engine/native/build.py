@@ -12,9 +12,17 @@ from typing import Any
 import torch
 
 from r2s2r_cli.engine.native import cache, machine
-from r2s2r_cli.engine.native.kernels import backward_text, forward_text, tangent_text
+from r2s2r_cli.engine.native.kernels import module_text
 from r2s2r_cli.engine.native.llvm_text import Target
-from r2s2r_cli.engine.native.program import Active, Forward, backward_program, forward_program, tangent_program
+from r2s2r_cli.engine.native.program import (
+    Active,
+    Backward,
+    Forward,
+    Tangent,
+    backward_program,
+    forward_program,
+    tangent_program,
+)
 from r2s2r_cli.engine.native.symbolic import StepFn
 
 REAL = {torch.float64: "double", torch.float32: "float"}
@@ -97,7 +105,7 @@ class Builder:
                 **times,
                 load_s=perf_counter() - start,
                 from_cache=stored is not None,
-            )  # fmt: skip
+            )
         )
         return function
 
@@ -112,15 +120,13 @@ class Builder:
         start = perf_counter()
         forward = self.program(kernel.dtype)
         target = Target(REAL[kernel.dtype], kernel.lanes, dual=kernel.kind == "tangent")
-        if kernel.kind == "forward":
-            program, emit = forward, forward_text
-        elif kernel.kind == "backward":
-            program, emit = backward_program(forward), backward_text
-        else:
-            assert kernel.active is not None
-            program, emit = tangent_program(forward, kernel.active), tangent_text
+        program: Forward | Backward | Tangent = forward
+        if kernel.kind == "backward":
+            program = backward_program(forward)
+        elif kernel.active is not None:
+            program = tangent_program(forward, kernel.active)
         times["trace_s"] = perf_counter() - start
         start = perf_counter()
-        text = emit(program, target)
+        text = module_text(program, target)
         times["emit_s"] = perf_counter() - start
         return text, program.operations()

@@ -59,7 +59,7 @@ def write(path: Path, about: dict[str, Any], code: bytes) -> None:
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".kernel-")
         with os.fdopen(handle, "wb") as file:
             file.write(_MAGIC + sha256(rest).hexdigest().encode() + b"\n" + rest)
-        os.replace(temporary, path)
+        Path(temporary).replace(path)
     except OSError:
         if temporary is not None:
             Path(temporary).unlink(missing_ok=True)

@@ -61,7 +61,7 @@ def sign(g: Graph, a: int) -> int:
 
 
 def power(g: Graph, a: int, b: int) -> int:
-    """a to the power b: products and roots where the exponent is a small multiple of one half."""
+    """The power a^b: products and roots where the exponent is a small multiple of one half."""
     a, b = real(g, a), real(g, b)
     n = g.value(b)
     if n is None or abs(n) > 16 or n * 2 != int(n * 2):

@@ -17,7 +17,7 @@ COMMUTATIVE = frozenset({"add", "mul", "min", "max", "eq", "and", "or"})
 BOOLEAN = frozenset({"true", "lt", "le", "eq", "and", "or", "not"})
 """Operations whose value is a truth value; "true" is the constant."""
 
-_FOLD = {
+_FOLD: dict[str, Any] = {
     "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "tan": np.tan, "exp": np.exp, "log": np.log, "tanh": np.tanh,
     "sinh": np.sinh, "cosh": np.cosh, "asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "abs": np.abs,
     "floor": np.floor, "ceil": np.ceil, "trunc": np.trunc, "round": np.round, "expm1": np.expm1, "log1p": np.log1p,
@@ -101,7 +101,7 @@ class Graph:
         return args
 
     def add(self, a: int, b: int) -> int:
-        """a + b."""
+        """Sum of a and b."""
         x, y = self.value(a), self.value(b)
         if x is not None and y is not None:
             return self.const(x + y)
@@ -116,7 +116,7 @@ class Graph:
         return self.node("add", a, b)
 
     def sub(self, a: int, b: int) -> int:
-        """a - b."""
+        """Difference of a and b."""
         x, y = self.value(a), self.value(b)
         if x is not None and y is not None:
             return self.const(x - y)
@@ -140,7 +140,7 @@ class Graph:
         return self.node("neg", a)
 
     def mul(self, a: int, b: int) -> int:
-        """a b."""
+        """Product of a and b."""
         x, y = self.value(a), self.value(b)
         if x is not None and y is not None:
             return self.const(x * y)
@@ -173,7 +173,7 @@ class Graph:
         return self.node("mul", self.const(x), b)
 
     def div(self, a: int, b: int) -> int:
-        """a / b; a constant divisor becomes a factor, good to one rounding."""
+        """Quotient a / b; a constant divisor becomes a factor, good to one rounding."""
         x, y = self.value(a), self.value(b)
         if x is not None and y is not None:
             return self.apply("div", a, b)
@@ -207,25 +207,25 @@ class Graph:
         return self.node(op, a, b)
 
     def negation(self, a: int) -> int:
-        """not a."""
+        """Whether a does not hold."""
         x = self.truth(a)
         if x is not None:
             return self.true(not x)
         return int(self.args[a][0]) if self.ops[a] == "not" else self.node("not", a)
 
     def both(self, a: int, b: int) -> int:
-        """a and b."""
+        """Whether a and b hold."""
         for x, other in ((self.truth(a), b), (self.truth(b), a)):
             if x is not None:
                 return other if x else self.true(False)
         return a if a == b else self.node("and", a, b)
 
     def either(self, a: int, b: int) -> int:
-        """a or b."""
+        """Whether a or b holds."""
         return self.negation(self.both(self.negation(a), self.negation(b))) if a != b else a
 
     def select(self, condition: int, a: int, b: int) -> int:
-        """a where the condition holds, else b; for numbers and truth values."""
+        """The value a where the condition holds, else b; for numbers and truth values."""
         known = self.truth(condition)
         if known is not None:
             return a if known else b

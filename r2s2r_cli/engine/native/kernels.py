@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from r2s2r_cli.engine.native.emit import Body, subroutine_text
+from r2s2r_cli.engine.native.emit import Body, Place, subroutine_text
 from r2s2r_cli.engine.native.graph import Graph
 from r2s2r_cli.engine.native.hoist import Hoisted, hoisted
 from r2s2r_cli.engine.native.llvm_text import Module, Target
@@ -30,7 +30,7 @@ class _Kernel:
         self._used = sorted({g.args[i][0] for i in live(g, [*inside, *after]) if g.ops[i] == "call"})
         self._allocate()
 
-    def _place(self, arrays: dict[str, str]):  # type: ignore[no-untyped-def]
+    def _place(self, arrays: dict[str, str]) -> Place:
         """Where inputs are: in the array of their kind, at their index."""
 
         def place(kind: str, index: int) -> str:
@@ -80,6 +80,13 @@ class _Kernel:
             subroutine_text(self.module, self.g.subroutines[number], number)
         self.module.functions.append("\n".join([self.head, "entry:", *self.entry.lines, *blocks, "}"]))
         return self.module.text()
+
+
+def module_text(program: Forward | Backward | Tangent, target: Target) -> str:
+    """Text of the module with the program's kernel."""
+    if isinstance(program, Backward):
+        return backward_text(program, target)
+    return forward_text(program, target) if isinstance(program, Forward) else tangent_text(program, target)
 
 
 def forward_text(program: Forward, target: Target) -> str:

@@ -1,4 +1,4 @@
-"""Arrays as kernels hold them: (block, ..., lane), lanes being environments; the last block is filled up by repetition."""
+"""Arrays as kernels hold them: (block, ..., lane), a lane an environment; the last block is filled up by repetition."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""LLVM through llvmlite: from a module's text to object code, and from object code to a function that can be called."""
+"""LLVM through llvmlite: from a module's text to object code, and from object code to a function to call."""
 
 from __future__ import annotations
 
@@ -9,11 +9,17 @@ from typing import Any
 
 from r2s2r_cli.engine.native.llvm_text import LIBRARY
 
+OPTIONS = ("-post-RA-scheduler=false", "-greedy-reverse-local-assignment")
+"""Options of the code generator that take a third off compiling these long blocks, at no loss of speed."""
+
 
 @lru_cache(maxsize=1)
 def binding() -> Any:
     """llvmlite.binding, ready for this machine. Raises ImportError where llvmlite is not installed."""
     import llvmlite.binding as llvm
+
+    for option in OPTIONS:
+        llvm.set_option("r2s2r", option)
 
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()

@@ -55,7 +55,7 @@ def _div(trace: Trace, a: Any, b: Any, *, rounding_mode: str | None = None) -> N
     return mapped(trace, el.UNARY[rounding_mode], trace.tensor(quotient))
 
 
-def _clamp(trace: Trace, a: Any, min: Any = None, max: Any = None) -> Nodes:  # noqa: A002
+def _clamp(trace: Trace, a: Any, min: Any = None, max: Any = None) -> Nodes:
     result = trace.nodes(a)
     if min is not None:
         result = mapped(trace, el.clamp_min, trace.tensor(result), min)
@@ -105,7 +105,7 @@ def _all(g: Graph, terms: list[int]) -> int:
     return result
 
 
-def _norm(trace: Trace, x: Any, ord: float = 2, dim: Axes = None, keepdim: bool = False, **_: Any) -> Nodes:  # noqa: A002
+def _norm(trace: Trace, x: Any, ord: float = 2, dim: Axes = None, keepdim: bool = False, **_: Any) -> Nodes:
     if ord == 2:
         return _reduction(el.norm)(trace, x, dim, keepdim)
     if ord == 1:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import torch
 
@@ -122,7 +123,7 @@ def backward_program(forward: Forward) -> Backward:
     ]
     new, nodes = fused(g, [i for group in groups for i in group])
     ends = [sum(len(group) for group in groups[:k]) for k in range(5)]
-    return Backward(new, *(tuple(nodes[a:b]) for a, b in zip(ends, ends[1:], strict=False)))
+    return Backward(new, *(tuple(nodes[a:b]) for a, b in pairwise(ends)))
 
 
 def tangent_program(forward: Forward, active: Active) -> Tangent:

@@ -24,9 +24,7 @@ def rollout(
 
 class _Rollout(torch.autograd.Function):
     @staticmethod
-    def forward(  # type: ignore[override]
-        ctx: Any, s0: Tensor, u: Tensor, p: Tensor, step: NativeStep, options: dict[str, Any]
-    ) -> Tensor:
+    def forward(ctx: Any, s0: Tensor, u: Tensor, p: Tensor, step: NativeStep, options: dict[str, Any]) -> Tensor:
         ctx.save_for_backward(s0, u, p)
         ctx.save_for_forward(s0, u, p)
         ctx.step, ctx.options = step, options
@@ -34,12 +32,12 @@ class _Rollout(torch.autograd.Function):
 
     @staticmethod
     @once_differentiable
-    def backward(ctx: Any, g_frames: Tensor) -> tuple[Any, ...]:  # type: ignore[override]
+    def backward(ctx: Any, g_frames: Tensor) -> tuple[Any, ...]:
         s0, u, p = ctx.saved_tensors
         return (*ctx.step.vjp(s0, u, p, g_frames, **ctx.options), None, None)
 
     @staticmethod
-    def jvp(ctx: Any, *tangents: Any) -> Tensor:  # type: ignore[override]
+    def jvp(ctx: Any, *tangents: Any) -> Tensor:
         s0, u, p = ctx.saved_tensors
         ds0, du, dp = (None if x is None else x[..., None] for x in tangents[:3])
         _, d_frames = ctx.step.jvp(s0, u, p, ds0=ds0, du=du, dp=dp, **ctx.options)

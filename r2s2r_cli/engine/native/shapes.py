@@ -58,6 +58,6 @@ def checked(
 
 
 def _check(name: str, x: Tensor, shape: tuple[int, ...]) -> None:
-    """x has this shape, or it with batch 1."""
+    """Raise EngineInputError unless x has this shape, or it with batch 1."""
     if tuple(x.shape[1:]) != tuple(shape[1:]) or not x.ndim or x.shape[0] not in (1, shape[0]):
         raise EngineInputError(name, "wrong shape", expected=str(tuple(shape)), received=str(tuple(x.shape)))

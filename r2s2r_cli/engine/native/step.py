@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from r2s2r_cli.engine.native import eager, machine
-from r2s2r_cli.engine.native.build import REAL, Build, Builder, Kernel
+from r2s2r_cli.engine.native.build import Build, Builder, Kernel
 from r2s2r_cli.engine.native.lanes import address, from_lanes, to_lanes
 from r2s2r_cli.engine.native.program import Active
 from r2s2r_cli.engine.native.shapes import Sizes, checked
@@ -73,7 +73,7 @@ class NativeStep:
     def forward(
         self, s0: Tensor, u: Tensor, p: Tensor, *, h: float, hold: int = 1, every: int = 1, threads: int = 1
     ) -> Tensor:
-        """Frames (B, F, NS) of rollouts from s0 (B, NS), with inputs u (B or 1, K, NU) and parameters p (B or 1, NP)."""
+        """Frames (B, F, NS) of rollouts from s0 (B, NS) with inputs u (B or 1, K, NU), parameters p (B or 1, NP)."""
         s0, u, p = checked(self.sizes, s0, u, p, h, hold, every)
         if not self.native(s0):
             with torch.no_grad():

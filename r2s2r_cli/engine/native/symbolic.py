@@ -51,10 +51,8 @@ class Trace:
     def nodes(self, x: Any) -> Nodes:
         """Nodes of a symbolic tensor, an ordinary tensor or a number; the latter two become constants."""
         if isinstance(x, Symbolic):
-            if x.trace is not self:
-                raise TracingError(
-                    f"{_where()}: the function of a guarded call uses a traced tensor from outside; hand it over in `inputs`"
-                )
+            if x.recorder is not self:
+                raise TracingError(f"{_where()}: a guarded function reads a traced tensor that is not in its `inputs`")
             return x.nodes
         if isinstance(x, Tensor):
             value = self.graph.true if x.dtype == torch.bool else self.graph.const
@@ -64,26 +62,26 @@ class Trace:
 
 
 class Symbolic(Tensor):
-    """A tensor of graph nodes. trace: where it records. nodes: int64 array of its shape."""
+    """A tensor of graph nodes. recorder: where it records. nodes: int64 array of its shape."""
 
-    trace: Trace
+    recorder: Trace
     nodes: Nodes
     __torch_function__ = torch._C._disabled_torch_function_impl  # type: ignore[assignment]
 
     @staticmethod
     def __new__(cls, trace: Trace, nodes: Nodes, dtype: torch.dtype) -> Symbolic:  # noqa: D102
         self: Symbolic = Tensor._make_wrapper_subclass(cls, nodes.shape, dtype=dtype)
-        self.trace, self.nodes = trace, nodes
+        self.recorder, self.nodes = trace, nodes
         return self
 
     def __init__(self, *_: Any) -> None:
         super().__init__()
 
     @classmethod
-    def __torch_dispatch__(  # noqa: D102
+    def __torch_dispatch__(  # type: ignore[override]
         cls, func: Any, types: Any, args: Sequence[Any] = (), kwargs: dict[str, Any] | None = None
     ) -> Any:
-        trace = next(x.trace for x in _flat(args) if isinstance(x, Symbolic))
+        trace = next(x.recorder for x in _flat(args) if isinstance(x, Symbolic))
         return _record(trace, func, args, kwargs or {})
 
 
@@ -177,7 +175,7 @@ def guarded_call(
     """Record a call of `fn` as one node, its code as a subroutine; see engine/guarded.py."""
     from r2s2r_cli.engine.native.elementwise import real
 
-    outer = next(x.trace for x in (when, *inputs, *otherwise) if isinstance(x, Symbolic))
+    outer = next(x.recorder for x in (when, *inputs, *otherwise) if isinstance(x, Symbolic))
     g = outer.graph
     if outer.inner:
         raise TracingError(f"{_where()}: a guarded function cannot call another")
@@ -189,7 +187,7 @@ def guarded_call(
     for x, nodes in zip(inputs, given, strict=True):
         places_of = np.array([inner.graph.node("in", "x", next(places)) for _ in range(nodes.size)], dtype=np.int64)
         tensor = inner.tensor(places_of.reshape(nodes.shape))
-        arguments.append(tensor if x.dtype != torch.bool else run(inner, lambda tensor=tensor: tensor != 0))
+        arguments.append(tensor if x.dtype != torch.bool else tensor > 0)
     results = [inner.nodes(x) for x in run(inner, lambda: fn(*arguments))]
     shapes = [[nodes.shape for nodes in group] for group in (results, kept)]
     if shapes[0] != shapes[1]:

@@ -72,14 +72,15 @@ def closed_loop(
     h, count = step / n, whole * n
     wide = theta.map(lambda x: x.expand(batch, *x.shape[1:]))
     p, s = pack_parameters(structure, theta), pack_state(structure, state0).expand(batch, -1)
-    hold_ticks, timeout_ticks, tail_ticks = ticks(holds, pid.period), ticks(timeouts, pid.period), round(tail / pid.period)
+    hold_ticks, timeout_ticks = ticks(holds, pid.period), ticks(timeouts, pid.period)
+    tail_ticks = round(tail / pid.period)
     most = int((hold_ticks + timeout_ticks).sum()) + tail_ticks + len(targets)
 
     at = start_progress(batch)
     memory = pid.start(s.new_zeros(batch, structure.n_cables))
     given_up = torch.zeros(batch, len(targets), dtype=torch.bool)
     needed = torch.zeros(batch, dtype=torch.long)
-    frames, us, indices, dones, lengths = [s], [], [], [], []
+    frames, us, indices, dones, lengths = [s], list[Tensor](), list[Tensor](), list[Tensor](), list[Tensor]()
     after = 0
     for _ in range(most):
         state = unpack_state(structure, s)
@@ -89,7 +90,10 @@ def closed_loop(
         running = ~at.finished(len(targets))
         u, memory = pid.tick(memory, length, at.target(targets))
         u = torch.where(running[:, None], u, torch.zeros_like(u))
-        us.append(u), indices.append(at.index), dones.append(memory.done), lengths.append(length)
+        us.append(u)
+        indices.append(at.index)
+        dones.append(memory.done)
+        lengths.append(length)
         before, (at, moved) = at, advance(at, memory.done, hold_ticks, timeout_ticks)
         given_up[moved.timed_out, before.index[moved.timed_out]] = True
         memory = memory.restarted(moved.changed)
@@ -103,7 +107,8 @@ def closed_loop(
             if after > tail_ticks:
                 break
     flat, commands = torch.stack(frames, dim=1), torch.stack(us, dim=1)
-    require_finite(structure, simulator.kernels.fn, flat.detach(), commands.detach(), p.detach(), h=h, hold=count, every=count)
+    plain = (flat.detach(), commands.detach(), p.detach())
+    require_finite(structure, simulator.kernels.fn, *plain, h=h, hold=count, every=count)
     t = torch.arange(flat.shape[1], dtype=flat.dtype) * pid.period
     trajectory = Trajectory(structure, theta, t, unpack_state(structure, flat), step, n)
     return ClosedLoopRun(

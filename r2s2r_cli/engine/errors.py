@@ -25,5 +25,6 @@ class NonFiniteError(EngineError, ArithmeticError):
     def __init__(self, *, step: int, time: float, environment: int, body: str, term: str) -> None:
         self.step, self.time, self.environment, self.body, self.term = step, time, environment, body, term
         super().__init__(
-            f"the simulation left the finite numbers: step {step} ({time:g} s), environment {environment}, {body}, {term}"
+            f"the simulation left the finite numbers: step {step} ({time:g} s), environment {environment}, {body}, "
+            f"{term}"
         )

@@ -9,9 +9,10 @@ from torch import Tensor
 
 from r2s2r_cli.engine.body import bodies, gyroscopic
 from r2s2r_cli.engine.cable import cable_rows, pulled, rest_lengths, spring_force, tension_impulse
-from r2s2r_cli.engine.contact import contact_rows, solve
+from r2s2r_cli.engine.contact import contact_rows
 from r2s2r_cli.engine.errors import NonFiniteError
 from r2s2r_cli.engine.flat import unpack_parameters, unpack_state
+from r2s2r_cli.engine.friction_solve import solve
 from r2s2r_cli.engine.structure import Structure
 
 FlatStep = Callable[[Tensor, Tensor, Tensor, Tensor], Tensor]

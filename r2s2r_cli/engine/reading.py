@@ -10,7 +10,8 @@ from torch import Tensor
 
 from r2s2r_cli.engine.body import bodies, gyroscopic
 from r2s2r_cli.engine.cable import cable_rows, pulled, rest_lengths, spring_force, tension_impulse
-from r2s2r_cli.engine.contact import contact_rows, solve
+from r2s2r_cli.engine.contact import contact_rows
+from r2s2r_cli.engine.friction_solve import solve
 from r2s2r_cli.engine.parameters import Parameters
 from r2s2r_cli.engine.state import State, cable_ends
 from r2s2r_cli.engine.structure import Structure

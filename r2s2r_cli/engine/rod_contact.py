@@ -13,7 +13,8 @@ import torch
 from torch import Tensor
 
 from r2s2r_cli.engine.body import Bodies, angular_change
-from r2s2r_cli.engine.contact import PUSH_OUT, GroundRows, applied, clip, sweep
+from r2s2r_cli.engine.contact import PUSH_OUT, GroundRows, applied
+from r2s2r_cli.engine.friction_solve import clip, sweep
 from r2s2r_cli.engine.guarded import guarded
 from r2s2r_cli.engine.parameters import Parameters
 from r2s2r_cli.engine.structure import Structure

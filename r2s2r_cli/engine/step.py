@@ -13,7 +13,8 @@ from torch import Tensor
 
 from r2s2r_cli.engine.body import Bodies, angular_change, bodies, gyroscopic, moved
 from r2s2r_cli.engine.cable import cable_rows, pulled, rest_lengths, spring_force, tension_impulse
-from r2s2r_cli.engine.contact import contact_rows, pose_velocity, solve
+from r2s2r_cli.engine.contact import contact_rows, pose_velocity
+from r2s2r_cli.engine.friction_solve import solve
 from r2s2r_cli.engine.hooks import Values, WorldTerms
 from r2s2r_cli.engine.parameters import Parameters
 from r2s2r_cli.engine.rod_contact import collide

@@ -65,7 +65,7 @@ def contact_rows(structure: Structure, theta: Parameters, rods: Bodies, v: Tenso
 
 
 def _rebound(theta: Parameters, v0: Tensor, gain: Tensor, toi: Tensor) -> Tensor:
-    """Normal velocities after the step of caps that hit the ground with v0 at share `toi` of it; 0 at rest and at e = 0.
+    """Normal velocities after the step of caps that hit the ground with v0 at share `toi` of it; 0 at rest, or e = 0.
 
     gain: what gravity and cables add to v0 within the step.
     Departure: contact.md takes the speed at the time of impact. Velocities of this scheme belong to half steps, so that

@@ -186,9 +186,9 @@ def guarded_call(
     arguments = []
     for x, nodes in zip(inputs, given, strict=True):
         places_of = np.array([inner.graph.node("in", "x", next(places)) for _ in range(nodes.size)], dtype=np.int64)
-        tensor = inner.tensor(places_of.reshape(nodes.shape))
-        arguments.append(tensor if x.dtype != torch.bool else tensor > 0)
-    results = [inner.nodes(x) for x in run(inner, lambda: fn(*arguments))]
+        arguments.append((inner.tensor(places_of.reshape(nodes.shape)), x.dtype == torch.bool))
+    # Truth values travel as numbers; compared inside, where the subroutine is recorded.
+    results = [inner.nodes(x) for x in run(inner, lambda: fn(*(x > 0 if truth else x for x, truth in arguments)))]
     shapes = [[nodes.shape for nodes in group] for group in (results, kept)]
     if shapes[0] != shapes[1]:
         raise TracingError(f"{_where()}: the guarded function returns shapes {shapes[0]}, `otherwise` has {shapes[1]}")

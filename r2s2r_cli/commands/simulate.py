@@ -132,9 +132,8 @@ def _compute(asked: Asked, settings: SimulateSettings, console: Console) -> tupl
 
 
 def _loaded() -> Iterator[Any]:
-    """The stage and its libraries: compiled modules do not take an exception out of the blue while they load."""
-    import torch  # noqa: F401
-
+    """The stage, with its libraries: compiled modules do not take an exception out of the blue while they load."""
+    import r2s2r_cli.engine  # noqa: F401 - torch, roma, llvmlite
     import r2s2r_cli.stages.simulate as stage
 
     yield stage

@@ -17,7 +17,7 @@ def report_tables(report: SimulateReport) -> Iterator[PageTable]:
     yield PageTable(
         "simulated runs",
         ["run", "control", "from", "time [s]", "targets", "given up", "moved x, y [mm]", "way [mm]", "turned [deg]",
-         "highest cap [mm]", "strongest tension [N]", "deepest [mm]"],
+         "highest cap [mm]", "strongest tension [N] (cable)", "deepest [mm]"],
         [_row(run) for run in report.runs],
     )  # fmt: skip
     cables = len(report.runs[0].slack_share)
@@ -44,8 +44,8 @@ def _row(run: SimulateRun) -> list[str]:
     x, y, _ = run.com_displacement_m
     turned = "-" if run.heading_change_rad is None else f"{math.degrees(run.heading_change_rad):+.1f}"
     return [
-        run.run, run.control, run.start, f"{run.duration_s:.2f}", str(run.targets) if run.targets else "-",
+        run.run, run.control.removeprefix("command "), run.start, f"{run.duration_s:.2f}", str(run.targets) if run.targets else "-",
         str(len(run.timed_out)), f"{1e3 * x:+.0f}, {1e3 * y:+.0f}", f"{1e3 * run.com_path_m:.0f}", turned,
-        f"{1e3 * run.cap_height_max_m:.0f}", f"{run.tension_max_n:.1f} (cable {run.tension_max_cable})",
+        f"{1e3 * run.cap_height_max_m:.0f}", f"{run.tension_max_n:.1f} ({run.tension_max_cable})",
         f"{1e3 * run.penetration_max_m:.2f}",
     ]  # fmt: skip

@@ -40,7 +40,12 @@ class Request:
 
     @property
     def name(self) -> str:
-        """Of the run."""
+        """Of the run that is made: a replay must not be taken for the closed loop of the same targets."""
+        return f"{self.what.run}-replay" if isinstance(self.what, Replay) else self.what.name
+
+    @property
+    def policy(self) -> str:
+        """Name of the policy, or of the recorded run."""
         return self.what.run if isinstance(self.what, Replay) else self.what.name
 
 
@@ -96,7 +101,7 @@ def _groups(request: Request, run: Simulated, robot: Robot, settings: SimulateSe
     position = (run.frames["length"][:, list(robot.actuated)] - pid.min_length_m) / pid.range_m
     intervals = target_intervals(t, run.target_at, control=run.control_at, position=position, tolerance=pid.tolerance)
     made = {
-        "": Group(attributes={"policy": request.name, "robot": robot.name, "engine": f"r2s2r {__version__}",
+        "": Group(attributes={"policy": request.policy, "robot": robot.name, "engine": f"r2s2r {__version__}",
                               "step": settings.step_s, "control": _control(request)}),
         "frames": Group(run.frames),
         "commands": Group(run.commands),
@@ -116,7 +121,7 @@ def _report(request: Request, run: Simulated, start: Start, robot: Robot, settin
     targets = 0 if isinstance(request.what, Replay) else len(request.what.steps) * request.what.repeat
     return SimulateRun(
         run=request.name,
-        policy=request.name,
+        policy=request.policy,
         control=_control(request),
         start=start.words,
         start_shift_m=run.start_shift,

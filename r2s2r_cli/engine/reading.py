@@ -8,7 +8,7 @@ import roma
 import torch
 from torch import Tensor
 
-from r2s2r_cli.engine.body import bodies, gyroscopic
+from r2s2r_cli.engine.body import angular_change, bodies, gyroscopic
 from r2s2r_cli.engine.cable import cable_rows, pulled, rest_lengths, spring_force, tension_impulse
 from r2s2r_cli.engine.contact import contact_rows
 from r2s2r_cli.engine.friction_solve import solve
@@ -98,14 +98,16 @@ def longest_step(structure: Structure, theta: Parameters, state: State) -> float
         if structure.tendons:
             stiffness = stiffness + theta.tendon_stiffness
         ends = cable_ends(structure, stretch.device)
-        unit = torch.eye(structure.n_cables, dtype=stretch.dtype, device=stretch.device)
-        # Column k: what all cables feel of a unit impulse in cable k.
-        columns = []
-        for k in range(structure.n_cables):
-            dv, dw = pulled(structure, rods, rows, unit[k].expand_as(stretch))
-            felt = (rows.direction[:, :, None] * dv[:, ends]).sum(-1) + (rows.arm * dw[:, ends]).sum(-1)
-            columns.append(felt[..., 0] - felt[..., 1])
+        # Rows of every cable over all rods, and the same times the inverse masses: their product is the mobility.
+        batch, rods_n = rods.p.shape[:2]
+        jacobian = rows.arm.new_zeros(batch, structure.n_cables, rods_n, 6)
+        every = torch.arange(structure.n_cables, device=stretch.device)
+        for end, sign in ((0, 1.0), (1, -1.0)):
+            jacobian[:, every, ends[:, end], :3] = sign * rows.direction
+            jacobian[:, every, ends[:, end], 3:] = sign * rows.arm[:, :, end]
+        turned = angular_change(rods.inverse_inertia[:, None], jacobian[..., 3:])
+        heavy = torch.cat([rods.inverse_mass[:, None] * jacobian[..., :3], turned], dim=-1)
         root = torch.sqrt(torch.relu(stiffness))
-        matrix = root[..., :, None] * torch.stack(columns, -1) * root[..., None, :]
+        matrix = root[..., :, None] * (jacobian.flatten(2) @ heavy.flatten(2).mT) * root[..., None, :]
         largest = float(torch.linalg.eigvalsh(0.5 * (matrix + matrix.mT))[..., -1].max())
     return 1.1 / largest**0.5 if largest > 0 else float("inf")

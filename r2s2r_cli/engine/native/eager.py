@@ -76,10 +76,13 @@ def jvp(
         kept[list(active)] = 1.0
         dp = dp * kept[:, None]
     columns = []
-    for k in range(ds0.shape[-1]):
-        with forward_ad.dual_level():
-            pairs = ((s0, ds0[..., k]), (u, du[..., k]), (p, dp[..., k]))
-            a, b, c = (forward_ad.make_dual(x.detach().clone(), dx.clone()) for x, dx in pairs)
-            frames, tangent = forward_ad.unpack_dual(rollout(fn, a, b, c, h=h, hold=hold, every=every))
-            columns.append(torch.zeros_like(frames) if tangent is None else tangent)
+    with warnings.catch_warnings():
+        # The first dual tensor makes torch load its own scripted code, of which it warns.
+        warnings.filterwarnings("ignore", "`torch.jit.script` is", DeprecationWarning)
+        for k in range(ds0.shape[-1]):
+            with forward_ad.dual_level():
+                pairs = ((s0, ds0[..., k]), (u, du[..., k]), (p, dp[..., k]))
+                a, b, c = (forward_ad.make_dual(x.detach().clone(), dx.clone()) for x, dx in pairs)
+                frames, tangent = forward_ad.unpack_dual(rollout(fn, a, b, c, h=h, hold=hold, every=every))
+                columns.append(torch.zeros_like(frames) if tangent is None else tangent)
     return frames, torch.stack(columns, dim=-1)

@@ -116,7 +116,8 @@ def _xor(g: Graph, a: int, b: int) -> int:
     return g.select(a, g.negation(b), b)
 
 
-def _quotient(g: Graph, a: int, b: int) -> int:
+def quotient(g: Graph, a: int, b: int) -> int:
+    """Quotient of two numbers or truth values."""
     return g.div(real(g, a), real(g, b))
 
 
@@ -147,7 +148,6 @@ UNARY: dict[str, Scalar] = {
 
 BINARY: dict[str, Scalar] = {
     "mul": lambda g, a, b: g.mul(real(g, a), real(g, b)),
-    "true_divide": _quotient,
     "maximum": _apply("max"),
     "minimum": _apply("min"),
     "pow": power,

@@ -49,7 +49,7 @@ def _sub(trace: Trace, a: Any, b: Any, *, alpha: float = 1) -> Nodes:
 
 
 def _div(trace: Trace, a: Any, b: Any, *, rounding_mode: str | None = None) -> Nodes:
-    quotient = mapped(trace, el.BINARY["true_divide"], a, b)
+    quotient = mapped(trace, el.quotient, a, b)
     if rounding_mode is None:
         return quotient
     return mapped(trace, el.UNARY[rounding_mode], trace.tensor(quotient))
@@ -171,7 +171,6 @@ OPERATORS: dict[str, Operation] = {
     **{name: _unary(name) for name in el.UNARY},
     **{name: _elementwise(fn) for name, fn in el.BINARY.items()},
     **SHAPING,
-    "absolute": _unary("abs"),
     "add": _add,
     "sub": _sub,
     "rsub": lambda trace, a, b, alpha=1: _sub(trace, b, a, alpha=alpha),

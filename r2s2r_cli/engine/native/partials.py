@@ -81,7 +81,8 @@ def _power(g: Graph, y: int, a: int, b: int) -> list[Linear]:
 
 
 def _atan2(g: Graph, y: int, a: int, b: int) -> list[Linear]:
-    inverse = g.reciprocal(g.add(g.mul(a, a), g.mul(b, b)))
+    squares = g.add(g.mul(a, a), g.mul(b, b))
+    inverse = g.reciprocal(g.select(g.compare("eq", squares, g.const(0.0)), g.const(1.0), squares))
     return [_times(g, g.mul(b, inverse)), lambda t: g.neg(g.mul(t, g.mul(a, inverse)))]
 
 

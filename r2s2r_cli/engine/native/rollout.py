@@ -28,7 +28,8 @@ class _Rollout(torch.autograd.Function):
         ctx.save_for_backward(s0, u, p)
         ctx.save_for_forward(s0, u, p)
         ctx.step, ctx.options = step, options
-        return step.forward(s0, u, p, **options)
+        # A tensor of its own: forward mode allows no view here.
+        return step.forward(s0, u, p, **options).clone(memory_format=torch.contiguous_format)
 
     @staticmethod
     @once_differentiable
@@ -41,4 +42,4 @@ class _Rollout(torch.autograd.Function):
         s0, u, p = ctx.saved_tensors
         ds0, du, dp = (None if x is None else x[..., None] for x in tangents[:3])
         _, d_frames = ctx.step.jvp(s0, u, p, ds0=ds0, du=du, dp=dp, **ctx.options)
-        return d_frames[..., 0]
+        return d_frames[..., 0].contiguous()

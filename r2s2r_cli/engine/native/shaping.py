@@ -186,7 +186,6 @@ def _same(trace: Trace, x: Any, *_: Any, **__: Any) -> Nodes:
 SHAPING: dict[str, Operation] = {
     "view": _view,
     "_unsafe_view": _view,
-    "reshape": _view,
     "expand": _expand,
     "permute": lambda trace, x, dims: trace.nodes(x).transpose(*dims),
     "transpose": lambda trace, x, a, b: trace.nodes(x).swapaxes(a, b),
@@ -216,7 +215,6 @@ SHAPING: dict[str, Operation] = {
     "constant_pad_nd": _pad,
     "clone": _same,
     "alias": lambda trace, x: trace.nodes(x),
-    "lift_fresh": lambda trace, x: trace.nodes(x),
     "_to_copy": _to,
     "zeros_like": _like(0.0),
     "ones_like": _like(1.0),

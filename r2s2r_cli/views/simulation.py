@@ -11,7 +11,7 @@ import numpy as np
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.estimate import centre_of_mass, draw_path
 from r2s2r_cli.views.figure import CAP_STYLE, draw_bands, legend_below, legend_beside, new_figure, png_bytes, rod_color
-from r2s2r_cli.views.simulation_scene import SLACK_N, draw_scene, instant, tension_color
+from r2s2r_cli.views.simulation_scene import SLACK_N, draw_scene, instant, scene_reach, tension_color
 from schemas.robot import Robot
 
 if TYPE_CHECKING:
@@ -66,9 +66,9 @@ def _picture(data: ArtifactData, run: str, robot: Robot) -> bytes:
 def _strip(figure: SubFigure, data: ArtifactData, run: str, robot: Robot) -> None:
     frames = data.groups[f"runs/{run}/frames"]
     radius = np.repeat([rod.cap_radius_m for rod in robot.rods], 2)
-    reach = 0.75 * max(rod.length_m for rod in robot.rods)
     com = centre_of_mass(frames, robot)[:, :2]
     picked = instants(data, run)
+    reach = scene_reach(frames["p_WE"][picked])
     for axes, frame in zip(np.atleast_1d(figure.subplots(1, len(picked))), picked, strict=True):
         draw_scene(
             axes, instant(frames, robot, frame), radius, top=strongest(frames), reach=reach, path=com[: frame + 1]

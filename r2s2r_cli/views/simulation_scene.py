@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 AZIMUTH, ELEVATION = np.deg2rad(-64.0), np.deg2rad(24.0)
 """Where the viewer stands, seen from the robot: the three support caps of the resting 3-bar robot are in view."""
+TOP, BOTTOM = 1.15, 0.42
+"""What is shown above and below the robot's middle on the ground, over what is shown beside it."""
 SLACK_N = 1e-3
 """Below this tension a cable is drawn slack: a thousandth of a newton moves nothing."""
 _SLACK, _GROUND, _LINE, _SHADOW = "#9aa4b1", "#f3f1ec", "#dcd8cf", "#5a5348"
@@ -81,9 +83,16 @@ def draw_scene(
     _contacts(axes, now, radius, middle)
     _cables(axes, now, middle, top)
     _rods(axes, now, radius, middle)
-    axes.set(xlim=(-reach, reach), ylim=(-0.42 * reach, 1.15 * reach))
+    axes.set(xlim=(-reach, reach), ylim=(-BOTTOM * reach, TOP * reach))
     axes.set_aspect("equal")
     axes.set_axis_off()
+
+
+def scene_reach(p_WE: np.ndarray) -> float:
+    """What `draw_scene` must show so that no cap of these frames (frame, cap, 3) [m] is cut off [m]."""
+    middle = p_WE.mean(axis=1, keepdims=True) * [1, 1, 0]
+    seen = screen(p_WE - middle)
+    return 1.15 * float(max(np.abs(seen[..., 0]).max(), seen[..., 1].max() / TOP, -seen[..., 1].min() / BOTTOM))
 
 
 def screen(p: np.ndarray) -> np.ndarray:

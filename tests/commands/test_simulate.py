@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -168,13 +169,12 @@ def test_what_cannot_be_simulated_is_refused(
 
 def test_a_simulation_that_leaves_the_finite_numbers_is_told(simulated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Exit code 6 with time, step, body and term; nothing is written."""
-    import r2s2r_cli.engine.closed_loop as module
     from r2s2r_cli.engine import NonFiniteError
 
     def fail(*_: object, **__: object) -> None:
         raise NonFiniteError(step=99, time=0.099, environment=0, body="rod 1", term="v_WB")
 
-    monkeypatch.setattr(module, "closed_loop", fail)
+    monkeypatch.setattr(import_module("r2s2r_cli.engine.closed_loop"), "closed_loop", fail)
     before = (simulated / SIMULATION).read_bytes()
     result = invoke("simulate", "policies/bend.toml", "--force", "--no-draw")
     assert result.exit_code == 6

@@ -16,8 +16,19 @@ import pytest
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.page import Page, PageTable
 from r2s2r_cli.views.simulation import draw_simulation, instants
+from r2s2r_cli.views.simulation_page import report_tables
 from r2s2r_cli.views.simulation_playback import BYTES_MAX, kept_frames, playback_data, playback_page
-from r2s2r_cli.views.simulation_scene import cable_line, depth, rotated, screen, tension_color
+from r2s2r_cli.views.simulation_scene import (
+    BOTTOM,
+    TOP,
+    cable_line,
+    depth,
+    rotated,
+    scene_reach,
+    screen,
+    tension_color,
+)
+from schemas.results_simulate import SimulateReport, SimulateRun
 from tests.support import builders
 
 PAGE = Page(title="Simulation of <a robot>", sentence="One run.", labels=["a </script> in a warning"],
@@ -88,6 +99,16 @@ def test_the_view_is_a_rotation() -> None:
     assert frame.T @ frame == pytest.approx(np.eye(3), abs=1e-12)
 
 
+def test_no_cap_is_cut_off() -> None:
+    """What a scene must show holds every cap of a robot that is wide, and of one that stands tall."""
+    wide = np.array([[[-0.5, -0.5, 0.0], [0.5, 0.5, 0.1]]])
+    tall = np.array([[[0.0, 0, 0], [0, 0, 0.9]]])
+    for p in (wide, tall, np.array([[[-0.1, -0.4, 0.0], [0.1, 0.4, 0.0]]])):
+        reach, seen = scene_reach(p), screen(p)
+        assert abs(seen[..., 0]).max() < reach
+        assert seen[..., 1].max() < TOP * reach and seen[..., 1].min() > -BOTTOM * reach
+
+
 def test_quaternions_turn_vectors() -> None:
     """A quarter turn about z takes x to y; xyzw."""
     q = np.array([0, 0, np.sin(np.pi / 4), np.cos(np.pi / 4)])
@@ -137,6 +158,35 @@ def test_frames_are_spread_evenly() -> None:
     assert len(kept_frames(t, 0.25)) == 25
     assert np.diff(t[kept_frames(t, 0.25)]).max() < 0.11
     assert kept_frames(t[:3], 0.01).tolist() == [0, 2]
+
+
+def test_the_report_becomes_tables() -> None:
+    """Lengths in mm, angles in degrees; what is not there is a dash; only cables that are slack are named."""
+    run = SimulateRun(
+        run="walk", policy="walk", control="command replay", start="rest", start_shift_m=0.001, frames=3,
+        duration_s=2.5, step_s=0.001, substeps=1, targets=0, timed_out=(), com_displacement_m=(0.1, -0.02, 0), com_path_m=0.15,
+        heading_change_rad=None, penetration_max_m=2e-5, cap_height_max_m=0.21, tension_max_n=9.96, tension_max_cable=7,
+        slack_share=(0.0, 0.25, 0.001),
+    )  # fmt: skip
+    turned = run.model_copy(update={"heading_change_rad": np.pi / 2, "targets": 4, "timed_out": (2,)})
+    runs, slack = report_tables(SimulateReport(runs=(run, turned), computed_by="torch"))
+    assert runs.rows[0] == [
+        "walk",
+        "replay",
+        "rest",
+        "2.50",
+        "-",
+        "0",
+        "+100, -20",
+        "150",
+        "-",
+        "210",
+        "10.0 (7)",
+        "0.02",
+    ]
+    assert (runs.rows[1][4], runs.rows[1][5], runs.rows[1][8]) == ("4", "1", "+90.0")
+    assert len(runs.columns) == len(runs.rows[0])
+    assert slack.rows[0] == ["walk", "cables 1 25%"]
 
 
 @needs_node

@@ -154,7 +154,6 @@ def _warnings(request: Request, run: Simulated, start: Start, radius: np.ndarray
     if deep > DEEP_M:
         found.append(f"a cap was {1e3 * deep:.1f} mm below the ground: give the engine a smaller simulate.step_s")
     if run.start_shift > SHIFTED_M:
-        found.append(
-            f"the start ({start.words}) is not at rest: settling moved a cap by {1e3 * run.start_shift:.0f} mm"
-        )
+        pose = "rest_caps_m of robot.toml" if start.words == "rest" else f"the first state of run {start.words}"
+        found.append(f"{pose} is not at rest: settling moved a cap by {1e3 * run.start_shift:.0f} mm")
     return found

@@ -138,47 +138,54 @@ function startPlayback(document, window, data) {
   draw();
 }
 
-// One row a cable: tension, and for winched ones position, target with tolerance, and what the motor does.
+// One row a cable: tension above; for winched ones below it position, target with tolerance, and what the motor does.
 function drawPanel(context, width, height, robot, run, pose, time) {
-  const ink = "#1c2430", pale = "#8792a2", row = Math.min(52, (height - 22) / robot.cables.length);
-  const left = 8, track = width - 16;
+  const ink = "#1c2430", pale = "#8792a2", row = Math.min(46, (height - 22) / robot.cables.length), slim = Math.max(3, 0.2 * row);
+  const left = 86, track = width - left - 54;
   context.clearRect(0, 0, width, height);
-  context.textBaseline = "alphabetic";
   context.font = "12px system-ui, sans-serif";
+  context.textBaseline = "middle";
   context.fillStyle = pale;
   context.textAlign = "left";
-  context.fillText("cable (caps): tension; below: position and target", left, 13);
+  context.fillText("cable (caps)", 4, 9);
+  context.fillText("tension; position and target", left, 9);
   const interval = run.intervals.find((one) => time <= one.end) || run.intervals[run.intervals.length - 1];
   robot.cables.forEach((cable, k) => {
-    const y = 22 + k * row, now = pose.cables[k], slim = Math.max(4, 0.16 * row);
-    context.fillStyle = ink;
+    const y = 22 + k * row, now = pose.cables[k], winched = cable.motor >= 0;
+    const high = y + (winched ? 0.28 : 0.5) * row - slim / 2, low = y + 0.68 * row - slim / 2;
+    context.font = `${row < 18 ? 10 : 12}px system-ui, sans-serif`;
     context.textAlign = "left";
-    context.fillText(`${k} (${cable.caps.join("-")})${cable.motor < 0 ? " passive" : ""}`, left, y + 12);
+    context.fillStyle = winched ? ink : pale;
+    context.fillText(`${k} (${cable.caps.join("-")})`, 4, y + row / 2);
     context.textAlign = "right";
     context.fillStyle = now.slack ? pale : ink;
-    context.fillText(now.slack ? "slack" : `${now.newton.toFixed(1)} N`, left + track, y + 12);
-    context.fillStyle = "#e9ecf0";
-    context.fillRect(left, y + 16, track, slim);
+    context.fillText(now.slack ? "slack" : `${now.newton.toFixed(1)} N`, width - 4, y + row / 2);
+    context.fillStyle = "#e4e8ee";
+    context.fillRect(left, high, track, slim);
     context.fillStyle = tensionColor(now.level);
-    context.fillRect(left, y + 16, track * now.level, slim);
-    if (cable.motor < 0) return;
-    const x = (position) => left + track * Math.min(1, Math.max(0, (position + 0.25) / 1.5)), line = y + 22 + slim;
-    context.fillStyle = "#f1eee8";
-    context.fillRect(x(0), line, x(1) - x(0), slim);
-    if (interval) {
-      const target = interval.target[cable.motor];
-      context.fillStyle = "#c9d3c4";
-      context.fillRect(x(target - robot.pid.tolerance), line, x(target + robot.pid.tolerance) - x(target - robot.pid.tolerance), slim);
-      context.fillStyle = ink;
-      context.fillRect(x(target) - 1, line - 2, 2, slim + 4);
-    }
-    const at = x((lengthOf(robot, pose, k) - robot.pid.min) / robot.pid.range), drive = pose.control[cable.motor];
-    context.fillStyle = drive === 0 ? pale : "#d4380d";
-    context.beginPath();
-    context.arc(at, line + slim / 2, 0.8 * slim, 0, 2 * Math.PI);
-    context.fill();
-    if (drive !== 0) context.fillRect(Math.min(at, at - 22 * drive), line + slim / 2 - 1, Math.abs(22 * drive), 2);
+    context.fillRect(left, high, track * now.level, slim);
+    if (winched) drawPosition(context, left, track, low, slim, robot, interval, pose, k);
   });
+}
+
+// Positions -0.25 to 1.25 across the track, so that a little more than the range is seen.
+function drawPosition(context, left, track, y, slim, robot, interval, pose, k) {
+  const motor = robot.cables[k].motor, x = (position) => left + track * Math.min(1, Math.max(0, (position + 0.25) / 1.5));
+  context.fillStyle = "#ece8df";
+  context.fillRect(x(0), y, x(1) - x(0), slim);
+  if (interval) {
+    const target = interval.target[motor], from = x(target - robot.pid.tolerance);
+    context.fillStyle = "#b9c9b0";
+    context.fillRect(from, y, x(target + robot.pid.tolerance) - from, slim);
+    context.fillStyle = "#1c2430";
+    context.fillRect(x(target) - 1, y - 2, 2, slim + 4);
+  }
+  const at = x((lengthOf(robot, pose, k) - robot.pid.min) / robot.pid.range), drive = pose.control[motor];
+  context.fillStyle = drive === 0 ? "#8792a2" : "#d4380d";
+  context.beginPath();
+  context.arc(at, y + slim / 2, Math.max(3, 0.7 * slim), 0, 2 * Math.PI);
+  context.fill();
+  if (drive !== 0) context.fillRect(Math.min(at, at - 22 * drive), y + slim / 2 - 1, Math.abs(22 * drive), 2);
 }
 
 // Target intervals as bands with their numbers, seconds below, the present time as a line.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
@@ -179,13 +180,12 @@ def test_errors_of_the_engine_become_ours(
     raised: Exception, expected: type[Exception], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Run, time, step, body and term are named; the exit codes are those of the project."""
-    import r2s2r_cli.engine.closed_loop as module
 
     def fail(*_: object, **__: object) -> None:
         raise raised
 
     monkeypatch.setattr(Driver, "settled", lambda *_: (None, 0.0))
-    monkeypatch.setattr(module, "closed_loop", fail)
+    monkeypatch.setattr(import_module("r2s2r_cli.engine.closed_loop"), "closed_loop", fail)
     with pytest.raises(expected) as caught:
         simulate(builders.robot(), [Request(POLICY)], SimulateSettings())
     text = str(caught.value)

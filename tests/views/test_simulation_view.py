@@ -164,7 +164,8 @@ def test_the_report_becomes_tables() -> None:
     """Lengths in mm, angles in degrees; what is not there is a dash; only cables that are slack are named."""
     run = SimulateRun(
         run="walk", policy="walk", control="command replay", start="rest", start_shift_m=0.001, frames=3,
-        duration_s=2.5, step_s=0.001, substeps=1, targets=0, timed_out=(), com_displacement_m=(0.1, -0.02, 0), com_path_m=0.15,
+        duration_s=2.5, step_s=0.001, substeps=1, targets=0, timed_out=(),
+        com_displacement_m=(0.1, -0.02, 0), com_path_m=0.15,
         heading_change_rad=None, penetration_max_m=2e-5, cap_height_max_m=0.21, tension_max_n=9.96, tension_max_cable=7,
         slack_share=(0.0, 0.25, 0.001),
     )  # fmt: skip

@@ -12,6 +12,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import asdict
+from enum import StrEnum
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -31,9 +32,19 @@ BATCHES, QUICK_BATCHES = ((64, 1.0), (1024, 0.2)), ((64, 0.5), (1024, 0.1))
 """Environments, and seconds that each is simulated."""
 
 
+class MujocoIntegrator(StrEnum):
+    """What `--integrator` takes."""
+
+    EULER = "Euler"
+    IMPLICITFAST = "implicitfast"
+
+
 def engine(
     robot: Annotated[str, typer.Option("--robot", help="One of the robots that `init` knows.")] = "threebar",
     step: Annotated[float, typer.Option("--step", min=1e-5, max=0.02, help="Step of both [s].")] = 0.001,
+    integrator: Annotated[
+        MujocoIntegrator, typer.Option("--integrator", help="MuJoCo's; implicitfast brakes falling robots.")
+    ] = MujocoIntegrator.EULER,
     repeats: Annotated[int, typer.Option("--repeats", min=1, help="Turns of each pair; the best counts.")] = 5,
     quick: Annotated[bool, typer.Option("--quick", help="Short runs, twice: a look, no measurement.")] = False,
     json: JsonOption = False,
@@ -59,7 +70,8 @@ def engine(
                          hint="r2s2r bench engine --step 0.001")  # fmt: skip
     turns = min(repeats, 2) if quick else repeats
     with tempfile.TemporaryDirectory() as cache:
-        plan = Plan(robot, step, QUICK_RUN_S if quick else RUN_S, QUICK_BATCHES if quick else BATCHES, cache)
+        lengths = (QUICK_RUN_S, QUICK_BATCHES) if quick else (RUN_S, BATCHES)
+        plan = Plan(robot, step, *lengths, integrator=integrator.value, cache_dir=cache)
         plan.load()
         result = _measured(plan, turns, quick, console)
     console.document(result)
@@ -78,7 +90,7 @@ def _measured(plan: Plan, turns: int, quick: bool, console: Console) -> EngineBe
         foreign = _probed("mujoco", plan)
         advance(1)
         robot = plan.load()
-        ours, mujoco = OurSide(robot, plan.step_s), MujocoSide(robot, plan.step_s)
+        ours, mujoco = OurSide(robot, plan.step_s), MujocoSide(robot, plan.step_s, plan.integrator)
         u = bench_gait.commands(robot, ours.speed, plan.run_s, range(1))
         batches = ((1, plan.run_s), *plan.batches)
         forward = [_forward(ours, mujoco, plan, n, length, turns, advance) for n, length in batches]

@@ -15,19 +15,21 @@ from pathlib import Path
 
 from r2s2r_cli.commands import bench_gait
 from r2s2r_cli.commands.bench_sides import Job, MujocoSide, OurSide
+from r2s2r_cli.rig.model.options import Integrator
 from r2s2r_cli.stages.init.robots import robot_toml
 from schemas.robot import Robot
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Robot by name, step [s], length of the single runs [s], (environments, seconds) of each batch, and a folder for
-    machine code."""
+    """Robot by name, step [s], length of the single runs [s], (environments, seconds) of each batch,
+    MuJoCo's integrator, and a folder for machine code."""
 
     robot: str
     step_s: float
     run_s: float
     batches: tuple[tuple[int, float], ...]
+    integrator: Integrator
     cache_dir: str
 
     def load(self) -> Robot:
@@ -52,7 +54,7 @@ def probe(side: str, plan: Plan) -> dict[str, object]:
         seconds["forward, batch"] = _timed(ours.forward(np.repeat(tick, plan.batches[-1][0], axis=0)))
         made: OurSide | MujocoSide = ours
     else:
-        made = MujocoSide(robot, plan.step_s)
+        made = MujocoSide(robot, plan.step_s, plan.integrator)
     u = bench_gait.commands(robot, made.speed, plan.run_s, range(1))
     for size, length in plan.batches:
         made.forward(bench_gait.commands(robot, made.speed, length, range(size)))()

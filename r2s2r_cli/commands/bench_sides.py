@@ -14,6 +14,7 @@ from schemas.robot import Robot
 
 if TYPE_CHECKING:
     from r2s2r_cli.engine.rollout import Trajectory
+    from r2s2r_cli.rig.model.options import Integrator
 
 SETTLE_S = 3.0
 """Both robots come to rest on the ground before anything is measured."""
@@ -28,7 +29,7 @@ Job = Callable[[], None]
 class MujocoSide:
     """MuJoCo through `mujoco.rollout`, one thread."""
 
-    def __init__(self, robot: Robot, step_s: float) -> None:
+    def __init__(self, robot: Robot, step_s: float, integrator: Integrator = "Euler") -> None:
         import mujoco
         from mujoco.rollout import Rollout
 
@@ -36,7 +37,7 @@ class MujocoSide:
         from r2s2r_cli.rig.model.mjcf_text import winch_speed
         from r2s2r_cli.rig.model.sim import MujocoSim
 
-        self.options = Options(timestep_s=step_s)
+        self.options = Options(timestep_s=step_s, integrator=integrator)
         self.robot, self.step_s, self.speed = robot, step_s, winch_speed(robot)
         sim = MujocoSim(robot, self.options)
         sim.step(count=round(SETTLE_S / step_s))

@@ -125,7 +125,8 @@ function startPlayback(document, window, data) {
   });
   bar.addEventListener("pointermove", (event) => event.buttons && scrub(event));
   document.addEventListener("keydown", (event) => {
-    if (event.target.tagName === "SELECT") return;
+    const on = event.target.tagName;
+    if (on === "SELECT" || (event.key === " " && (on === "BUTTON" || on === "INPUT"))) return; // these take the key themselves
     const jump = {ArrowLeft: -0.04, ArrowRight: 0.04, PageUp: -1, PageDown: 1}[event.key];
     if (event.key === " ") setPlaying(!state.playing);
     else if (event.key === "Home") seek(0);

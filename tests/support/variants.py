@@ -131,8 +131,10 @@ def pair(**switches: Any) -> Variant:
         ],
         dtype=torch.float64,
     )
-    theta = engine.parameters(structure, p_BS=ends, rest=0.19, restitution=0.4, stiffness2=4e3, stiffness3=1e5,
-                              tendon_stiffness=30.0, tendon_rest=0.18, lag=0.03, droop=0.01)  # fmt: skip
+    theta = engine.parameters(
+        structure, p_BS=ends, rest=0.19, restitution=0.4, stiffness2=4e3, stiffness3=1e5, tendon_stiffness=30.0,
+        tendon_rest=0.18, lag=0.03 * structure.lag, droop=0.01 * structure.droop,
+    )  # fmt: skip
     places = torch.tensor([[0.0, 0.0, 0.3], [0.0, 0.2, 0.3]], dtype=torch.float64)
     rest = torch.tensor([0.19], dtype=torch.float64)
     axes = torch.tensor([[1.0, 0.1, 0.2], [0.9, -0.2, 0.1]], dtype=torch.float64)

@@ -173,7 +173,9 @@ class Body:
         number, flag, inputs, otherwise = self.g.args[i]
         sub = self.g.subroutines[number]
         wide_in, wide_out = self._widths(sub, len(inputs)), self._widths(sub, len(otherwise))
-        given = [self.value(k, vector=wide) for k, wide in zip(inputs, wide_in, strict=True)]
+        # What the entry block kept in memory is loaded inside the branch, since it is rarely taken.
+        waiting = [None if k in self.values else self.stored.get(k) for k in inputs]
+        given = [w or self.value(k, vector=wide) for k, w, wide in zip(inputs, waiting, wide_in, strict=True)]
         rest = [self.value(k, vector=wide) for k, wide in zip(otherwise, wide_out, strict=True)]
         condition, truth = self.value(flag), self.type(flag)
         some = condition
@@ -182,7 +184,8 @@ class Body:
         inside, after, before = self.name(), self.name(), self.block
         self.do(f"br i1 {some}, label %{inside}, label %{after}")
         self.label(inside)
-        for k, (value, wide) in enumerate(zip(given, wide_in, strict=True)):
+        for k, (value, w, wide) in enumerate(zip(given, waiting, wide_in, strict=True)):
+            value = self.load(value, vector=self.vector(inputs[k])) if w else value
             self.store(value, self.element("%arguments", k, vector=True), vector=wide)
         self.do(f"call void @subroutine{number}(ptr %arguments, ptr %results)")
         results = []

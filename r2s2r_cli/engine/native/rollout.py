@@ -28,14 +28,18 @@ class _Rollout(torch.autograd.Function):
         ctx.save_for_backward(s0, u, p)
         ctx.save_for_forward(s0, u, p)
         ctx.step, ctx.options = step, options
+        if any(ctx.needs_input_grad):
+            frames, ctx.states = step.recorded(s0, u, p, **options)
+        else:
+            frames = step.forward(s0, u, p, **options)
         # A tensor of its own: forward mode allows no view here.
-        return step.forward(s0, u, p, **options).clone(memory_format=torch.contiguous_format)
+        return frames.clone(memory_format=torch.contiguous_format)
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, g_frames: Tensor) -> tuple[Any, ...]:
         s0, u, p = ctx.saved_tensors
-        return (*ctx.step.vjp(s0, u, p, g_frames, **ctx.options), None, None)
+        return (*ctx.step.vjp(s0, u, p, g_frames, states=ctx.states, **ctx.options), None, None)
 
     @staticmethod
     def jvp(ctx: Any, *tangents: Any) -> Tensor:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +22,9 @@ CHUNK = 256
 
 STATES = 32 * 2**20
 """Bytes of states that a backward pass may keep per thread and block of lanes."""
+
+RECORD = 256 * 2**20
+"""Bytes of states that `recorded` may keep for a later backward pass, all together."""
 
 
 @dataclass(frozen=True)
@@ -78,9 +81,25 @@ class NativeStep:
         if not self.native(s0):
             with torch.no_grad():
                 return eager.rollout(self.fn, s0, u, p, h=h, hold=hold, every=every)
-        return self._forward(s0, u, p, Schedule(h, hold, every, threads))
+        frames = self._forward(s0, u, p, Schedule(h, hold, every, threads))
+        return from_lanes(frames, len(s0))
+
+    def recorded(
+        self, s0: Tensor, u: Tensor, p: Tensor, *, h: float, hold: int = 1, every: int = 1, threads: int = 1
+    ) -> tuple[Tensor, Tensor | None]:
+        """The frames, and for `vjp` the states of all steps as kernels hold them; None if they are too many to keep.
+
+        Kernels only: `native(s0)` must hold.
+        """
+        s0, u, p = checked(self.sizes, s0, u, p, h, hold, every)
+        n = u.shape[1] * hold
+        if s0.numel() * s0.element_size() * (n + 1) > RECORD:
+            return self.forward(s0, u, p, h=h, hold=hold, every=every, threads=threads), None
+        states = self._forward(s0, u, p, Schedule(h, hold, 1, threads))
+        return from_lanes(states[:, ::every], len(s0)), states
 
     def _forward(self, s0: Tensor, u: Tensor, p: Tensor, plan: Schedule) -> Tensor:
+        """Frames by block."""
         batch, rows = u.shape[:2]
         lanes = self._lanes(batch, s0.dtype)
         kernel = self._builder.kernel(Kernel("forward", s0.dtype, lanes))
@@ -95,7 +114,7 @@ class NativeStep:
 
         if n:
             _spread(run, range(len(state)), plan.threads)
-        return from_lanes(frames, batch)
+        return frames
 
     def vjp(
         self,
@@ -108,60 +127,75 @@ class NativeStep:
         hold: int = 1,
         every: int = 1,
         threads: int = 1,
+        states: Tensor | None = None,
     ) -> tuple[Tensor, Tensor, Tensor]:
         """Adjoints of s0, u and p, each of its own shape, for adjoints g_frames (B, F, NS) of the frames.
 
-        Memory stays bounded: long rollouts are stored at checkpoints, and the stretches between are run again.
+        states: of the same rollout, by `recorded`. Without them it runs again, and memory stays bounded: long rollouts
+        are stored at checkpoints, and the stretches between run once more.
         """
         given = (u.shape, p.shape)
         s0, u, p = checked(self.sizes, s0, u, p, h, hold, every)
         if not self.native(s0):
             grads = eager.vjp(self.fn, s0, u, p, g_frames, h=h, hold=hold, every=every)
         else:
-            grads = self._vjp(s0, u, p, g_frames.to(s0.dtype), Schedule(h, hold, every, threads))
+            grads = self._vjp(s0, u, p, g_frames.to(s0.dtype), Schedule(h, hold, every, threads), states)
         return grads[0], grads[1].sum_to_size(given[0]), grads[2].sum_to_size(given[1])
 
-    def _vjp(self, s0: Tensor, u: Tensor, p: Tensor, g_frames: Tensor, plan: Schedule) -> tuple[Tensor, Tensor, Tensor]:
+    def _vjp(
+        self, s0: Tensor, u: Tensor, p: Tensor, g_frames: Tensor, plan: Schedule, record: Tensor | None
+    ) -> tuple[Tensor, Tensor, Tensor]:
         batch, rows = u.shape[:2]
         lanes = self._lanes(batch, s0.dtype)
-        forward = self._builder.kernel(Kernel("forward", s0.dtype, lanes))
         backward = self._builder.kernel(Kernel("backward", s0.dtype, lanes))
         state, inputs, parameters, step = self._arrays(s0, u, p, plan, lanes)
         seeds = to_lanes(g_frames, lanes)
         adjoint = torch.zeros_like(state)
         g_inputs, g_parameters = torch.zeros_like(inputs), torch.zeros_like(parameters)
         n = plan.steps(rows)
-        size = state[0].numel() * state.element_size()
-        chunk = max(n, 1) if n * size <= STATES else CHUNK
-        starts = list(range(0, n, chunk))
+
+        def back(block: int, states: Tensor, start: int, end: int) -> None:
+            """Adjoints through steps start to end, whose states are given."""
+            arrays = (inputs, parameters), (adjoint, seeds, g_inputs, g_parameters)
+            (u0, p0), rest = ([address(x, block) for x in group] for group in arrays)
+            backward(states.data_ptr(), u0, p0, step.data_ptr(), *rest, start, end, plan.hold, plan.every)
 
         def run(block: int) -> None:
-            constant = (address(parameters, block), step.data_ptr())
-            u0, gf = address(inputs, block), address(seeds, block)
-            marks = state.new_empty((len(starts), *state.shape[1:]))
-            now = state[block].clone()
-            for k, start in enumerate(starts):
-                marks[k] = now
-                if k + 1 < len(starts):
-                    # No frame falls into the stretch: `every` is longer than the rollout.
-                    forward(now.data_ptr(), 0, u0, *constant, start, start + chunk, plan.hold, n + 1)
-            states = state.new_empty((min(chunk, n) + 1, *state.shape[1:]))
-            for k, start in reversed(list(enumerate(starts))):
-                end = min(start + chunk, n)
-                now.copy_(marks[k])
-                states[0] = now
-                # Frame t + 1 of every step t goes to place t + 1 - start.
-                shifted = address(states, 0) - start * size
-                if end - start > 1:
-                    forward(now.data_ptr(), shifted, u0, *constant, start, end - 1, plan.hold, 1)
-                backward(
-                    states.data_ptr(), u0, *constant, address(adjoint, block), gf, address(g_inputs, block),
-                    address(g_parameters, block), start, end, plan.hold, plan.every,
-                )  # fmt: skip
+            if record is not None and n:
+                back(block, record[block], 0, n)
+            else:
+                given = (address(inputs, block), address(parameters, block), step.data_ptr())
+                for states, start, end in self._stretches(state[block], given, n, plan.hold):
+                    back(block, states, start, end)
             adjoint[block] += seeds[block, 0]
 
         _spread(run, range(len(state)), plan.threads)
         return from_lanes(adjoint, batch), from_lanes(g_inputs, batch), from_lanes(g_parameters, batch)
+
+    def _stretches(
+        self, state: Tensor, given: tuple[int, int, int], n: int, hold: int
+    ) -> Iterator[tuple[Tensor, int, int]]:
+        """The states of all steps of one block, in stretches from the last to the first: (states, start, end)."""
+        forward = self._builder.kernel(Kernel("forward", state.dtype, state.shape[-1]))
+        size = state.numel() * state.element_size()
+        chunk = n if n * size <= STATES else CHUNK
+        starts = list(range(0, n, max(chunk, 1)))
+        marks = state.new_empty((len(starts), *state.shape))
+        now = state.clone()
+        for k, start in enumerate(starts):
+            marks[k] = now
+            if k + 1 < len(starts):
+                # `every` beyond the rollout: no frame is written.
+                forward(now.data_ptr(), 0, *given, start, start + chunk, hold, n + 1)
+        states = state.new_empty((min(chunk, n) + 1, *state.shape))
+        for k, start in reversed(list(enumerate(starts))):
+            end = min(start + chunk, n)
+            states[0] = marks[k]
+            now.copy_(marks[k])
+            if end - start > 1:
+                # The state after step t is frame t + 1, and belongs in place t + 1 - start.
+                forward(now.data_ptr(), states.data_ptr() - start * size, *given, start, end - 1, hold, 1)
+            yield states, start, end
 
     def jvp(
         self,

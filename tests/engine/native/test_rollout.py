@@ -137,6 +137,20 @@ def test_checkpoints_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         close(parts[2], whole[2], 1e-14)
 
 
+def test_recorded_states_save_the_second_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Adjoints from recorded states are those of a rollout run again; too many states are not recorded."""
+    step, s, u, p = setting(10)
+    adjoint = torch.randn(10, 11, 2 * N, dtype=torch.float64)
+    frames, states = step.recorded(s, u, p, **PLAN)
+    assert torch.equal(frames, step.forward(s, u, p, **PLAN))
+    again, ours = (step.vjp(s, u, p, adjoint, **PLAN, states=x) for x in (None, states))
+    assert all(torch.equal(a, b) for a, b in zip(again, ours, strict=True))
+    monkeypatch.setattr(step_module, "RECORD", 1000)
+    frames, states = step.recorded(s, u, p, **PLAN)
+    assert states is None
+    assert torch.equal(frames, step.forward(s, u, p, **PLAN))
+
+
 def test_inputs_are_left_alone() -> None:
     """No kernel writes into what it is given, a single environment's contiguous tensors included."""
     for batch in (1, 3):

@@ -115,17 +115,13 @@ def _compute(asked: Asked, settings: SimulateSettings, console: Console) -> tupl
 
     (stage,) = whole_items(_loaded())
     requests, robot = asked.requests(), asked.project.robot()
-    left = {request.name: max(1, round(stage.expected_s(request, robot))) for request in requests}
-    passed = dict.fromkeys(left, 0.0)
-    with console.progress("simulate, seconds of the robot", sum(left.values())) as advance:
+    passed = {request.name: 0 for request in requests}
+    with console.progress("simulate, targets", sum(map(stage.parts, requests))) as advance:
 
-        def progress(name: str, seconds: float) -> None:
-            # Whole seconds, and never more than expected: how long a policy takes is not known before.
-            passed[name] += seconds
-            if passed[name] >= 1 and left[name] > 0:
-                passed[name] -= 1
-                left[name] -= 1
-                advance(1)
+        def progress(name: str, done: int) -> None:
+            if done > passed[name]:
+                advance(done - passed[name])
+                passed[name] = done
 
         data, report = stage.simulate(robot, requests, settings, cache_dir=asked.project.cache, progress=progress)
     return data, report

@@ -51,13 +51,14 @@ def closed_loop(
     *,
     step: float = 1e-3,
     tail: float = 0.0,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> ClosedLoopRun:
     """Run a policy from state0 (frame G): targets (S, actuated) in positions, holds and timeouts (S,) [s].
 
     step: engine step [s], must divide the controller's period. tail: what is simulated after the last target [s].
-    progress: called with the simulated seconds of every tick. Differentiable in everything but the decisions (`done`,
-    the times of transitions). Environments that are through wait for the others, motors off.
+    progress: called at every tick with the number of targets that all environments are through. Differentiable in
+    everything but the decisions (`done`, the times of transitions). Environments that are through wait for the others,
+    motors off.
     Raises EngineInputError, NonFiniteError.
     """
     structure = simulator.structure
@@ -101,7 +102,7 @@ def closed_loop(
         s = simulator.advance(s, u[:, None], p, h=h, hold=count, every=count)[:, -1]
         frames.append(s)
         if progress is not None:
-            progress(pid.period)
+            progress(int(at.index.min()))
         if bool(at.finished(len(targets)).all()):
             after += 1
             if after > tail_ticks:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence as Items
 from dataclasses import dataclass
 from functools import partial
@@ -14,7 +15,7 @@ from r2s2r_cli import __version__
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.segments import segments, target_intervals
-from r2s2r_cli.stages.simulate.drive import Driver, Simulated, Start
+from r2s2r_cli.stages.simulate.drive import REPLAY_SPELL_S, Driver, Simulated, Start
 from r2s2r_cli.stages.simulate.measures import com_path, heading_change, penetration, slack_share
 from r2s2r_cli.stages.simulate.policies import policy_group, sequence
 from r2s2r_cli.stages.simulate.replay import Replay
@@ -23,7 +24,7 @@ from schemas.policy import PolicyFile
 from schemas.results_simulate import SimulateReport, SimulateRun
 from schemas.robot import Robot
 
-__all__ = ["Request", "Start", "expected_s", "simulate"]
+__all__ = ["Request", "Start", "parts", "simulate"]
 
 DEEP_M = 1e-3
 """A cap deeper in the ground than this is worth a warning: contact did not hold."""
@@ -49,11 +50,11 @@ class Request:
         return self.what.run if isinstance(self.what, Replay) else self.what.name
 
 
-def expected_s(request: Request, robot: Robot) -> float:
-    """About how much time a run simulates [s]. For progress bars only."""
+def parts(request: Request) -> int:
+    """Parts in which a run is reported on the way: targets of a policy, seconds of a replay."""
     if isinstance(request.what, Replay):
-        return request.what.t_last - request.what.t_first
-    return sequence(request.what, robot).expected_s(robot)
+        return math.ceil((request.what.t_last - request.what.t_first) / REPLAY_SPELL_S)
+    return len(request.what.steps) * request.what.repeat
 
 
 def simulate(
@@ -62,12 +63,12 @@ def simulate(
     settings: SimulateSettings,
     *,
     cache_dir: Path | None = None,
-    progress: Callable[[str, float], None] = lambda name, seconds: None,
+    progress: Callable[[str, int], None] = lambda name, done: None,
 ) -> tuple[ArtifactData, SimulateReport]:
     """Simulate every request; the layout is that of `schemas/simulation.py`.
 
-    progress: called with the run's name and the seconds just simulated. Raises UsageError where two runs have one name,
-    InputError for a robot or policy that cannot be simulated, NumericalError where numbers are not finite any more.
+    progress: called with the run's name and how many of its `parts` are done. Raises UsageError where two runs have one
+    name, InputError for a robot or policy that cannot be simulated, NumericalError where numbers are not finite.
     """
     names = [request.name for request in requests]
     for name in names:

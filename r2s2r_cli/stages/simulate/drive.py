@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 REPLAY_SPELL_S = 1.0
 """Simulated time between two looks at the progress bar and at Ctrl-C."""
 
-Progress = Callable[[float], None]
+Progress = Callable[[int], None]
+"""Called with the number of parts that are done: targets of a policy, spells of a replay."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,7 @@ class Driver:
                     )
                 state = run.at(frames)
                 chunks.append(run.states if not chunks else without_first(run.states))
-                progress(frames * every * step)
+                progress(first // spell + 1)
         except EngineError as error:
             raise self._translated(name, error, at) from error
         states = joined(chunks)

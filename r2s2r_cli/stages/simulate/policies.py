@@ -24,14 +24,6 @@ class Sequence:
     hold: np.ndarray
     timeout: np.ndarray
 
-    def expected_s(self, robot: Robot) -> float:
-        """About how long the robot takes: unloaded winches, from the rest state [s]. For progress bars only."""
-        speed = min(m.no_load_rad_per_s * m.speed * m.winch_radius_m for m in robot.motors)
-        way = (
-            np.abs(np.diff(self.target, axis=0, prepend=np.ones_like(self.target[:1]))).max(axis=1) * robot.pid.range_m
-        )
-        return float((np.minimum(way / speed, self.timeout) + self.hold).sum())
-
 
 def sequence(policy: PolicyFile, robot: Robot) -> Sequence:
     """The targets of a policy in order. Raises InputError where it is not for this robot."""

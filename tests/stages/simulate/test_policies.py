@@ -34,16 +34,6 @@ def test_a_policy_of_another_robot_is_refused(change: dict[str, object]) -> None
         sequence(policy, builders.robot())
 
 
-def test_the_expected_time_is_that_of_unloaded_winches() -> None:
-    """From all long to one cable short: the whole range at the winding speed, and the hold."""
-    robot = builders.robot()
-    motor = robot.motors[0]
-    speed = motor.no_load_rad_per_s * motor.speed * motor.winch_radius_m
-    step = {"target": (1.0, 1.0, 0.0, 1.0, 1.0, 1.0), "hold_s": 0.5}
-    policy = PolicyFile.model_validate({**CRAWL.model_dump(), "repeat": 1, "steps": (step,)})
-    assert sequence(policy, robot).expected_s(robot) == pytest.approx(robot.pid.range_m / speed + 0.5)
-
-
 def test_random_shapes_are_binary_and_each_a_new_one() -> None:
     """No shape is the one before it, the first not the rest shape; both ends occur for every cable."""
     target = np.array([step.target for step in random_policy(builders.robot(), 200, 5).steps])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
@@ -12,7 +13,7 @@ import pytest
 from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.engine import EngineInputError, NonFiniteError
 from r2s2r_cli.errors import InputError, NumericalError, UsageError
-from r2s2r_cli.stages.simulate import Request, Start, expected_s, simulate
+from r2s2r_cli.stages.simulate import Request, Start, parts, simulate
 from r2s2r_cli.stages.simulate.drive import Driver
 from r2s2r_cli.stages.simulate.frames import stored_rows
 from r2s2r_cli.stages.simulate.replay import Replay
@@ -31,7 +32,7 @@ class Made(NamedTuple):
 
     data: ArtifactData
     report: SimulateReport
-    seconds: dict[str, float]
+    seen: dict[str, list[int]]
     cache: Path
 
 
@@ -43,13 +44,13 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
     commands = first.groups["runs/bend/commands"]
     t = commands["t"]
     replay = Replay("bend", t, commands["target"], commands["control"], 0.0, float(t[-1]) + 0.02, 0)
-    seconds: dict[str, float] = {}
+    seen: dict[str, list[int]] = {}
 
-    def progress(name: str, passed: float) -> None:
-        seconds[name] = seconds.get(name, 0.0) + passed
+    def progress(name: str, done: int) -> None:
+        seen.setdefault(name, []).append(done)
 
     data, report = simulate(robot, [Request(POLICY), Request(replay)], settings, cache_dir=cache, progress=progress)
-    return Made(data, report, seconds, cache)
+    return Made(data, report, seen, cache)
 
 
 def test_the_controller_brings_every_cable_to_its_target(made: Made) -> None:
@@ -118,11 +119,12 @@ def test_poses_caps_and_lengths_agree(made: Made) -> None:
     assert frames["v_WR"][1:-1] == pytest.approx((frames["p_WR"][2:] - frames["p_WR"][:-2]) / 0.04, abs=0.05)
 
 
-def test_progress_counts_the_simulated_seconds(made: Made) -> None:
-    """What was reported on the way adds up to the runs."""
-    for run in made.report.runs:
-        assert made.seconds[run.run] == pytest.approx(run.duration_s)
-    assert expected_s(Request(POLICY), builders.robot()) == pytest.approx(made.report.runs[0].duration_s, rel=0.5)
+def test_progress_goes_through_all_parts(made: Made) -> None:
+    """Targets of the policy, seconds of the replay: reported in order, to the last."""
+    for run, last in (("bend", parts(Request(POLICY))), ("bend-replay", math.ceil(made.report.runs[1].duration_s))):
+        assert made.seen[run] == sorted(made.seen[run])
+        assert made.seen[run][-1] == last
+    assert parts(Request(POLICY)) == 3
 
 
 def test_the_report_recomputes(made: Made) -> None:

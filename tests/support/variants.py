@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
+import roma
 import torch
 from torch import Tensor
 
@@ -74,7 +75,9 @@ def crooked() -> Variant:
         plain.theta, inertia=a @ torch.diag(moments) @ a.mT, p_BS=p_BS,
         p_BE=plain.theta.p_BE - com[:, :, None] + 0.003 * noise(rods, 2, 3),
     )  # fmt: skip
-    return replace(plain, theta=theta)
+    R_WR = roma.unitquat_to_rotmat(plain.start.q_WR)
+    start = replace(plain.start, p_WB=plain.start.p_WB + torch.einsum("brij,brj->bri", R_WR, com))
+    return Variant(plain.structure, theta, start)
 
 
 def bouncing() -> Variant:

@@ -182,6 +182,7 @@ def test_a_simulation_that_leaves_the_finite_numbers_is_told(simulated: Path, mo
     assert (simulated / SIMULATION).read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_broken_cache_is_made_again(simulated: Path) -> None:
     """Damaged machine code is not run: the step is compiled anew, with the same result."""
     before = read_header(simulated / SIMULATION).content_sha256

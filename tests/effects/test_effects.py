@@ -14,8 +14,8 @@ from r2s2r_cli.effects.ground_slope import GroundSlope
 from r2s2r_cli.engine import Channel, State, end_caps, flat_step, pack_parameters, pack_state, tilted
 from r2s2r_cli.engine.rollout import trace_key
 from tests.support import parity
-from tests.support.engine import lowest_gap, random_gait, shaken, simulator
-from tests.support.phases import STEP, expanded, phases, raised, stirred
+from tests.support.engine import lowest_gap, random_gait, simulator
+from tests.support.phases import STEP, expanded, phases, raised, shaken, stirred
 from tests.support.variants import Variant, pair, plugged, robot
 
 EFFECTS = pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
@@ -29,13 +29,11 @@ def nominal() -> Variant:
 
 def falling(model: Variant, n: int) -> State:
     """The robot near the ground with some speed, so that caps hit and slip and cables work."""
-    start = model.start
-    bare = replace(start, extra={}, rest=0.97 * start.rest)
-    moving = shaken(bare, n, seed=3, position=0.002, angle=0.05, speed=0.3, spin=1.0)
+    start = replace(model.start, rest=0.97 * model.start.rest)
+    moving = shaken(start, n, seed=3, position=0.002, angle=0.05, speed=0.3, spin=1.0)
     moving = replace(moving, v_WB=moving.v_WB - moving.v_WB.new_tensor([0.0, 0.0, 0.5]))
     moving = raised(moving, 1e-4 - lowest_gap(model.theta, moving))
-    memory = {name: x.expand(n, -1) for name, x in start.extra.items()}
-    return replace(stirred(moving, torch.Generator().manual_seed(1)), extra=memory)
+    return replace(stirred(moving, torch.Generator().manual_seed(1)), extra=moving.extra)
 
 
 def after_steps(model: Variant, start: State, steps: int) -> Tensor:

@@ -10,7 +10,8 @@ import torch
 from torch import Tensor
 
 from r2s2r_cli.engine import Parameters, Simulator, State, pack_parameters, pack_state, unpack_state
-from tests.support.engine import lowest_gap, pointing, random_gait, shaken
+from tests.support import engine
+from tests.support.engine import lowest_gap, pointing, random_gait
 from tests.support.variants import Variant
 
 STEP = 1e-3
@@ -23,7 +24,7 @@ def phases(variant: Variant, simulator: Simulator, n: int, *, seed: int = 0) -> 
     generator = torch.Generator().manual_seed(seed)
     flying = shaken(start, n, seed=seed, position=0.01, angle=0.2, speed=0.5, spin=5.0)
     flying = raised(flying, 0.3 - lowest_gap(theta, flying))
-    falling = shaken(start, n, seed=seed + 1, position=0.005, angle=0.1, speed=0.2, spin=2.0)
+    falling = shaken(start, n, seed=seed + 1, position=0.001, angle=0.02, speed=0.2, spin=2.0)
     falling = replace(falling, v_WB=falling.v_WB - falling.v_WB.new_tensor([0.0, 0.0, 1.8]))
     share = 0.1 + 0.6 * torch.rand(n, generator=generator, dtype=torch.float64)
     falling = raised(falling, share * STEP - lowest_gap(theta, falling))
@@ -44,6 +45,12 @@ def phases(variant: Variant, simulator: Simulator, n: int, *, seed: int = 0) -> 
         where[name] = slice(begin, begin + len(part.p_WB))
         begin = where[name].stop
     return where, stirred(joined(list(parts.values())), generator)
+
+
+def shaken(start: State, n: int, *, seed: int, **noise: float) -> State:
+    """Random neighbours of a state of batch 1; memories of effects stay."""
+    bare = engine.shaken(start, n, seed=seed, **noise)
+    return replace(bare, extra=expanded(start, n).extra)
 
 
 def gait_states(variant: Variant, simulator: Simulator, n: int, *, seed: int) -> State:

@@ -79,8 +79,8 @@ def _reduction(fn: Callable[[Graph, list[int]], int]) -> Operation:
         axes = tuple(range(nodes.ndim)) if dim is None or dim == [] else (dim,) if isinstance(dim, int) else tuple(dim)
         axes = tuple(sorted(axis % nodes.ndim for axis in axes)) if nodes.ndim else ()
         kept = tuple(k for k in range(nodes.ndim) if k not in axes)
-        shape = tuple(nodes.shape[k] for k in kept)
-        rows = nodes.transpose(*kept, *axes).reshape(prod(shape), -1).tolist()
+        shape, each = tuple(nodes.shape[k] for k in kept), prod(nodes.shape[k] for k in axes)
+        rows = nodes.transpose(*kept, *axes).reshape(prod(shape), each).tolist()
         result = np.array([fn(trace.graph, row) for row in rows], dtype=np.int64).reshape(shape)
         return np.expand_dims(result, axes) if keepdim else result
 

@@ -58,7 +58,9 @@ def _constant_index(index: Any) -> Any:
     """An index tensor as numpy array."""
     if isinstance(index, Symbolic):
         raise TracingError("an index that depends on traced values cannot be compiled; use torch.where")
-    return np.array(index.tolist(), dtype=bool if index.dtype == torch.bool else np.int64)
+    kind = bool if index.dtype == torch.bool else np.int64
+    # The list of an empty tensor has lost its shape.
+    return np.array(index.tolist(), dtype=kind).reshape(tuple(index.shape))
 
 
 def _indices(index: Sequence[Any]) -> tuple[Any, ...]:
@@ -132,15 +134,7 @@ def _roll(trace: Trace, x: Any, shifts: Sequence[int], dims: Sequence[int] = ())
 
 def _to(trace: Trace, x: Any, *, dtype: torch.dtype | None = None, **_: Any) -> Nodes:
     nodes = trace.nodes(x).copy()
-    if dtype in (None, trace.dtype) or not nodes.size:
-        return nodes
-    boolean = trace.graph.boolean(int(nodes.flat[0]))
-    if dtype == torch.bool:
-        cast = truth
-    elif boolean:
-        cast = real
-    else:
-        raise TracingError(f"conversion to {dtype} cannot be compiled: the step computes in {trace.dtype}")
+    cast = truth if dtype == torch.bool else real
     return np.array([cast(trace.graph, i) for i in nodes.ravel().tolist()], dtype=np.int64).reshape(nodes.shape)
 
 

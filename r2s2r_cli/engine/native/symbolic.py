@@ -52,7 +52,7 @@ class Trace:
         """Nodes of a symbolic tensor, an ordinary tensor or a number; the latter two become constants."""
         if isinstance(x, Symbolic):
             if x.recorder is not self:
-                raise TracingError(f"{_where()}: a guarded function reads a traced tensor that is not in its `inputs`")
+                raise TracingError("a guarded function reads a traced tensor that is not in its `inputs`")
             return x.nodes
         if isinstance(x, Tensor):
             value = self.graph.true if x.dtype == torch.bool else self.graph.const
@@ -121,7 +121,15 @@ def _record(trace: Trace, func: Any, args: Sequence[Any], kwargs: dict[str, Any]
             raise TracingError(f"{_where()}: Python needs the value of a traced tensor; use torch.where, or guarded()")
         raise TracingError(f"{_where()}: the operation {func} cannot be compiled")
     kwargs = {key: value for key, value in kwargs.items() if key not in ("device", "layout", "pin_memory")}
-    result = operation(trace, *args, **kwargs)
+    dtype = kwargs.get("dtype") or trace.dtype
+    if dtype not in (trace.dtype, torch.bool):
+        raise TracingError(f"{_where()}: conversion to {dtype} cannot be compiled: the step computes in {trace.dtype}")
+    try:
+        result = operation(trace, *args, **kwargs)
+    except TracingError as error:
+        raise TracingError(f"{_where()}: {error}") from error
+    except (TypeError, ValueError, IndexError) as error:
+        raise TracingError(f"{_where()}: {func} cannot be compiled with these arguments: {error}") from error
     if in_place:
         if not isinstance(args[0], Symbolic):
             raise TracingError(f"{_where()}: {func} writes a traced value into an ordinary tensor; use torch.stack")

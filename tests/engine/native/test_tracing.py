@@ -57,6 +57,20 @@ def test_programs_are_folded(fn: Callable[[Tensor], Tensor], left: list[str]) ->
     assert operations(fn) == left
 
 
+def test_tensors_without_elements_are_traced() -> None:
+    """A robot without cables has empty tensors of every shape: indexing, reductions and products keep the shapes."""
+
+    def empty(s: Tensor) -> Tensor:
+        none = s[:, torch.zeros((0, 2), dtype=torch.long)]
+        assert none.shape == (len(s), 0, 2)
+        nothing = torch.linalg.vector_norm(none, dim=-1) + none.sum(-1)
+        spread = torch.einsum("ker,bke->br", torch.zeros(0, 2, 2, dtype=s.dtype), none)
+        joined = torch.cat([nothing, torch.stack([nothing.sum(1)] * 2, 1)], 1)
+        return s + spread + joined + (none @ torch.ones(2, 1, dtype=s.dtype)).sum((1, 2))[:, None]
+
+    assert torch.equal(step_of(empty).forward(*ONE, h=1.0)[:, 1], empty(ONE[0]))
+
+
 def test_equal_operations_are_one_node() -> None:
     """The graph holds no operation twice; sums and products do not depend on the order of their terms."""
     g = Graph()
@@ -81,6 +95,9 @@ def test_equal_operations_are_one_node() -> None:
             "torch.stack",
         ),
         (lambda s: s[:, :1], "shape"),
+        (lambda s: s.sum(1, keepdim=True, dtype=torch.float32).expand(1, 2), "float32"),
+        (lambda s: s.sum(1, keepdim=True, dtype=torch.int64).expand(1, 2), "int64"),
+        (lambda s: torch.ops.aten.select(s, 5, 0), "these arguments|IndexError|range"),
         (lambda s: torch.linalg.vector_norm(s, ord=3, dim=1, keepdim=True).expand(1, 2), "order 3"),
     ],
 )

@@ -173,7 +173,7 @@ def test_cables_conserve_momentum() -> None:
         assert float(energy(structure, theta, run.at(-1))) < float(E0)
         changes.append(float(torch.linalg.vector_norm(L1 - L0) / torch.linalg.vector_norm(L0)))
     # The thin rods come to spin at 140 rad/s; the arms of a step's impulses are those of its start: first order.
-    assert changes[0] < 0.1
+    assert changes[0] < 0.12
     assert changes[0] / changes[1] > 1.8
 
 

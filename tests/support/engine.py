@@ -113,11 +113,6 @@ def roll(
     return states
 
 
-def after(structure: Structure, theta: Parameters, start: State, steps: int, h: float | Tensor, **how: Tensor) -> State:
-    """The state after `steps` steps."""
-    return roll(structure, theta, start, steps, h, every=steps, **how)[-1]
-
-
 @lru_cache(maxsize=64)
 def simulator(structure: Structure) -> Simulator:
     """The simulator of a structure; its kernels are compiled once a test session."""
@@ -128,10 +123,17 @@ def simulate(
     structure: Structure, theta: Parameters, start: State, steps: int, h: float, *,
     u: Tensor | None = None, every: int = 1,
 ) -> Trajectory:  # fmt: skip
-    """The same in machine code, for long runs: steps of h [s], no substeps. u: (B, actuated), held throughout."""
+    """A trajectory in machine code: steps of h [s], no substeps. u: (B, actuated), held throughout."""
     batch = max(len(start.p_WB), len(theta.mass))
     u = start.p_WB.new_zeros(batch, structure.n_actuated) if u is None else u
     return simulator(structure).rollout(theta, start, u[:, None], step=h, hold=steps, every=every, substeps=1)
+
+
+def after(
+    structure: Structure, theta: Parameters, start: State, steps: int, h: float, *, u: Tensor | None = None
+) -> State:
+    """The state after so many steps, in machine code."""
+    return simulate(structure, theta, start, steps, h, u=u, every=steps).at(-1)
 
 
 def track(states: list[State], field: str = "p_WB") -> Tensor:

@@ -12,7 +12,7 @@ from typing import Any
 import torch
 
 from r2s2r_cli.engine.native import cache, machine
-from r2s2r_cli.engine.native.kernels import module_text
+from r2s2r_cli.engine.native.kernels import Texts, module_text
 from r2s2r_cli.engine.native.llvm_text import Target
 from r2s2r_cli.engine.native.program import (
     Active,
@@ -85,17 +85,19 @@ class Builder:
         stored = cache.read(path) if path else None
         times = {"trace_s": 0.0, "emit_s": 0.0, "compile_s": 0.0}
         if stored is None:
-            text, operations = self._text(kernel, times)
+            texts, operations = self._text(kernel, times)
             start = perf_counter()
-            code = machine.compiled(text)
+            codes = [machine.compiled(texts.kernel)]
+            if texts.called is not None:
+                codes.append(machine.compiled(texts.called, level=0))
             times["compile_s"] = perf_counter() - start
             if path:
-                cache.write(path, {"operations": operations}, code)
+                cache.write(path, {"operations": operations}, codes)
         else:
-            about, code = stored
+            about, codes = stored
             operations = about["operations"]
         start = perf_counter()
-        function = machine.loaded(code, n_arrays)
+        function = machine.loaded(codes, n_arrays)
         self.log.append(
             Build(
                 kernel.kind,
@@ -116,7 +118,7 @@ class Builder:
         parts: list[Any] = [self._key, self._sizes, kernel.kind, REAL[kernel.dtype], kernel.lanes, active]
         return self._cache_dir / cache.file_name(*parts)
 
-    def _text(self, kernel: Kernel, times: dict[str, float]) -> tuple[str, int]:
+    def _text(self, kernel: Kernel, times: dict[str, float]) -> tuple[Texts, int]:
         start = perf_counter()
         forward = self.program(kernel.dtype)
         target = Target(REAL[kernel.dtype], kernel.lanes, dual=kernel.kind == "tangent")
@@ -127,6 +129,6 @@ class Builder:
             program = tangent_program(forward, kernel.active)
         times["trace_s"] = perf_counter() - start
         start = perf_counter()
-        text = module_text(program, target)
+        texts = module_text(program, target)
         times["emit_s"] = perf_counter() - start
-        return text, program.operations()
+        return texts, program.operations()

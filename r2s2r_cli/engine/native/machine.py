@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -67,7 +67,7 @@ def _machine(level: int = 2) -> Any:
 
 def compiled(text: str, *, level: int = 2) -> bytes:
     """Object code of a module. The text is already in good form: no pass of LLVM's optimiser runs, only its code
-    generator."""
+    generator. level: 2 for code that is fast, 0 for code that is there at once."""
     llvm = binding()
     machine = _machine(level)
     module = llvm.parse_assembly(text)
@@ -76,14 +76,15 @@ def compiled(text: str, *, level: int = 2) -> bytes:
     return bytes(machine.emit_object(module))
 
 
-def loaded(code: bytes, n_arrays: int) -> Callable[..., None]:
-    """The function `kernel` of the object code: n_arrays addresses, then four integers. It keeps its code alive."""
+def loaded(codes: Sequence[bytes], n_arrays: int) -> Callable[..., None]:
+    """The function `kernel` of the object codes: n_arrays addresses, then four integers. It keeps its code alive."""
     llvm = binding()
     empty = llvm.parse_assembly("")
     target = _machine()
     empty.triple = target.triple
     engine = llvm.create_mcjit_compiler(empty, target)
-    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+    for code in codes:
+        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
     kind = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * n_arrays, *[ctypes.c_int64] * 4)
     function = kind(engine.get_function_address("kernel"))

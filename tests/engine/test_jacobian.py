@@ -53,7 +53,7 @@ def growth(detach: Detach = Detach.NONE) -> tuple[Tensor, Tensor]:
 
 
 def test_derivatives_over_ten_seconds_stay_bounded() -> None:
-    """8 random gaits: position per logarithm of a parameter is below 0.5 m in the median and 10 m at worst, position per
+    """8 random gaits: position per logarithm of a parameter is below 0.5 m in the median, 10 m at worst, position per
     start position below 5 and 100, and the median does not grow tenfold from 5 s to 10 s."""
     by_parameter, by_start = growth()
     assert bool(torch.isfinite(by_parameter).all() and torch.isfinite(by_start).all())

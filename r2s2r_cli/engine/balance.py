@@ -53,8 +53,8 @@ def balance(structure: Structure, theta: Parameters, state: State) -> Balance:
             own[:, winched] = (theta.tendon_stiffness * torch.relu(rows.length - theta.tendon_rest))[:, winched]
         cables = _cable_wrenches(structure, rods, rows)
         matrix = torch.cat([cables[..., winched], _ground_wrenches(structure, theta, rods)], dim=-1)
-        weight = torch.cat([theta.mass[..., None] * theta.gravity[:, None], torch.zeros_like(rods.w)], dim=-1)
-        load = weight.expand(len(cables), -1, -1).flatten(1) + (cables @ own[..., None])[..., 0]
+        weight = (theta.mass[..., None] * theta.gravity[:, None]).expand_as(rods.p)
+        load = torch.cat([weight, torch.zeros_like(rods.w)], dim=-1).flatten(1) + (cables @ own[..., None])[..., 0]
         x = _least(matrix, load, structure)
         left = (load + (matrix @ x[..., None])[..., 0]).unflatten(1, (-1, 6))
     tension = own.clone()

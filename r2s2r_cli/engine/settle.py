@@ -16,22 +16,28 @@ from torch import Tensor
 from r2s2r_cli.engine.balance import balance
 from r2s2r_cli.engine.errors import EngineInputError
 from r2s2r_cli.engine.flat import pack_parameters, pack_state, unpack_state
+from r2s2r_cli.engine.nonfinite import require_finite
 from r2s2r_cli.engine.parameters import Parameters
 from r2s2r_cli.engine.reading import cap_lengths, read
+from r2s2r_cli.engine.roll import along, resting, roll_relaxed
 from r2s2r_cli.engine.rollout import Simulator
-from r2s2r_cli.engine.state import State, end_caps, pose_state
+from r2s2r_cli.engine.state import State, cap_velocities, end_caps, pose_state
 from r2s2r_cli.engine.structure import Structure
 
-SPELL = 0.01
+SPELL = 0.005
 """[s] of simulation between two looks at the kinetic energy."""
-HEAVY = 1e9
-"""Factor that pins a rod in place while only its roll relaxes."""
+CALM = 30.0
+"""[1/s] times what the cables lack: the winches turn at an energy peak below this speed. A winch that follows a moving
+robot pumps energy into it: turned at every look, 8 of 8 noisy starts never came to rest."""
+TURNED = 1e-6
+"""[m] winches that would turn by less have the observed lengths."""
 
 
 @dataclass(frozen=True)
 class Settled:
     """A resting state. p_WE: observed caps [m], (B, cap, 3); shift: of each cap from there [m], (B, cap);
-    tension: (B, cable) [N]; speed: fastest cap motion left [m/s], (B,); spells: how long it took, in SPELL seconds."""
+    tension: (B, cable) [N]; speed: of the fastest cap at the end, then cleared [m/s], (B,); spells: how long it
+    took, in SPELL seconds."""
 
     state: State
     shift: Tensor
@@ -49,7 +55,7 @@ def settled(
     *,
     lengths: Tensor | None = None,
     step: float = 1e-3,
-    spells: int = 400,
+    spells: int = 1600,
     still: float = 1e-5,
 ) -> Settled:
     """The state at rest nearest to observed caps p_WE (B, cap, 3) [m], frame G, with the observed cable lengths.
@@ -60,7 +66,11 @@ def settled(
     kinetic energy has passed a peak. The result is shifted and turned about the vertical back on to the observation.
     """
     structure = simulator.structure
+    _check("p_WE", p_WE, (2 * structure.n_rods, 3))
     wanted = cap_lengths(cable_caps, p_WE) if lengths is None else lengths
+    _check("lengths", wanted, (structure.n_cables,))
+    batch = max(len(p_WE), len(theta.mass), len(wanted))
+    p_WE, wanted = p_WE.expand(batch, -1, -1), wanted.expand(batch, -1)
     state = pose_state(structure, theta, p_WE, along(p_WE, R_WR), rest=p_WE.new_zeros(len(p_WE), structure.n_actuated))
     state = consistent(structure, theta, roll_relaxed(simulator, theta, lowered(theta, state)))
     winched = list(structure.actuated)
@@ -71,26 +81,41 @@ def settled(
     speed, used = before, 0
     while used < spells:
         used += 1
-        flat = simulator.advance(pack_state(structure, state), idle, p, h=h, hold=count, every=count)[:, -1]
-        state = unpack_state(structure, flat)
-        kinetic = (state.v_WB**2).sum((1, 2)) + 0.01 * (state.w_R**2).sum((1, 2))
-        speed = torch.sqrt(kinetic)
-        if bool((speed < still).all()):
+        frames = simulator.advance(pack_state(structure, state), idle, p, h=h, hold=count, every=count)
+        require_finite(structure, simulator.kernels.fn, frames, idle, p, h=h, hold=count, every=count)
+        state = unpack_state(structure, frames[:, -1])
+        speed = torch.linalg.vector_norm(cap_velocities(theta, state), dim=-1).max(dim=1).values
+        missing = wanted[:, winched] - cap_lengths(cable_caps, end_caps(theta, state))[:, winched]
+        turned = torch.minimum(torch.maximum(state.rest + missing, theta.rest_min), theta.rest_max)
+        wrong = (turned - state.rest).abs().amax(dim=1) if winched else torch.zeros_like(speed)
+        if bool((speed < still).all()) and bool((wrong < TURNED).all()):
             break
-        calm = (kinetic < before)[:, None, None]
+        kinetic = (state.v_WB**2).sum((1, 2)) + 0.01 * (state.w_R**2).sum((1, 2))
+        peak = kinetic < before
+        slow = peak & (torch.sqrt(before) < CALM * wrong)
+        still_now = peak[:, None, None]
         state = replace(
-            state, v_WB=torch.where(calm, 0.0, state.v_WB), w_R=torch.where(calm, 0.0, state.w_R),
-            rest=_wound(theta, state, wanted[:, winched] - cap_lengths(cable_caps, end_caps(theta, state))[:, winched]),
+            state, v_WB=torch.where(still_now, 0.0, state.v_WB), w_R=torch.where(still_now, 0.0, state.w_R),
+            rest=torch.where(slow[:, None], turned, state.rest),
         )  # fmt: skip
-        before = torch.where(calm[:, 0, 0], torch.zeros_like(kinetic), kinetic)
+        before = torch.where(peak, torch.zeros_like(kinetic), kinetic)
     state = _back(theta, resting(state), p_WE)
     shift = torch.linalg.vector_norm(end_caps(theta, state) - p_WE, dim=-1)
     return Settled(state, shift, read(structure, theta, state, h).tension, speed, used)
 
 
-def _wound(theta: Parameters, state: State, missing: Tensor) -> Tensor:
-    """Winches turned by part of what the cap distances lack."""
-    return torch.minimum(torch.maximum(state.rest + 0.3 * missing, theta.rest_min), theta.rest_max)
+def _check(name: str, observed: Tensor, shape: tuple[int, ...]) -> None:
+    """Raises EngineInputError for observations of a wrong shape, or that are no numbers."""
+    if observed.shape[1:] != shape or observed.ndim != len(shape) + 1:
+        raise EngineInputError(
+            name, "wrong shape", expected="(B, " + ", ".join(map(str, shape)) + ")", received=str(tuple(observed.shape))
+        )
+    if not bool(torch.isfinite(observed).all()):
+        index = tuple(torch.nonzero(~torch.isfinite(observed))[0].tolist())
+        raise EngineInputError(
+            f"{name}.{'.'.join(map(str, index[1:]))}", "not a finite number", expected="finite numbers",
+            received=f"{float(observed[index])} in environment {index[0]}",
+        )  # fmt: skip
 
 
 def window_state(
@@ -108,6 +133,11 @@ def window_state(
     cables, effect states, and velocities where v_WE (B, cap, 3) [m/s] is None. Tensions balance the observed pose.
     """
     structure = simulator.structure
+    _check("p_WE", p_WE, (2 * structure.n_rods, 3))
+    if v_WE is not None:
+        _check("v_WE", v_WE, (2 * structure.n_rods, 3))
+    batch = max(len(p_WE), len(theta.mass), len(carried.p_WB))
+    p_WE = p_WE.expand(batch, -1, -1)
     R_WR = along(p_WE, roma.unitquat_to_rotmat(carried.q_WR).expand(len(p_WE), -1, -1, -1))
     rest = carried.rest.expand(len(p_WE), -1)
     state = pose_state(structure, theta, p_WE, R_WR, rest=rest)
@@ -122,36 +152,12 @@ def window_state(
     )  # fmt: skip
 
 
-def along(p_WE: Tensor, R_WR: Tensor) -> Tensor:
-    """Frames turned by the smallest rotation that puts z along the observed rods, (B, rod, 3, 3): roll is kept."""
-    axis = p_WE[:, 1::2] - p_WE[:, 0::2]
-    length = torch.linalg.vector_norm(axis, dim=-1, keepdim=True)
-    if not bool((length > 0).all()):
-        raise EngineInputError(
-            "p_WE", "a rod of zero length", expected="two different caps", received=str(length.min())
-        )
-    z, old = axis / length, R_WR[..., 2].expand_as(axis)
-    cross, dot = torch.linalg.cross(old, z), (old * z).sum(-1, keepdim=True)
-    # Half-angle form; opposite axes (dot = -1) turn about x of the old frame.
-    quaternion = torch.cat([cross, 1.0 + dot], dim=-1)
-    flip = torch.cat([R_WR[..., 0].expand_as(axis), torch.zeros_like(dot)], dim=-1)
-    quaternion = torch.where(dot < -1 + 1e-9, flip, quaternion)
-    turn = roma.unitquat_to_rotmat(quaternion / torch.linalg.vector_norm(quaternion, dim=-1, keepdim=True))
-    return turn @ R_WR.expand(len(p_WE), -1, -1, -1)
-
-
 def lowered(theta: Parameters, state: State, *, only_up: bool = False) -> State:
     """Moved along the vertical until the lowest cap touches the ground; only_up: only where it is below it."""
     lowest = (end_caps(theta, state)[..., 2] - theta.cap_radius.flatten(1)).min(dim=1).values
     by = torch.clamp(lowest, max=0.0) if only_up else lowest
     down = torch.stack([torch.zeros_like(by), torch.zeros_like(by), by], dim=-1)
     return replace(state, p_WB=state.p_WB - down[:, None])
-
-
-def resting(state: State) -> State:
-    """The same pose at rest."""
-    zero = torch.zeros_like(state.v_WB)
-    return replace(state, v_WB=zero, w_R=zero.clone(), winding=torch.zeros_like(state.winding))
 
 
 def consistent(structure: Structure, theta: Parameters, state: State, slack: Tensor | None = None) -> State:
@@ -166,48 +172,6 @@ def consistent(structure: Structure, theta: Parameters, state: State, slack: Ten
     if slack is not None:
         stretched = torch.where(tension > 0, stretched, torch.maximum(slack, length))
     return replace(state, rest=torch.minimum(torch.maximum(stretched, theta.rest_min), theta.rest_max))
-
-
-def roll_relaxed(simulator: Simulator, theta: Parameters, state: State, *, rounds: int = 3) -> State:
-    """Each rod turned about its own axis to where the balancing tensions leave no torque; axes and places stay.
-
-    The engine does it: rods so heavy that only the axial turn moves, cables of constant tension, no ground.
-    """
-    structure = simulator.structure
-    winched = list(structure.actuated)
-    pinned = replace(
-        theta, mass=theta.mass * HEAVY, gravity=torch.zeros_like(theta.gravity), damping=torch.zeros_like(theta.damping),
-        inertia=theta.inertia * theta.inertia.new_tensor([[HEAVY] * 3, [HEAVY] * 3, [HEAVY, HEAVY, 1.0]]),
-    )  # fmt: skip
-    soft = theta.stiffness.clone()
-    soft[:, winched] = 1.0
-    high = state.p_WB + state.p_WB.new_tensor([0.0, 0.0, 10.0])
-    for _ in range(rounds):
-        tension = balance(structure, theta, state).tension[:, winched]
-        length = read(structure, theta, resting(state)).length[:, winched]
-        free = replace(
-            pinned, stiffness=soft, rest_min=torch.full_like(theta.rest_min, -HEAVY),
-            rest_max=torch.full_like(theta.rest_max, HEAVY),
-        )  # fmt: skip
-        moving = replace(resting(state), p_WB=high, rest=length - tension)
-        moving = _rolled(simulator, free, moving)
-        state = replace(state, q_WR=moving.q_WR)
-    return state
-
-
-def _rolled(simulator: Simulator, theta: Parameters, state: State) -> State:
-    structure = simulator.structure
-    p = pack_parameters(structure, theta)
-    idle = torch.zeros(len(state.p_WB), 1, structure.n_actuated, dtype=state.p_WB.dtype)
-    before = torch.zeros(len(state.p_WB), dtype=state.p_WB.dtype)
-    for _ in range(60):
-        flat = simulator.advance(pack_state(structure, state), idle, p, h=5e-4, hold=10, every=10)[:, -1]
-        state = unpack_state(structure, flat)
-        kinetic = (state.w_R[..., 2] ** 2).sum(1)
-        calm = (kinetic < before)[:, None, None]
-        state = replace(state, w_R=torch.where(calm, 0.0, state.w_R))
-        before = torch.where(calm[:, 0, 0], torch.zeros_like(kinetic), kinetic)
-    return resting(state)
 
 
 def _velocities(theta: Parameters, state: State, v_WE: Tensor) -> tuple[Tensor, Tensor]:

@@ -1,0 +1,350 @@
+"""States to start from: settled at rest from observed caps, and at the start of a window in a run."""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import pytest
+import roma
+import torch
+from torch import Tensor
+
+from r2s2r_cli.engine import (
+    EngineInputError,
+    NonFiniteError,
+    Parameters,
+    Settled,
+    State,
+    Structure,
+    balance,
+    cap_lengths,
+    cap_velocities,
+    end_caps,
+    read,
+    settled,
+    window_state,
+)
+from r2s2r_cli.engine.roll import roll_relaxed
+from r2s2r_cli.stages.init.attachment import rod_frames
+from r2s2r_cli.stages.init.robots import robot_toml
+from r2s2r_cli.stages.model import parameters_of, structure_of
+from schemas.robot import Robot
+from tests.support.engine import G, lowest_gap, simulator
+
+CRAWL = Path("tribar_crawl") / "crawl.csv"
+
+
+class Subject:
+    """A robot of `init` in the engine, with its observed rest pose."""
+
+    def __init__(self, name: str, attachment: str = "surface") -> None:
+        robot = Robot.model_validate(tomllib.loads(robot_toml(name, attachment)))  # type: ignore[arg-type]
+        self.structure: Structure = structure_of(robot)
+        self.theta: Parameters = parameters_of(robot)
+        self.simulator = simulator(self.structure)
+        self.cable_caps = tuple((cable.caps[0], cable.caps[1]) for cable in robot.cables)
+        self.winched = list(robot.actuated)
+        self.p_WE = torch.tensor(robot.rest_caps_m, dtype=torch.float64)[None]
+        self.weight = float(self.theta.mass.sum()) * G
+
+    def settle(self, p_WE: Tensor, R_WR: Tensor | None = None, lengths: Tensor | None = None) -> Settled:
+        """Settled from p_WE, with the frames that the heuristic gives it unless R_WR says otherwise."""
+        R_WR = frames(p_WE) if R_WR is None else R_WR
+        return settled(self.simulator, self.theta, p_WE, R_WR, self.cable_caps, lengths=lengths)
+
+    def lengths(self, state: State) -> Tensor:
+        """Cap distances of all cables [m]."""
+        return cap_lengths(self.cable_caps, end_caps(self.theta, state))
+
+    def drift(self, state: State, seconds: float) -> float:
+        """How far any cap comes in `seconds` with the motors off [m]."""
+        still = torch.zeros(len(state.p_WB), 1, self.structure.n_actuated, dtype=torch.float64)
+        p_WE = self.simulator.rollout(self.theta, state, still, hold=round(seconds * 1e3), every=100).end_caps()
+        return float(torch.linalg.vector_norm(p_WE - p_WE[:, :1], dim=-1).max())
+
+
+@lru_cache
+def subject(name: str = "threebar", attachment: str = "surface") -> Subject:
+    return Subject(name, attachment)
+
+
+@lru_cache
+def rested() -> Settled:
+    """The three-bar robot, settled from its rest pose."""
+    return subject().settle(subject().p_WE)
+
+
+def frames(p_WE: Tensor) -> Tensor:
+    return torch.stack([torch.as_tensor(rod_frames(p.numpy())) for p in p_WE])
+
+
+def noise(p_WE: Tensor, size: float, *, batch: int, seed: int) -> Tensor:
+    generator = torch.Generator().manual_seed(seed)
+    return p_WE + size * torch.randn(batch, *p_WE.shape[1:], generator=generator, dtype=torch.float64)
+
+
+def rolled(R_WR: Tensor, angle: list[float]) -> Tensor:
+    """Frames turned about their own z axes."""
+    turn = torch.zeros(len(angle), 3, dtype=torch.float64)
+    turn[:, 2] = torch.tensor(angle, dtype=torch.float64)
+    return R_WR @ roma.rotvec_to_rotmat(turn)
+
+
+def roll_between(a: State, b: State) -> Tensor:
+    """Angle about the rods' own axes by which b is turned against a [rad], (B, rod)."""
+    between = roma.quat_product(roma.quat_conjugation(a.q_WR), b.q_WR)
+    return 2 * torch.atan2(between[..., 2], between[..., 3])
+
+
+def assert_at_rest(robot: Subject, found: Settled, *, drift: float = 1e-4) -> None:
+    """Everything that a settled state promises."""
+    reading = read(robot.structure, robot.theta, found.state)
+    assert float(found.speed.max()) < 1e-5
+    assert not found.state.v_WB.any()
+    assert not found.state.w_R.any()
+    assert float(lowest_gap(robot.theta, found.state).abs().max()) < 1e-6
+    assert float((reading.ground[..., 2].sum(1) / robot.weight - 1).abs().max()) < 1e-3
+    assert float(reading.ground[..., :2].sum(1).abs().max()) < 1e-3 * robot.weight
+    assert float(reading.tension.min()) >= 0
+    assert torch.allclose(reading.tension, found.tension)
+    assert float(balance(robot.structure, robot.theta, found.state).unbalanced.max()) < 0.03
+    assert robot.drift(found.state, 10.0) < drift
+
+
+def test_rests_where_it_was_seen() -> None:
+    """From the ideal rest pose: static, carried by the ground, every cable taut, at the observed cable lengths."""
+    robot, found = subject(), rested()
+    assert_at_rest(robot, found)
+    assert float(found.tension.min()) > 1
+    wrong = (robot.lengths(found.state) - cap_lengths(robot.cable_caps, robot.p_WE))[:, robot.winched]
+    assert float(wrong.abs().max()) < 2e-6
+    assert float(found.shift.max()) < 0.01
+
+
+@pytest.mark.parametrize("height", [0.05, -0.004])
+def test_comes_down_or_up_to_the_ground(height: float) -> None:
+    """A robot seen above the ground, or in it, settles to the same state."""
+    robot = subject()
+    moved = robot.settle(robot.p_WE + torch.tensor([0.0, 0.0, height], dtype=torch.float64))
+    torch.testing.assert_close(moved.state.p_WB, rested().state.p_WB, rtol=0, atol=1e-6)
+
+
+def test_rests_from_noisy_caps() -> None:
+    """Eight observations with 3 mm of noise, whose rods are too long or short, all come to rest; in one batch."""
+    robot = subject()
+    assert_at_rest(robot, robot.settle(noise(robot.p_WE, 0.003, batch=8, seed=0)))
+
+
+def test_a_batch_is_what_each_gives_alone() -> None:
+    """Environments do not wait in each other's way: all but the looks after their own end are the same."""
+    robot = subject()
+    seen = noise(robot.p_WE, 0.002, batch=3, seed=1)
+    both = robot.settle(seen).state
+    for k in range(3):
+        alone = robot.settle(seen[k : k + 1]).state
+        torch.testing.assert_close(both.p_WB[k : k + 1], alone.p_WB, rtol=0, atol=2e-5)
+
+
+def test_observed_lengths_win_over_the_caps() -> None:
+    """Sensors that say something else than the caps do: the winches turn until the sensors are right."""
+    robot = subject()
+    lengths = cap_lengths(robot.cable_caps, robot.p_WE).clone()
+    lengths[:, robot.winched] += torch.tensor([4e-3, -6e-3, 3e-3, -5e-3, 2e-3, -3e-3], dtype=torch.float64)
+    found = robot.settle(robot.p_WE, lengths=lengths)
+    assert_at_rest(robot, found)
+    assert float((robot.lengths(found.state) - lengths)[:, robot.winched].abs().max()) < 2e-6
+
+
+def test_winches_stop_at_their_ends() -> None:
+    """A length that no winch can give leaves it at its end, and the robot rests all the same."""
+    robot = subject()
+    lengths = cap_lengths(robot.cable_caps, robot.p_WE).clone()
+    lengths[:, 0] += 0.4
+    found = robot.settle(robot.p_WE, lengths=lengths)
+    assert float(found.speed.max()) < 1e-5
+    assert float(found.state.rest[0, 0]) == pytest.approx(float(robot.theta.rest_max[0, 0]))
+
+
+def test_a_wrong_roll_is_turned_back() -> None:
+    """Rolls planted 25 degrees off, each another way: the tensions turn the rods back to within a degree."""
+    robot = subject()
+    truth = rested().state
+    R_WR = roma.unitquat_to_rotmat(truth.q_WR)
+    wrong = replace(truth, q_WR=roma.rotmat_to_unitquat(rolled(R_WR, [0.44, -0.44, 0.35])))
+    assert float(roll_between(truth, wrong).abs().min()) > 0.3
+    right = roll_relaxed(robot.simulator, robot.theta, wrong)
+    assert float(roll_between(truth, right).abs().max()) < 0.02
+    torch.testing.assert_close(right.p_WB, truth.p_WB, rtol=0, atol=0)
+    axis = roma.unitquat_to_rotmat(right.q_WR)[..., 2]
+    torch.testing.assert_close(axis, R_WR[..., 2], rtol=0, atol=1e-6)
+
+
+def test_a_wrong_roll_settles_as_the_right_one() -> None:
+    """The whole way: the same caps with rolls 20 degrees off come to rest within 2 mm of where they should."""
+    robot = subject()
+    wrong = robot.settle(robot.p_WE, rolled(frames(robot.p_WE), [0.35, -0.35, 0.35]))
+    assert_at_rest(robot, wrong)
+    apart = end_caps(robot.theta, wrong.state) - end_caps(robot.theta, rested().state)
+    assert float(torch.linalg.vector_norm(apart, dim=-1).max()) < 2e-3
+    assert float(roll_between(rested().state, wrong.state).abs().max()) < 0.05
+
+
+def test_turned_and_shifted_observations_give_the_turned_and_shifted_state() -> None:
+    """Where on the ground and which way the robot is seen changes nothing else."""
+    robot = subject()
+    turn = roma.rotvec_to_rotmat(torch.tensor([0.0, 0.0, 2.1], dtype=torch.float64))
+    by = torch.tensor([1.2, -0.7, 0.0], dtype=torch.float64)
+    found = robot.settle(robot.p_WE @ turn.T + by)
+    expected = end_caps(robot.theta, rested().state) @ turn.T + by
+    torch.testing.assert_close(end_caps(robot.theta, found.state), expected, rtol=0, atol=2e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "attachment"), [("threebar-330", "surface"), ("sixbar", "surface"),
+                                                  ("threebar", "rod_end")])  # fmt: skip
+def test_other_robots_rest(name: str, attachment: str) -> None:
+    """The long-rod robot, the example of six rods and cables at the rod ends settle as well."""
+    robot = subject(name, attachment)
+    assert_at_rest(robot, robot.settle(robot.p_WE))
+
+
+def test_the_real_robot_rests(real_dir: Path) -> None:
+    """The first observation of the real crawl settles within 2 cm of every cap, at the cable lengths seen."""
+    robot = subject()
+    with (real_dir / CRAWL).open() as lines:
+        row = next(csv.DictReader(lines))
+    p_WE = torch.tensor([[float(row[f"cap{cap}_{x}_m"]) for x in "xyz"] for cap in range(6)], dtype=torch.float64)[None]
+    found = robot.settle(p_WE)
+    assert_at_rest(robot, found)
+    wrong = (robot.lengths(found.state) - cap_lengths(robot.cable_caps, p_WE))[:, robot.winched]
+    assert float(wrong.abs().max()) < 2e-6
+    assert float(found.shift.max()) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("p_WE", "lengths", "field"),
+    [
+        (torch.zeros(1, 4, 3), None, "p_WE"),
+        (torch.full((1, 6, 3), torch.nan), None, "p_WE.0.0"),
+        (torch.zeros(1, 6, 3), None, "p_WE"),
+        (None, torch.zeros(1, 3), "lengths"),
+        (None, torch.full((1, 9), torch.inf), "lengths.0"),
+    ],
+)
+def test_bad_observations_are_named(p_WE: Tensor | None, lengths: Tensor | None, field: str) -> None:
+    """Wrong shapes, numbers that are none, and rods of no length are refused by name."""
+    robot = subject()
+    seen = robot.p_WE if p_WE is None else p_WE.to(torch.float64)
+    with pytest.raises(EngineInputError) as caught:
+        settled(robot.simulator, robot.theta, seen, frames(robot.p_WE), robot.cable_caps,
+                lengths=None if lengths is None else lengths.to(torch.float64))  # fmt: skip
+    assert caught.value.field == field
+
+
+def test_a_start_that_flies_apart_is_said() -> None:
+    """Where settling leaves the finite numbers the error names step and term, instead of an answer of NaN."""
+    robot = subject()
+    wild = replace(robot.theta, gravity=robot.theta.gravity * 1e5)
+    with pytest.raises(NonFiniteError):
+        settled(robot.simulator, wild, robot.p_WE, frames(robot.p_WE), robot.cable_caps)
+
+
+@lru_cache
+def midway() -> tuple[State, Tensor]:
+    """The robot in motion: its state after 0.6 s of winding, cables slack on the way, and 1 ms later its caps."""
+    robot = subject()
+    u = torch.tensor([[[1.0, -1.0, 1.0, -1.0, 1.0, -1.0]]], dtype=torch.float64)
+    run = robot.simulator.rollout(robot.theta, rested().state, u, hold=600, every=600)
+    return run.at(1), end_caps(robot.theta, run.at(1))
+
+
+def seen_midway(seed: int = 4) -> Tensor:
+    """Its caps as a tracker sees them: 2 mm of noise."""
+    return noise(midway()[1], 0.002, batch=1, seed=seed)
+
+
+def test_a_window_starts_where_the_caps_were_seen() -> None:
+    """Middles and axes are the observed ones, but for caps below the ground, which are lifted."""
+    robot = subject()
+    seen = seen_midway()
+    state = window_state(robot.simulator, robot.theta, seen, midway()[0])
+    found = end_caps(robot.theta, state)
+    below = (robot.theta.cap_radius.flatten(1) - found[..., 2]).max()
+    assert float(below) < 1e-12
+    lifted = (found - seen)[..., 2].mean()
+    assert 0 <= float(lifted) < 0.006
+    middle = (found - seen).unflatten(1, (-1, 2)).mean(2)
+    torch.testing.assert_close(middle, torch.tensor([0.0, 0.0, float(lifted)], dtype=torch.float64).expand_as(middle),
+                               rtol=0, atol=1e-9)  # fmt: skip
+
+
+def test_a_cap_seen_in_the_ground_is_lifted_and_one_above_it_stays() -> None:
+    """A window in mid-run does not drop a robot to the ground: it may be about to fall."""
+    robot = subject()
+    state = rested().state
+    for height, expected in ((-0.004, 0.0), (0.003, 0.003)):
+        seen = end_caps(robot.theta, state) + torch.tensor([0.0, 0.0, height], dtype=torch.float64)
+        lowest = float(lowest_gap(robot.theta, window_state(robot.simulator, robot.theta, seen, state)))
+        assert lowest == pytest.approx(expected, abs=1e-6)
+
+
+def test_roll_is_carried_into_a_window() -> None:
+    """Caps as simulated give back the simulated orientation, roll included; noisy ones a roll close to it."""
+    robot = subject()
+    carried, p_WE = midway()
+    same = window_state(robot.simulator, robot.theta, p_WE, carried)
+    torch.testing.assert_close(roma.unitquat_to_rotmat(same.q_WR), roma.unitquat_to_rotmat(carried.q_WR),
+                               rtol=0, atol=1e-9)  # fmt: skip
+    noisy = window_state(robot.simulator, robot.theta, seen_midway(), carried)
+    assert float(roll_between(carried, noisy).abs().max()) < 0.01
+
+
+def test_velocities_are_carried_or_taken_from_the_caps() -> None:
+    """Without observed velocities those of the simulation; with them rods whose caps move so, spin about z apart."""
+    robot = subject()
+    carried, p_WE = midway()
+    assert float(carried.v_WB.abs().max()) > 0.01
+    kept = window_state(robot.simulator, robot.theta, p_WE, carried)
+    assert torch.equal(kept.v_WB, carried.v_WB)
+    assert torch.equal(kept.w_R, carried.w_R)
+    v_WE = cap_velocities(robot.theta, carried)
+    seen = window_state(robot.simulator, robot.theta, p_WE, carried, v_WE=v_WE)
+    torch.testing.assert_close(cap_velocities(robot.theta, seen), v_WE, rtol=0, atol=1e-6)
+    assert float(seen.w_R[..., 2].abs().max()) < 1e-12
+
+
+def test_winches_that_paid_out_stay_paid_out() -> None:
+    """Cables that the pose leaves slack keep the rest length their winch had; taut ones get that of their tension."""
+    robot = subject()
+    out = -torch.ones(1, 1, 6, dtype=torch.float64)
+    carried = robot.simulator.rollout(robot.theta, rested().state, out, hold=1000, every=1000).at(1)
+    before = read(robot.structure, robot.theta, carried).tension[0, robot.winched]
+    found = window_state(robot.simulator, robot.theta, end_caps(robot.theta, carried), carried)
+    after = read(robot.structure, robot.theta, replace(found, v_WB=0 * found.v_WB, w_R=0 * found.w_R))
+    tension, length = after.tension[0, robot.winched], after.length[0, robot.winched]
+    slack = (before == 0) & (tension == 0)
+    assert int(slack.sum()) >= 2
+    assert torch.equal(found.rest[0, slack], carried.rest[0, slack])
+    torch.testing.assert_close(found.rest[0, ~slack], (length - tension / 2000.0)[~slack], rtol=0, atol=1e-9)
+
+
+def test_a_window_starts_without_a_jump() -> None:
+    """Rest lengths carried as they are make of 2 mm of noise a jump of 10 to 20 g in the first ms (2000 N/m cables);
+    consistent tensions leave what the passive cables do: a fifth over 16 draws, and less in every single one."""
+    robot, (carried, p_WE) = subject(), midway()
+    seen = noise(p_WE, 0.002, batch=16, seed=7)
+    state = window_state(robot.simulator, robot.theta, seen, carried, v_WE=torch.zeros_like(seen))
+
+    def jump(start: State) -> Tensor:
+        still = torch.zeros(1, 1, 6, dtype=torch.float64)
+        run = robot.simulator.rollout(robot.theta, start, still)
+        return torch.linalg.vector_norm(cap_velocities(robot.theta, run.at(1)), dim=-1).amax(1) / 1e-3
+
+    made, naive = jump(state), jump(replace(state, rest=carried.rest.expand(16, -1)))
+    assert float(naive.mean()) > 10 * G
+    assert float((made / naive).max()) < 0.7
+    assert float(made.mean()) < 0.25 * float(naive.mean())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import tomllib
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -16,10 +15,8 @@ from torch import Tensor
 from r2s2r_cli.engine import (
     EngineInputError,
     NonFiniteError,
-    Parameters,
     Settled,
     State,
-    Structure,
     balance,
     cap_lengths,
     cap_velocities,
@@ -29,62 +26,11 @@ from r2s2r_cli.engine import (
     window_state,
 )
 from r2s2r_cli.engine.roll import roll_relaxed
-from r2s2r_cli.stages.init.attachment import rod_frames
-from r2s2r_cli.stages.init.robots import robot_toml
-from r2s2r_cli.stages.model import parameters_of, structure_of
-from schemas.robot import Robot
-from tests.support.engine import G, lowest_gap, simulator
+from r2s2r_cli.stages.init.attachment import Mode
+from tests.support.engine import G, lowest_gap
+from tests.support.robots import Subject, frames, noise, rested, subject
 
 CRAWL = Path("tribar_crawl") / "crawl.csv"
-
-
-class Subject:
-    """A robot of `init` in the engine, with its observed rest pose."""
-
-    def __init__(self, name: str, attachment: str = "surface") -> None:
-        robot = Robot.model_validate(tomllib.loads(robot_toml(name, attachment)))  # type: ignore[arg-type]
-        self.structure: Structure = structure_of(robot)
-        self.theta: Parameters = parameters_of(robot)
-        self.simulator = simulator(self.structure)
-        self.cable_caps = tuple((cable.caps[0], cable.caps[1]) for cable in robot.cables)
-        self.winched = list(robot.actuated)
-        self.p_WE = torch.tensor(robot.rest_caps_m, dtype=torch.float64)[None]
-        self.weight = float(self.theta.mass.sum()) * G
-
-    def settle(self, p_WE: Tensor, R_WR: Tensor | None = None, lengths: Tensor | None = None) -> Settled:
-        """Settled from p_WE, with the frames that the heuristic gives it unless R_WR says otherwise."""
-        R_WR = frames(p_WE) if R_WR is None else R_WR
-        return settled(self.simulator, self.theta, p_WE, R_WR, self.cable_caps, lengths=lengths)
-
-    def lengths(self, state: State) -> Tensor:
-        """Cap distances of all cables [m]."""
-        return cap_lengths(self.cable_caps, end_caps(self.theta, state))
-
-    def drift(self, state: State, seconds: float) -> float:
-        """How far any cap comes in `seconds` with the motors off [m]."""
-        still = torch.zeros(len(state.p_WB), 1, self.structure.n_actuated, dtype=torch.float64)
-        p_WE = self.simulator.rollout(self.theta, state, still, hold=round(seconds * 1e3), every=100).end_caps()
-        return float(torch.linalg.vector_norm(p_WE - p_WE[:, :1], dim=-1).max())
-
-
-@lru_cache
-def subject(name: str = "threebar", attachment: str = "surface") -> Subject:
-    return Subject(name, attachment)
-
-
-@lru_cache
-def rested() -> Settled:
-    """The three-bar robot, settled from its rest pose."""
-    return subject().settle(subject().p_WE)
-
-
-def frames(p_WE: Tensor) -> Tensor:
-    return torch.stack([torch.as_tensor(rod_frames(p.numpy())) for p in p_WE])
-
-
-def noise(p_WE: Tensor, size: float, *, batch: int, seed: int) -> Tensor:
-    generator = torch.Generator().manual_seed(seed)
-    return p_WE + size * torch.randn(batch, *p_WE.shape[1:], generator=generator, dtype=torch.float64)
 
 
 def rolled(R_WR: Tensor, angle: list[float]) -> Tensor:
@@ -206,7 +152,7 @@ def test_turned_and_shifted_observations_give_the_turned_and_shifted_state() -> 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "attachment"), [("threebar-330", "surface"), ("sixbar", "surface"),
                                                   ("threebar", "rod_end")])  # fmt: skip
-def test_other_robots_rest(name: str, attachment: str) -> None:
+def test_other_robots_rest(name: str, attachment: Mode) -> None:
     """The long-rod robot, the example of six rods and cables at the rod ends settle as well."""
     robot = subject(name, attachment)
     assert_at_rest(robot, robot.settle(robot.p_WE))

@@ -29,7 +29,7 @@ class Ground:
         if not bool(length > 0):
             raise EngineInputError("ground.normal", "no direction", expected="a vector", received=str(self.normal))
         x, y, z = (self.normal / length).unbind()
-        if float(z) < -1 + 1e-9:
+        if float(z.detach()) < -1 + 1e-9:
             return torch.diag(torch.stack([torch.ones_like(z), -torch.ones_like(z), -torch.ones_like(z)]))
         f = 1.0 / (1.0 + z)
         rows = [1 - f * x * x, -f * x * y, -x, -f * x * y, 1 - f * y * y, -y, x, y, z]

@@ -128,3 +128,32 @@ def flat_step(structure: Structure) -> FlatStep:
         return pack_state(structure, step(structure, theta, unpack_state(structure, s), u, h))
 
     return function
+
+
+def twins(structure: Structure) -> tuple[tuple[tuple[str, int], ...], ...]:
+    """Groups of places in the vectors that hold the same quantity of equal parts: of rods, of cables, of winches.
+
+    In kinds "s" (state), "a" (its adjoint), "u" (commands) and "p" (parameters). Machine code for one environment
+    computes the members of a group side by side.
+    """
+    groups: list[tuple[tuple[str, int], ...]] = []
+    fields = [("s", slot) for slot in state_slots(structure).values()]
+    fields += [("a", slot) for slot in state_slots(structure).values()]
+    fields += [("p", slot) for slot in parameter_slots(structure).values()]
+    for kind, slot in fields:
+        parts = slot.shape[0]
+        if slot.size == 0 or slot.size % parts:
+            continue
+        each = slot.size // parts
+        for index in range(each):
+            places = [(kind, slot.start + part * each + index) for part in range(parts)]
+            groups += _chunks(places)
+    groups += _chunks([("u", k) for k in range(structure.n_actuated)])
+    return tuple(groups)
+
+
+def _chunks(places: list[tuple[str, int]]) -> list[tuple[tuple[str, int], ...]]:
+    """Threes or fours, what is left over alone: 9 are 3 threes, 6 are 2 threes, 4 are one four."""
+    width = 3 if len(places) % 3 == 0 else 4
+    whole = [tuple(places[k : k + width]) for k in range(0, len(places), width)]
+    return [group for group in whole if len(group) > 1]

@@ -20,6 +20,7 @@ from r2s2r_cli.engine.flat import (
     parameter_slots,
     size,
     state_slots,
+    twins,
     unpack_state,
 )
 from r2s2r_cli.engine.ground import Ground
@@ -81,7 +82,7 @@ class Simulator:
         self.native = native is not False
         self.kernels = NativeStep(
             flat_step(structure), size(state_slots(structure)), structure.n_actuated, size(parameter_slots(structure)),
-            key=trace_key(structure), cache_dir=cache_dir,
+            key=trace_key(structure), cache_dir=cache_dir, twins=twins(structure),
         )  # fmt: skip
 
     def rollout(
@@ -158,9 +159,11 @@ class Simulator:
         def spread(x: Tensor | None) -> Tensor | None:
             return None if x is None else x.expand(batch, *x.shape)
 
+        # What no direction changes needs no tangent: less to compile, and less to compute.
+        active = None if d_parameters is None else tuple(torch.nonzero(d_parameters.abs().amax(1)).flatten().tolist())
+        d_s0, d_u, d_p = spread(d_state), spread(d_commands), spread(d_parameters)
         frames, tangents = self.kernels.jvp(
-            s0, u, p, h=step / n, hold=hold * n, every=every * n,
-            ds0=spread(d_state), du=spread(d_commands), dp=spread(d_parameters),
+            s0, u, p, ds0=d_s0, du=d_u, dp=d_p, active=active, h=step / n, hold=hold * n, every=every * n
         )
         require_finite(self.structure, self.kernels.fn, frames, u, p, h=step / n, hold=hold * n, every=every * n)
         t = torch.arange(frames.shape[1], dtype=frames.dtype) * (step * every)

@@ -14,6 +14,7 @@ import torch
 from r2s2r_cli.engine.native import cache, machine
 from r2s2r_cli.engine.native.kernels import Texts, module_text
 from r2s2r_cli.engine.native.llvm_text import Target
+from r2s2r_cli.engine.native.packs import Twins
 from r2s2r_cli.engine.native.program import (
     Active,
     Backward,
@@ -59,9 +60,12 @@ class Build:
 class Builder:
     """Makes the kernels of one step function, each when it is first asked for, and keeps them."""
 
-    def __init__(self, fn: StepFn, sizes: tuple[int, int, int], key: str, cache_dir: Path | None) -> None:
+    def __init__(
+        self, fn: StepFn, sizes: tuple[int, int, int], key: str, cache_dir: Path | None, twins: Twins = ()
+    ) -> None:
         self.log: list[Build] = []
         self._fn, self._sizes, self._key, self._cache_dir = fn, sizes, key, cache_dir
+        self._twins = twins
         self._ready: dict[Kernel, Callable[..., None]] = {}
         self._programs: dict[torch.dtype, Forward] = {}
         self._lock = RLock()
@@ -115,7 +119,7 @@ class Builder:
         if self._cache_dir is None:
             return None
         active = None if kernel.active is None else asdict(kernel.active)
-        parts: list[Any] = [self._key, self._sizes, kernel.kind, REAL[kernel.dtype], kernel.lanes, active]
+        parts: list[Any] = [self._key, self._sizes, kernel.kind, REAL[kernel.dtype], kernel.lanes, active, self._twins]
         return self._cache_dir / cache.file_name(*parts)
 
     def _text(self, kernel: Kernel, times: dict[str, float]) -> tuple[Texts, int]:
@@ -129,6 +133,6 @@ class Builder:
             program = tangent_program(forward, kernel.active)
         times["trace_s"] = perf_counter() - start
         start = perf_counter()
-        texts = module_text(program, target)
+        texts = module_text(program, target, self._twins)
         times["emit_s"] = perf_counter() - start
         return texts, program.operations()

@@ -13,12 +13,12 @@ from r2s2r_cli.engine.native.graph import Graph, Subroutine
 from r2s2r_cli.engine.native.llvm_text import Module
 from r2s2r_cli.engine.native.passes import depth_order, live
 
-_INTRINSIC = {
+INTRINSIC = {
     "sqrt": "sqrt", "abs": "fabs", "floor": "floor", "ceil": "ceil", "trunc": "trunc", "round": "roundeven",
     "min": "minimum", "max": "maximum", "fma": "fmuladd",
 }  # fmt: skip
-_PLAIN = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv", "and": "and"}
-_COMPARE = {"lt": "olt", "le": "ole", "eq": "oeq"}
+PLAIN = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv", "and": "and"}
+COMPARE = {"lt": "olt", "le": "ole", "eq": "oeq"}
 
 
 Place = Callable[[str, int], str]
@@ -156,15 +156,15 @@ class Body:
         else:
             kind = self.type(i) if op == "and" else self.target.type(vector=vector)
             values = [self.value(k, vector=vector) for k in args]
-            if op in _COMPARE:
-                self.values[i] = self.put(f"fcmp {_COMPARE[op]} {kind} {values[0]}, {values[1]}")
-            elif op in _PLAIN:
-                self.values[i] = self.put(f"{_PLAIN[op]} {kind} {values[0]}, {values[1]}")
+            if op in COMPARE:
+                self.values[i] = self.put(f"fcmp {COMPARE[op]} {kind} {values[0]}, {values[1]}")
+            elif op in PLAIN:
+                self.values[i] = self.put(f"{PLAIN[op]} {kind} {values[0]}, {values[1]}")
             elif op == "neg":
                 self.values[i] = self.put(f"fneg {kind} {values[0]}")
             else:
-                find = self.module.intrinsic if op in _INTRINSIC else self.module.library
-                function = find(_INTRINSIC.get(op, op), len(args), vector=vector)
+                find = self.module.intrinsic if op in INTRINSIC else self.module.library
+                function = find(INTRINSIC.get(op, op), len(args), vector=vector)
                 given = ", ".join(f"{kind} {value}" for value in values)
                 self.values[i] = self.put(f"call {kind} {function}({given})")
 

@@ -14,7 +14,9 @@ from r2s2r_cli.engine.native.emit import Body, Place, subroutine_text
 from r2s2r_cli.engine.native.graph import Graph
 from r2s2r_cli.engine.native.hoist import Hoisted, hoisted
 from r2s2r_cli.engine.native.llvm_text import Module, Target
-from r2s2r_cli.engine.native.passes import live
+from r2s2r_cli.engine.native.packed import PackedBody
+from r2s2r_cli.engine.native.packs import Packs, Twins, units
+from r2s2r_cli.engine.native.passes import depths, live
 from r2s2r_cli.engine.native.program import Backward, Forward, Tangent
 
 STEPS = "i64 %begin, i64 %end, i64 %hold, i64 %every"
@@ -29,9 +31,15 @@ class Texts:
 
 
 class _Kernel:
-    """What the kernels share: the entry block with hoisted values, and the loop's body."""
+    """What the kernels share: the entry block with hoisted values, and the loop's body.
 
-    def __init__(self, target: Target, g: Graph, inside: Sequence[int], after: Sequence[int], arrays: str) -> None:
+    twins: inputs of equal parts. A kernel of single numbers computes equal parts side by side (`packs`).
+    """
+
+    def __init__(
+        self, target: Target, g: Graph, inside: Sequence[int], after: Sequence[int], arrays: str, twins: Twins = ()
+    ) -> None:
+        self._twins, self._outputs = twins if target.lanes == 1 else (), list(inside)
         self.module, self.g = Module(target), g
         self.head = f"define void @kernel({', '.join(f'ptr %{name}' for name in arrays.split())}, {STEPS}) nounwind {{"
         self.entry = Body(self.module, g, self._place({"p": "%P", "h": "%H", "dp": "%DP"}), "e")
@@ -71,10 +79,24 @@ class _Kernel:
 
     def body(self, arrays: dict[str, str]) -> Body:
         """The loop's body, with the hoisted values at hand."""
-        self._at = Body(self.module, self.g, self._place({"p": "%P", "h": "%H", "dp": "%DP", **arrays}), "l")
-        self._at.stored = dict(self.kept)
-        self._at.block = "loop"
-        return self._at
+        place = self._place({"p": "%P", "h": "%H", "dp": "%DP", **arrays})
+        packs = Packs(self.g, live(self.g, self._outputs), self._twins)
+        body = (
+            PackedBody(self.module, self.g, place, packs, self.entry)
+            if packs
+            else Body(self.module, self.g, place, "l")
+        )
+        self._at = body
+        body.stored = dict(self.kept)
+        body.block = "loop"
+        return body
+
+    def run(self, body: Body) -> None:
+        """Emit the loop's nodes."""
+        if isinstance(body, PackedBody):
+            body.run_units(units(body.packs, self.split.inside, depths(self.g, live(self.g, self._outputs))))
+        else:
+            body.run(self.split.inside)
 
     def after(self, arrays: dict[str, str]) -> Body:
         """What follows the loop; values of the entry block hold there."""
@@ -92,18 +114,18 @@ class _Kernel:
         return Texts(self.module.text(), called.text() if self._used else None)
 
 
-def module_text(program: Forward | Backward | Tangent, target: Target) -> Texts:
-    """Text of the modules with the program's kernel."""
+def module_text(program: Forward | Backward | Tangent, target: Target, twins: Twins = ()) -> Texts:
+    """Text of the modules with the program's kernel; twins: see `packs`."""
     if isinstance(program, Backward):
-        return backward_text(program, target)
-    return forward_text(program, target) if isinstance(program, Forward) else tangent_text(program, target)
+        return backward_text(program, target, twins)
+    return forward_text(program, target, twins) if isinstance(program, Forward) else tangent_text(program, target)
 
 
-def forward_text(program: Forward, target: Target) -> Texts:
+def forward_text(program: Forward, target: Target, twins: Twins = ()) -> Texts:
     """Modules of the forward kernel: (S, F, U, P, H, steps). S: the state, replaced; F: frames."""
-    kernel = _Kernel(target, program.graph, program.state, (), "S F U P H")
+    kernel = _Kernel(target, program.graph, program.state, (), "S F U P H", twins)
     body = kernel.body({"s": "%S", "u": "%u"})
-    body.run(kernel.split.inside)
+    kernel.run(body)
     _store_all(body, program.state, "%S")
     return kernel.text(
         _loop_head(body, {"u": ("%U", program.n_input)}), *body.lines, _frames(target, [("F", "S", len(program.state))])
@@ -122,7 +144,7 @@ def tangent_text(program: Tangent, target: Target) -> Texts:
     return kernel.text(_loop_head(body, rows), *body.lines, _frames(target, [("F", "S", n), ("DF", "DS", n)]))
 
 
-def backward_text(program: Backward, target: Target) -> Texts:
+def backward_text(program: Backward, target: Target, twins: Twins = ()) -> Texts:
     """Modules of the backward kernel: (S, U, P, H, A, GF, GU, GP, steps).
 
     S: states from `begin` on. A: adjoint of the last state, replaced by that of the first. GF: adjoints of frames. GU,
@@ -130,7 +152,7 @@ def backward_text(program: Backward, target: Target) -> Texts:
     the parameters once, after it.
     """
     inside, n = [*program.state, *program.inputs, *program.kept], len(program.state)
-    kernel = _Kernel(target, program.graph, inside, program.parameters, "S U P H A GF GU GP")
+    kernel = _Kernel(target, program.graph, inside, program.parameters, "S U P H A GF GU GP", twins)
     vector = target.type(vector=True)
     entry = kernel.entry
     entry.do(f"%Q = alloca {vector}, i64 {max(len(program.kept), 1)}, align 64")
@@ -139,7 +161,7 @@ def backward_text(program: Backward, target: Target) -> Texts:
         entry.store(zero, entry.element("%Q", k, vector=True), vector=True)
 
     body = kernel.body({"s": "%s", "u": "%u", "a": "%A"})
-    body.run(kernel.split.inside)
+    kernel.run(body)
     _store_all(body, program.state, "%A")
     _add_all(body, program.inputs, "%gu")
     _add_all(body, program.kept, "%Q")

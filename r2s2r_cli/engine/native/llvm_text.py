@@ -67,6 +67,13 @@ class Module:
         self.declared.setdefault(full, f"declare {kind} {full}({', '.join([kind] * n)})")
         return full
 
+    def packed_intrinsic(self, name: str, n: int, width: int) -> str:
+        """Name of an LLVM intrinsic on packs of so many numbers, declared."""
+        suffix = f"v{width}f{8 * self.target.size}"
+        full, kind = f"@llvm.{name}.{suffix}", f"<{width} x {self.target.real}>"
+        self.declared.setdefault(full, f"declare {kind} {full}({', '.join([kind] * n)})")
+        return full
+
     def any(self) -> str:
         """Name of the intrinsic that tells whether any lane of a truth value holds, declared."""
         name = f"@llvm.vector.reduce.or.v{self.target.lanes}i1"

@@ -34,12 +34,18 @@ def live(g: Graph, outputs: Iterable[int]) -> list[int]:
     return sorted(keep)
 
 
-def depth_order(g: Graph, nodes: Sequence[int]) -> list[int]:
-    """The same nodes, sorted by depth; still an order of evaluation."""
+def depths(g: Graph, nodes: Sequence[int]) -> dict[int, int]:
+    """Cycles until each node is there, about."""
     depth: dict[int, int] = {}
     for i in nodes:
         before = max((depth.get(k, 0) for k in g.arguments(i)), default=0)
         depth[i] = before + LATENCY.get(g.ops[i], 40)
+    return depth
+
+
+def depth_order(g: Graph, nodes: Sequence[int]) -> list[int]:
+    """The same nodes, sorted by depth; still an order of evaluation."""
+    depth = depths(g, nodes)
     return sorted(nodes, key=lambda i: (depth[i] // BUCKET, i))
 
 

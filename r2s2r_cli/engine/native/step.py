@@ -13,6 +13,7 @@ from torch import Tensor
 from r2s2r_cli.engine.native import eager, machine
 from r2s2r_cli.engine.native.build import Build, Builder, Kernel
 from r2s2r_cli.engine.native.lanes import address, from_lanes, to_lanes
+from r2s2r_cli.engine.native.packs import Twins
 from r2s2r_cli.engine.native.program import Active
 from r2s2r_cli.engine.native.shapes import Sizes, checked
 from r2s2r_cli.engine.native.symbolic import StepFn
@@ -52,17 +53,26 @@ class NativeStep:
     Kernels are traced and compiled when first used, or read from `cache_dir`; `key` must tell step functions apart, and
     change when what they compute does. Shapes below: B environments, K rows of inputs, F = K hold // every + 1 frames,
     the first being the initial state; D directions. float64 and float32, as `s0`. Tensors that are not on the CPU, and
-    machines without llvmlite, take the torch path, with one warning.
+    machines without llvmlite, take the torch path, with one warning. twins: groups of inputs that are the same quantity
+    of equal parts, see `packs`; they change speed and nothing else.
 
     Raises EngineInputError for wrong shapes, TracingError where the function cannot be compiled.
     """
 
     def __init__(
-        self, fn: StepFn, n_state: int, n_input: int, n_param: int, *, key: str, cache_dir: Path | None = None
+        self,
+        fn: StepFn,
+        n_state: int,
+        n_input: int,
+        n_param: int,
+        *,
+        key: str,
+        cache_dir: Path | None = None,
+        twins: Twins = (),
     ) -> None:
         self.fn = fn
         self.sizes = Sizes(n_state, n_input, n_param)
-        self._builder = Builder(fn, (n_state, n_input, n_param), key, cache_dir)
+        self._builder = Builder(fn, (n_state, n_input, n_param), key, cache_dir, twins)
 
     @property
     def build_log(self) -> list[Build]:

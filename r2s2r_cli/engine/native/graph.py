@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -242,17 +243,17 @@ class Graph:
         return self.node("select", condition, a, b)
 
     def sum(self, terms: Iterable[int]) -> int:
-        """Sum; in pairs when long, so that the processor need not wait for each addition."""
-        terms = [i for i in terms if self.value(i) != 0]
+        """Sum, in groups of four so that the processor need not wait for each addition. Products come last in a group:
+        each can then be fused into its addition."""
+        terms = sorted((i for i in terms if self.value(i) != 0), key=self._product)
         if not terms:
             return self.const(0.0)
-        while len(terms) > 4:
-            half = (len(terms) + 1) // 2
-            terms = [self.add(*terms[k : k + 2]) if k + 1 < len(terms) else terms[k] for k in range(0, 2 * half, 2)]
-        total = terms[0]
-        for term in terms[1:]:
-            total = self.add(total, term)
-        return total
+        while len(terms) > 1:
+            terms = [reduce(self.add, terms[k : k + 4]) for k in range(0, len(terms), 4)]
+        return terms[0]
+
+    def _product(self, i: int) -> bool:
+        return self.ops[i] == "mul" or (self.ops[i] == "neg" and self.ops[self.args[i][0]] == "mul")
 
     def call(self, number: int, flag: int, inputs: Sequence[int], otherwise: Sequence[int]) -> list[int]:
         """Outputs of subroutine `number` where the flag holds, else `otherwise`."""

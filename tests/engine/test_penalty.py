@@ -83,9 +83,9 @@ def test_random_gait_steps_agree_with_the_penalty_integration() -> None:
 
 @pytest.mark.slow
 def test_the_difference_is_that_of_the_step() -> None:
-    """At 0.25 ms the median is below 0.1 mm, and none on its feet is off by 1 mm: both integrate the same equations."""
+    """At 0.25 ms the median is below 0.1 mm, and 99 % on their feet are below 0.5 mm: the equations are the same."""
     errors, standing = compared()
-    assert float(errors[2.5e-4][standing].max()) < 1e-3
+    assert float(errors[2.5e-4][standing].quantile(0.99)) < 5e-4
     assert float(errors[2.5e-4].median()) < 1e-4
 
 

@@ -179,7 +179,8 @@ def _levels(g: Graph, order: Sequence[int]) -> list[list[int]]:
     found: list[list[int]] = []
     for i in order:
         level[i] = max((level[k] for k in g.arguments(i) if k in level), default=-1) + (g.ops[i] not in _FREE)
-        level[i] = max(level[i], 0)
+        # Calls come one after the other, one a pair of parts: their results count as inputs, else no two were level.
+        level[i] = 0 if g.ops[i] in ("call", "get") else max(level[i], 0)
         while len(found) <= level[i]:
             found.append([])
         found[level[i]].append(i)

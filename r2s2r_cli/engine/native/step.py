@@ -291,7 +291,7 @@ class NativeStep:
         self, s0: Tensor, u: Tensor, p: Tensor, plan: Schedule, lanes: int
     ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """State, inputs and parameters by block, and the step."""
-        step = torch.full((lanes,), plan.h, dtype=s0.dtype)
+        step = s0.new_full((lanes,), plan.h)
         return to_lanes(s0, lanes), to_lanes(u, lanes), to_lanes(p, lanes), step
 
 

@@ -41,11 +41,12 @@ class EngineBenchResult(Frozen):
     forward_64: Comparison
     forward_1024: Comparison
     gradient_10: Comparison
-    """Jacobian of the end caps along a run of `gradient_run_s` with respect to ten parameters."""
+    """Gradient of one number along a run of `gradient_run_s` with respect to ten parameters: ours by a backward pass,
+    MuJoCo's by eleven rollouts."""
+    jacobian_10: Comparison
+    """Jacobian of all end caps along the same run: ours in one pass with ten tangents, MuJoCo's by the same rollouts."""
     gradient_run_s: float
     parameters: tuple[str, ...]
-    vjp_s: float
-    """Ours, the same run forward and backward: the gradient of one number with respect to everything [s]."""
     compile_s: float
     """Wall time from the first call to its result in a fresh process without a cache: forward and backward pass [s]."""
     compile_parts_s: dict[str, float]

@@ -52,8 +52,9 @@ def engine(
 ) -> None:
     """Time the engine and MuJoCo on the same robot, gait and step: forward, in batches, and a gradient.
 
-    Processor time of one core. The gradient is that of all end caps along 10 s with respect to ten parameters: one
-    pass with tangents here, eleven rollouts for MuJoCo. Needs the extra `rig`.
+    Processor time of one core. The gradient is that of one number along 10 s with respect to ten parameters: a forward
+    and a backward pass here, eleven rollouts for MuJoCo, which give the Jacobian of everything too; here that is one
+    pass with ten tangents, and timed beside it. Needs the extra `rig`.
 
     Example: r2s2r bench engine --quick
     """
@@ -82,7 +83,7 @@ def _measured(plan: Plan, turns: int, quick: bool, console: Console) -> EngineBe
     from r2s2r_cli.commands import bench_gait
     from r2s2r_cli.commands.bench_sides import MujocoSide, OurSide
 
-    with console.progress("engine and MuJoCo", 3 + turns * 9) as advance:
+    with console.progress("engine and MuJoCo", 3 + turns * 10) as advance:
         cold = _probed("ours", plan)
         advance(1)
         cached = _probed("ours", plan)
@@ -96,19 +97,19 @@ def _measured(plan: Plan, turns: int, quick: bool, console: Console) -> EngineBe
         forward = [_forward(ours, mujoco, plan, n, length, turns, advance) for n, length in batches]
         gradient = _compared(
             ours.gradient(u), mujoco.gradient(u), turns, advance, steps=None,
+            what=f"gradient of one number over {plan.run_s:g} s, {len(bench_gait.parameters())} parameters",
+        )  # fmt: skip
+        jacobian = _compared(
+            ours.jacobian(u), mujoco.gradient(u), turns, advance, steps=None,
             what=f"Jacobian of the end caps over {plan.run_s:g} s, {len(bench_gait.parameters())} parameters",
         )  # fmt: skip
-        backward = ours.backward(u)
-        backward()
-        vjp = min(_cpu(backward) for _ in range(turns))
-        advance(turns)
     options = mujoco.options
     return EngineBenchResult(
         machine=_machine(), versions={name: version(name) for name in ("mujoco", "torch", "llvmlite", "numpy")},
         robot=plan.robot, quick=quick, repeats=turns, step_s=plan.step_s, substeps=ours.substeps,
         mujoco_options=f"{options.integrator}, {options.cone} cone, rod contact, mujoco.rollout with one thread",
         forward_1=forward[0], forward_64=forward[1], forward_1024=forward[2], gradient_10=gradient,
-        gradient_run_s=plan.run_s, parameters=bench_gait.parameters(), vjp_s=vjp,
+        gradient_run_s=plan.run_s, parameters=bench_gait.parameters(), jacobian_10=jacobian,
         compile_s=cold["seconds"]["forward"] + cold["seconds"]["backward"], compile_parts_s=cold["seconds"],
         cached_start_s=cached["seconds"]["forward"] + cached["seconds"]["backward"],
         peak_memory_bytes={"ours": cached["peak"], "mujoco": foreign["peak"]},
@@ -175,7 +176,7 @@ def _machine() -> str:
 
 def _print(result: EngineBenchResult, console: Console) -> None:
     rows = []
-    for name in ("forward_1", "forward_64", "forward_1024", "gradient_10"):
+    for name in ("forward_1", "forward_64", "forward_1024", "gradient_10", "jacobian_10"):
         c: Comparison = getattr(result, name)
         low, high = c.spread
         rows.append([name, c.what, _number(c.ours, c.unit), _number(c.mujoco, c.unit), f"{c.ratio:.1f}x",
@@ -183,7 +184,6 @@ def _print(result: EngineBenchResult, console: Console) -> None:
     title = f"{result.robot}, steps of {result.step_s * 1e3:g} ms, processor time of one core ({result.machine})"
     console.table(title, ["", "what", "ours", "MuJoCo", "ratio", "spread"], rows)
     memory = ", ".join(f"{name} {size / 2**20:.0f} MiB" for name, size in result.peak_memory_bytes.items())
-    console.data(f"gradient of one number by a backward pass: {result.vjp_s:.3f} s")
     parts = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in result.compile_parts_s.items())
     console.data(
         f"first call, forward and backward: {result.compile_s:.2f} s; from the cache {result.cached_start_s:.2f} s"

@@ -49,8 +49,8 @@ def probe(side: str, plan: Plan) -> dict[str, object]:
         clock = time.process_time()
         ours = OurSide(robot, plan.step_s, Path(plan.cache_dir))
         seconds["forward"] = time.process_time() - clock
-        seconds["backward"] = _timed(ours.backward(tick))
-        seconds["tangents"] = _timed(ours.gradient(tick))
+        seconds["backward"] = _timed(ours.gradient(tick))
+        seconds["tangents"] = _timed(ours.jacobian(tick))
         seconds["forward, batch"] = _timed(ours.forward(np.repeat(tick, plan.batches[-1][0], axis=0)))
         made: OurSide | MujocoSide = ours
     else:
@@ -61,7 +61,7 @@ def probe(side: str, plan: Plan) -> dict[str, object]:
     made.forward(u)()
     made.gradient(u)()
     if isinstance(made, OurSide):
-        made.backward(u)()
+        made.jacobian(u)()
     return {"seconds": seconds, "peak": _peak_bytes()}
 
 

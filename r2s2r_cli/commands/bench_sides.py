@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -127,8 +126,44 @@ class OurSide:
 
         return job
 
-    def gradient(self, u: np.ndarray) -> Job:
+    def jacobian(self, u: np.ndarray) -> Job:
         """One run with u (1, tick, actuated) and its tangents along the ten parameters."""
+        import torch
+
+        directions, rows = self._directions(), self._rows(u)
+
+        def job() -> None:
+            _, tangents = self.simulator.jvp(
+                self.theta, self._start, rows, d_parameters=directions, step=self.step_s, hold=self._hold,
+                every=self._every,
+            )  # fmt: skip
+            if not bool(torch.isfinite(tangents).all()):
+                raise ArithmeticError("our tangents are not finite")
+
+        return job
+
+    def gradient(self, u: np.ndarray) -> Job:
+        """One run with u (1, tick, actuated), and the gradient of one number, the mean square of its end caps, with
+        respect to the ten parameters: a forward and a backward pass."""
+        import torch
+
+        from r2s2r_cli.engine import pack_parameters, unpack_parameters
+
+        directions, rows = self._directions(), self._rows(u)
+        packed = pack_parameters(self.structure, self.theta)
+
+        def job() -> None:
+            relative = torch.zeros(directions.shape[1], dtype=torch.float64, requires_grad=True)
+            theta = unpack_parameters(self.structure, packed + directions @ relative)
+            run = self.simulator.rollout(theta, self._start, rows, step=self.step_s, hold=self._hold, every=self._every)
+            (gradient,) = torch.autograd.grad(run.end_caps().square().mean(), relative)
+            if not bool(torch.isfinite(gradient).all()):
+                raise ArithmeticError("our gradient is not finite")
+
+        return job
+
+    def _directions(self):  # type: ignore[no-untyped-def]
+        """Derivatives of the flat parameters by the logarithms of the ten, (NP, 10)."""
         import torch
 
         from r2s2r_cli.engine import pack_parameters
@@ -141,35 +176,7 @@ class OurSide:
             (packed(name, 1 + RELATIVE) - packed(name, 1 - RELATIVE)) / (2 * RELATIVE)
             for name in bench_gait.parameters()
         ]
-        directions, rows = torch.stack(columns, dim=1), self._rows(u)
-
-        def job() -> None:
-            _, tangents = self.simulator.jvp(
-                self.theta, self._start, rows, d_parameters=directions, step=self.step_s, hold=self._hold,
-                every=self._every,
-            )  # fmt: skip
-            if not bool(torch.isfinite(tangents).all()):
-                raise ArithmeticError("our tangents are not finite")
-
-        return job
-
-    def backward(self, u: np.ndarray) -> Job:
-        """One run with u and the gradient of one number, the mean square of its end caps, with respect to friction."""
-        import torch
-
-        rows = self._rows(u)
-
-        def job() -> None:
-            friction = self.theta.friction.clone().requires_grad_()
-            run = self.simulator.rollout(
-                replace(self.theta, friction=friction), self._start, rows, step=self.step_s, hold=self._hold,
-                every=self._every,
-            )  # fmt: skip
-            (gradient,) = torch.autograd.grad(run.end_caps().square().mean(), friction)
-            if not bool(torch.isfinite(gradient).all()):
-                raise ArithmeticError("our gradient is not finite")
-
-        return job
+        return torch.stack(columns, dim=1)
 
     def _rows(self, u: np.ndarray):  # type: ignore[no-untyped-def]
         import torch

@@ -83,6 +83,16 @@ def momentum(theta: Parameters, state: State) -> tuple[Tensor, Tensor]:
     return p.sum(1), (spin + torch.linalg.cross(state.p_WB, p)).sum(1)
 
 
+def surely_stable_step(structure: Structure, theta: Parameters, state: State) -> float:
+    """A lower bound of `longest_step` [s] for a tenth of its price: the trace bounds the largest eigenvalue."""
+    if structure.n_cables == 0 or structure.cubic or structure.tendons:
+        return 0.0
+    with torch.no_grad():
+        rows = cable_rows(structure, theta, bodies(theta, state, axial=structure.axial))
+        most = float((theta.stiffness * rows.mobility).sum(-1).max())
+    return 1.1 / most**0.5 if most > 0 else 0.0
+
+
 def longest_step(structure: Structure, theta: Parameters, state: State) -> float:
     """The longest step [s] at which the explicit cables are stable at this state: 1.1 / sqrt of the largest eigenvalue
     of K^1/2 W K^1/2, W the mobility between all cables (contact.md section 2). Infinite without cables."""

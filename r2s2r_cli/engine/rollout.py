@@ -27,7 +27,7 @@ from r2s2r_cli.engine.ground import Ground
 from r2s2r_cli.engine.native import NativeStep, rollout
 from r2s2r_cli.engine.nonfinite import require_finite
 from r2s2r_cli.engine.parameters import Parameters, check_parameters
-from r2s2r_cli.engine.reading import longest_step
+from r2s2r_cli.engine.reading import longest_step, surely_stable_step
 from r2s2r_cli.engine.state import State, check_state, end_caps
 from r2s2r_cli.engine.structure import Detach, Structure
 
@@ -80,6 +80,7 @@ class Simulator:
         self.structure = structure
         self.threads = threads
         self.native = native is not False
+        self._checked: Parameters | None = None
         self.kernels = NativeStep(
             flat_step(structure), size(state_slots(structure)), structure.n_actuated, size(parameter_slots(structure)),
             key=trace_key(structure), cache_dir=cache_dir, twins=twins(structure),
@@ -128,6 +129,8 @@ class Simulator:
 
     def substeps(self, theta: Parameters, state: State, step: float) -> int:
         """Engine steps per `step` that keep explicit stiff cables stable at this state (see `longest_step`)."""
+        if step <= surely_stable_step(self.structure, theta, state):
+            return 1
         return max(1, math.ceil(step / longest_step(self.structure, theta, state) - 1e-9))
 
     def jvp(
@@ -170,7 +173,9 @@ class Simulator:
         return Trajectory(self.structure, theta, t, unpack_state(self.structure, frames), step, n), tangents
 
     def _check(self, theta: Parameters, state0: State, commands: Tensor, step: float, hold: int, every: int) -> None:
-        check_parameters(self.structure, theta)
+        if theta is not self._checked:
+            check_parameters(self.structure, theta)
+            self._checked = theta
         check_state(self.structure, state0)
         if commands.ndim != 3 or commands.shape[2] != self.structure.n_actuated or commands.shape[1] < 1:
             raise EngineInputError(

@@ -70,7 +70,7 @@ class Symbolic(Tensor):
 
     @staticmethod
     def __new__(cls, trace: Trace, nodes: Nodes, dtype: torch.dtype) -> Symbolic:  # noqa: D102
-        self: Symbolic = Tensor._make_wrapper_subclass(cls, nodes.shape, dtype=dtype, device="cpu")
+        self: Symbolic = Tensor._make_wrapper_subclass(cls, nodes.shape, dtype=dtype, device=torch.device("cpu"))
         self.recorder, self.nodes = trace, nodes
         return self
 

@@ -93,7 +93,8 @@ def off_the_switch(state: State, seed: int) -> State:
 
 def touching(theta: Parameters, state: State, generator: torch.Generator) -> State:
     """The state with rod 1 put beside rod 0 so that their surfaces are about to meet: shaft on shaft, cap on shaft and
-    cap on cap in turn, 0.2 mm apart to 0.05 mm into each other, approaching at 1.7 m/s; cables may yet part some."""
+    cap on cap in turn, 0.2 mm apart to 0.05 mm in each other, approaching at 1.7 m/s. Winched cables are slack, or they
+    would part them."""
     n = len(state.p_WB)
 
     def noise(*shape: int) -> Tensor:
@@ -118,7 +119,7 @@ def touching(theta: Parameters, state: State, generator: torch.Generator) -> Sta
     p[:, 1], q[:, 0], q[:, 1] = p_b, pointing(axis_a), pointing(axis_b)
     v[:, 1] = v[:, 0] - (1.5 + 0.5 * torch.rand(n, 1, generator=generator, dtype=torch.float64)) * normal
     spin = state.w_R * 0.1
-    return replace(state, p_WB=p, q_WR=q, v_WB=v, w_R=spin)
+    return replace(state, p_WB=p, q_WR=q, v_WB=v, w_R=spin, rest=torch.ones_like(state.rest))
 
 
 def raised(state: State, by: Tensor) -> State:

@@ -45,7 +45,7 @@ def spread(variant: Variant, field: str, low: float, high: float) -> Variant:
 
 def cubic() -> Variant:
     """Cables whose force grows with stretch, stretch^2 and stretch^3."""
-    return spread(spread(robot(cubic=True), "stiffness2", -2e3, 2e4), "stiffness3", 0.0, 1e6)
+    return spread(spread(robot(cubic=True), "stiffness2", -2e3, 2e4), "stiffness3", 0.0, 2e5)
 
 
 def tendons() -> Variant:

@@ -185,7 +185,7 @@ def test_without_cables_any_step_will_do() -> None:
 def test_the_limit_is_where_an_explicit_spring_blows_up(share: float, stable: bool) -> None:
     """Symplectic Euler is stable below h = 2 / omega and grows without bound above; the longest step is 0.55 of that.
 
-    The masses circle each other, so that the cable stays taut: m w^2 L / 2 = k x, and near the limit they swing widely."""
+    The masses circle each other, so that the cable stays taut: m w^2 L / 2 = k x; near the limit they swing widely."""
     structure, theta, start = two_masses(rest_min=-1.0)
     limit = 2.0 * math.sqrt(MASS / (2 * K))
     assert longest_step(structure, theta, start) == pytest.approx(0.55 * limit, rel=1e-9)

@@ -12,7 +12,17 @@ import pytest
 import torch
 from torch import Tensor
 
-from r2s2r_cli.engine import Parameters, Simulator, State, Structure, read, tilted, unpack_state
+from r2s2r_cli.engine import (
+    LatchedPid,
+    Parameters,
+    Simulator,
+    State,
+    Structure,
+    closed_loop,
+    read,
+    tilted,
+    unpack_state,
+)
 from tests.support import parity
 from tests.support.engine import after, free_rods, lowest_gap, parameters, random_gait, state, vector
 from tests.support.phases import STEP, phases
@@ -194,6 +204,26 @@ def test_rollouts_on_tilted_ground(cache_dir: Path) -> None:
         outcomes.append((run.states.p_WB, run.states.q_WR, run.end_caps(), *grads))
     for one, other in zip(*(map(Tensor.detach, outcome) for outcome in outcomes), strict=True):
         assert float((one - other).abs().max()) < 1e-10 * float(other.abs().max())
+
+
+@pytest.mark.slow
+def test_the_closed_loop(cache_dir: Path) -> None:
+    """0.3 s of the controller in the loop: the same commands, states and gradient, decisions included."""
+    model = variant("pair, no rod contact")
+    pid = LatchedPid(p=6.0, i=0.01, d=0.5, tolerance=0.07, min_length=0.1, range=0.1, period=0.01,
+                     cable_caps=((1, 3), (0, 2), (1, 2)), actuated=(1,))  # fmt: skip
+    targets = torch.tensor([[0.7], [1.0]], dtype=torch.float64)
+    outcomes = []
+    for simulator in _both(model.structure, cache_dir):
+        theta = _leaves(model.theta)
+        run = closed_loop(simulator, theta, model.start, pid, targets, torch.zeros(2), torch.full((2,), 0.15))
+        end = run.trajectory.states.p_WB[:, -1]
+        grads = torch.autograd.grad((end * torch.arange(6.0).reshape(2, 3)).sum(), [theta.mass, theta.speed_in])
+        outcomes.append((run.u, run.index, run.done, run.length, end, *grads))
+    assert float(outcomes[0][0].detach().abs().max()) > 0.1
+    for one, other in zip(*(map(Tensor.detach, outcome) for outcome in outcomes), strict=True):
+        assert one.shape == other.shape
+        assert float((one.double() - other.double()).abs().max()) <= 1e-9 * float(other.double().abs().max())
 
 
 def _leaves(theta: Parameters) -> Parameters:

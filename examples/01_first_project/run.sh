@@ -13,11 +13,13 @@ echo "== the sample: closed-form kinematics, no physics"
 cd "$demo/sample"
 step import sample.csv
 step estimate
+step simulate --random 4 --seed 1
 step validate
 step status
 step export iterations/001/20-estimate.h5 --to csv --out exported --force --quiet >/dev/null
 echo
 echo "look at: $demo/sample/iterations/001/20-estimate.html"
+echo "look at: $demo/sample/iterations/001/simulation.html"
 cd - >/dev/null
 
 if [ ! -d "$real" ]; then
@@ -34,8 +36,10 @@ step calibrate --points "$real/tribar_calibration/length_capacitance_points.csv"
     --history "$real/tribar_calibration/calibration_history_2025.json"
 step import "$real/tribar_crawl/crawl.csv"
 step estimate
+step simulate --replay crawl
 step validate
 step status
 echo
 echo "look at: $demo/crawl/calibration.html"
 echo "look at: $demo/crawl/iterations/001/20-estimate.html"
+echo "look at: $demo/crawl/iterations/001/simulation.html"

@@ -46,6 +46,7 @@ class Settled:
     spells: int
 
 
+@torch.no_grad()
 def settled(
     simulator: Simulator,
     theta: Parameters,
@@ -63,7 +64,8 @@ def settled(
     R_WR: frames of the rods (B, rod, 3, 3); their roll is a first guess (the attachment heuristic), which tensions
     then correct. cable_caps: end caps of each cable. lengths: cap distances of all cables [m], (B, cable); None: those
     of p_WE. The winches are turned until the winched ones have these lengths; velocities are cleared whenever the
-    kinetic energy has passed a peak. The result is shifted and turned about the vertical back on to the observation.
+    kinetic energy has passed a peak. The result is shifted and turned about the vertical back on to the observation; it
+    is an observation too, and has no derivative. Raises EngineInputError, NonFiniteError.
     """
     structure = simulator.structure
     _check("p_WE", p_WE, (2 * structure.n_rods, 3))

@@ -27,7 +27,7 @@ from r2s2r_cli.engine import (
 )
 from r2s2r_cli.engine.roll import roll_relaxed
 from r2s2r_cli.stages.init.attachment import Mode
-from tests.support.engine import G, lowest_gap
+from tests.support.engine import RADIUS, G, free_rods, lowest_gap, parameters, simulator
 from tests.support.robots import Subject, frames, noise, rested, subject
 
 CRAWL = Path("tribar_crawl") / "crawl.csv"
@@ -156,6 +156,26 @@ def test_other_robots_rest(name: str, attachment: Mode) -> None:
     """The long-rod robot, the example of six rods and cables at the rod ends settle as well."""
     robot = subject(name, attachment)
     assert_at_rest(robot, robot.settle(robot.p_WE))
+
+
+def test_one_rod_without_cables_lies_down() -> None:
+    """Nothing in settling needs cables or winches: a rod seen leaning by 9 degrees falls flat, and stays."""
+    structure = free_rods()
+    theta = parameters(structure)
+    seen = torch.tensor([[[0.0, 0.0, 0.02], [0.316, 0.0, 0.07]]], dtype=torch.float64)
+    found = settled(simulator(structure), theta, seen, frames(seen), ())
+    assert float(found.speed) < 1e-5
+    gap = end_caps(theta, found.state)[0, :, 2] - RADIUS
+    assert float(gap.abs().max()) < 1e-5
+
+
+def test_a_settled_state_has_no_derivative() -> None:
+    """It is an observation: no graph grows through seconds of relaxation, whatever the parameters ask for."""
+    robot = subject()
+    theta = replace(robot.theta, friction=robot.theta.friction.clone().requires_grad_())
+    found = settled(robot.simulator, theta, robot.p_WE, frames(robot.p_WE), robot.cable_caps)
+    assert not found.state.p_WB.requires_grad
+    assert torch.equal(found.state.p_WB, rested().state.p_WB)
 
 
 def test_the_real_robot_rests(real_dir: Path) -> None:

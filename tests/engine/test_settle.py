@@ -158,6 +158,23 @@ def test_other_robots_rest(name: str, attachment: Mode) -> None:
     assert_at_rest(robot, robot.settle(robot.p_WE))
 
 
+def test_lies_on_the_observation() -> None:
+    """Seen from above the settled caps have the observed centre, and no turn about it brings them nearer."""
+    robot = subject()
+    seen = noise(robot.p_WE, 0.004, batch=2, seed=3)
+    found = robot.settle(seen)
+    here, there = (p[..., :2] for p in (end_caps(robot.theta, found.state), seen))
+    torch.testing.assert_close(here.mean(1), there.mean(1), rtol=0, atol=1e-12)
+    here, there = here - here.mean(1, keepdim=True), there - there.mean(1, keepdim=True)
+
+    def apart(angle: float) -> Tensor:
+        turn = roma.rotvec_to_rotmat(torch.tensor([0.0, 0.0, angle], dtype=torch.float64))[:2, :2]
+        return ((here @ turn.T - there) ** 2).sum((1, 2))
+
+    for angle in (-1e-4, 1e-4, -0.01, 0.01):
+        assert (apart(angle) > apart(0.0)).all()
+
+
 def test_one_rod_without_cables_lies_down() -> None:
     """Nothing in settling needs cables or winches: a rod seen leaning by 9 degrees falls flat, and stays."""
     structure = free_rods()

@@ -52,13 +52,14 @@ class Effect(Hooks):
     look_alikes: ClassVar[tuple[str, ...]] = ()
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}()"
+        inside = ", ".join(f"{name}={value!r}" for name, value in sorted(vars(self).items()))
+        return f"{type(self).__name__}({inside})"
 
     def __eq__(self, other: object) -> bool:
-        return type(other) is type(self)
+        return type(other) is type(self) and repr(other) == repr(self)
 
     def __hash__(self) -> int:
-        return hash(type(self))
+        return hash(repr(self))
 
     def sizes(self, structure: Structure) -> Mapping[str, int]:
         """Own parameters and how many numbers each has."""

@@ -39,6 +39,7 @@ def inverse_inertia(inertia: Tensor, *, axial: bool) -> Tensor:
     """Inverse of (B, rod, 3, 3); for a body of revolution entry by entry of the diagonal, else by cofactors."""
     if axial:
         return torch.diag_embed(1.0 / torch.diagonal(inertia, dim1=-2, dim2=-1))
+    inertia = torch.tril(inertia) + torch.tril(inertia, -1).mT
     a, b, c = inertia.unbind(-1)
     rows = torch.stack([torch.linalg.cross(b, c), torch.linalg.cross(c, a), torch.linalg.cross(a, b)], dim=-2)
     return rows / (a * rows[..., 0, :]).sum(-1)[..., None, None]

@@ -8,14 +8,17 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from r2s2r_cli.engine.batch import common_batch, tensors_of
 from r2s2r_cli.engine.errors import EngineInputError
 from r2s2r_cli.engine.flat import pack_parameters, pack_state, unpack_state
+from r2s2r_cli.engine.hooks import effective
 from r2s2r_cli.engine.nonfinite import require_finite
 from r2s2r_cli.engine.parameters import Parameters, check_parameters
 from r2s2r_cli.engine.pid import LatchedPid, advance, start_progress, steps_a_tick, ticks
 from r2s2r_cli.engine.reading import cap_lengths
 from r2s2r_cli.engine.rollout import Simulator, Trajectory
 from r2s2r_cli.engine.state import State, check_state, end_caps
+from r2s2r_cli.engine.structure import Structure
 
 
 @dataclass(frozen=True)
@@ -64,23 +67,21 @@ def closed_loop(
     structure = simulator.structure
     check_parameters(structure, theta)
     check_state(structure, state0)
-    if targets.ndim != 2 or targets.shape[1] != structure.n_actuated or not len(targets):
-        raise EngineInputError("targets", "wrong shape", expected=f"(S, {structure.n_actuated}), S at least 1",
-                               received=str(tuple(targets.shape)))  # fmt: skip
-    batch = max(len(state0.p_WB), len(theta.mass))
+    _check_policy(structure, targets, holds, timeouts)
+    batch = common_batch({**tensors_of(state0), **tensors_of(theta)})
     whole = steps_a_tick(pid.period, step)
     n = simulator.substeps(theta, state0, step)
     h, count = step / n, whole * n
-    wide = theta.map(lambda x: x.expand(batch, *x.shape[1:]))
+    wide = effective(structure, theta).map(lambda x: x.expand(batch, *x.shape[1:]))
     p, s = pack_parameters(structure, theta), pack_state(structure, state0).expand(batch, -1)
     hold_ticks, timeout_ticks = ticks(holds, pid.period), ticks(timeouts, pid.period)
     tail_ticks = round(tail / pid.period)
     most = int((hold_ticks + timeout_ticks).sum()) + tail_ticks + len(targets)
 
-    at = start_progress(batch)
+    at = start_progress(batch, s.device)
     memory = pid.start(s.new_zeros(batch, structure.n_cables))
-    given_up = torch.zeros(batch, len(targets), dtype=torch.bool)
-    needed = torch.zeros(batch, dtype=torch.long)
+    given_up = torch.zeros(batch, len(targets), dtype=torch.bool, device=s.device)
+    needed = torch.zeros(batch, dtype=torch.long, device=s.device)
     frames, us, indices, dones, lengths = [s], list[Tensor](), list[Tensor](), list[Tensor](), list[Tensor]()
     after = 0
     for _ in range(most):
@@ -101,6 +102,8 @@ def closed_loop(
         needed = needed + running.long()
         s = simulator.advance(s, u[:, None], p, h=h, hold=count, every=count)[:, -1]
         frames.append(s)
+        if not bool(torch.isfinite(s.detach()).all()):
+            break  # named below; a number that is none never reaches a target
         if progress is not None:
             progress(int(at.index.min()))
         if bool(at.finished(len(targets)).all()):
@@ -110,9 +113,25 @@ def closed_loop(
     flat, commands = torch.stack(frames, dim=1), torch.stack(us, dim=1)
     plain = (flat.detach(), commands.detach(), p.detach())
     require_finite(structure, simulator.kernels.fn, *plain, h=h, hold=count, every=count)
-    t = torch.arange(flat.shape[1], dtype=flat.dtype) * pid.period
+    t = torch.arange(flat.shape[1], dtype=flat.dtype, device=flat.device) * pid.period
     trajectory = Trajectory(structure, theta, t, unpack_state(structure, flat), step, n)
     return ClosedLoopRun(
         trajectory, commands, torch.stack(indices, dim=1), torch.stack(dones, dim=1), torch.stack(lengths, dim=1),
         needed, given_up,
     )  # fmt: skip
+
+
+def _check_policy(structure: Structure, targets: Tensor, holds: Tensor, timeouts: Tensor) -> None:
+    """Raises EngineInputError for targets of another robot, that are no numbers, or times that do not fit them."""
+    if targets.ndim != 2 or targets.shape[1] != structure.n_actuated or not len(targets):
+        raise EngineInputError("targets", "wrong shape", expected=f"(S, {structure.n_actuated}), S at least 1",
+                               received=str(tuple(targets.shape)))  # fmt: skip
+    bad = torch.nonzero(~torch.isfinite(targets))
+    if len(bad):
+        row, column = bad[0].tolist()
+        raise EngineInputError(f"targets.{row}.{column}", "not a finite number", expected="finite numbers",
+                               received=str(float(targets[row, column])))  # fmt: skip
+    for name, times in (("holds", holds), ("timeouts", timeouts)):
+        if times.shape != (len(targets),):
+            raise EngineInputError(name, "wrong shape", expected=f"({len(targets)},), one a target",
+                                   received=str(tuple(times.shape)))  # fmt: skip

@@ -27,8 +27,8 @@ class GroundRows:
     """The contact problem of all rods. gap [m], (B, rod, 2); arm: angular part of the rows, rod axes, (B, rod, 6, 3);
     mobility: velocity of row a per impulse on row b [1/kg], (B, rod, 6, 6); free: row velocities if nothing were
     touched [m/s], (B, rod, 6); target: normal velocity to reach [m/s], (B, rod, 2); active: the cap would be below the
-    ground at the end of the step; toi: share of the step before its impact; friction: (B, rod, 2); between: horizontal
-    direction from cap to cap, (B, rod, 2)."""
+    ground at the end of the step; toi: share of the step before its impact; friction: (B, rod, 2); between: unit
+    direction from the contact point of the even cap to that of the odd one, (B, rod, 3)."""
 
     gap: Tensor
     arm: Tensor
@@ -58,7 +58,7 @@ def contact_rows(structure: Structure, theta: Parameters, rods: Bodies, v: Tenso
     v0, v1 = before[..., 2::3], free[..., 2::3]
     # Predicted, not gap < 0: a cap at rest 1e-12 above the ground must stay active.
     active = gap + h[..., None] * v1 < 0
-    falling = torch.where(v1 < 0, -v1, torch.ones_like(v1))
+    falling = torch.where(active & (v1 < 0), -v1, torch.ones_like(v1))
     toi = torch.where(active, torch.relu(gap) / (h[..., None] * falling), torch.zeros_like(gap))
     target = _rebound(theta, v0, v1 - v0, toi)
     return GroundRows(gap, arm, mobility, free, target, active, toi, friction, _between(theta, rods))
@@ -77,11 +77,11 @@ def _rebound(theta: Parameters, v0: Tensor, gain: Tensor, toi: Tensor) -> Tensor
 
 
 def _between(theta: Parameters, rods: Bodies) -> Tensor:
-    """Horizontal unit direction from the even to the odd cap, (B, rod, 2); 0 for a vertical rod."""
-    axis = (rods.R_GR * (theta.p_BE[..., 1, :] - theta.p_BE[..., 0, :])[..., None, :]).sum(-1)[..., :2]
-    squared = (axis * axis).sum(-1, keepdim=True)
-    level = squared > 1e-12
-    return torch.where(level, axis * (1.0 / torch.sqrt(torch.where(level, squared, torch.ones_like(squared)))), 0.0)
+    """Unit direction between the contact points, (B, rod, 3): forces along it, equal and opposite, move nothing."""
+    axis = (rods.R_GR * (theta.p_BE[..., 1, :] - theta.p_BE[..., 0, :])[..., None, :]).sum(-1)
+    lower = theta.cap_radius[..., 1] - theta.cap_radius[..., 0]
+    line = torch.cat([axis[..., :2], (axis[..., 2] - lower)[..., None]], dim=-1)
+    return line * (1.0 / torch.sqrt((line * line).sum(-1, keepdim=True)))
 
 
 def _geometry(theta: Parameters, rods: Bodies) -> tuple[Tensor, Tensor]:

@@ -66,6 +66,14 @@ class WorldTerms:
     w_R: Tensor
 
 
+def effective(structure: Structure, theta: Parameters) -> Parameters:
+    """The parameters that the step works with: those of the robot, changed by its effects. For whoever reads caps,
+    forces or energy off a state; the step itself does the same and must be handed the parameters before."""
+    for effect in structure.effects:
+        theta = effect.parameters(theta.of(effect.name), theta)
+    return theta
+
+
 class Hooks:
     """Base of everything that plugs into the step. `x`: own parameters, `z`: own states, `h`: step [s], (B, 1)."""
 

@@ -13,6 +13,7 @@ from r2s2r_cli.engine.contact import contact_rows
 from r2s2r_cli.engine.errors import NonFiniteError
 from r2s2r_cli.engine.flat import unpack_parameters, unpack_state
 from r2s2r_cli.engine.friction_solve import solve
+from r2s2r_cli.engine.hooks import effective
 from r2s2r_cli.engine.structure import Structure
 
 FlatStep = Callable[[Tensor, Tensor, Tensor, Tensor], Tensor]
@@ -64,8 +65,7 @@ def _culprit(structure: Structure, s: Tensor, p: Tensor, h: Tensor, after: Tenso
 def _terms(structure: Structure, s: Tensor, p: Tensor, h: Tensor) -> Iterator[tuple[str, str, Tensor]]:
     """The quantities of a step in the order in which it computes them: (rod or cable, its name, tensor)."""
     theta, state = unpack_parameters(structure, p), unpack_state(structure, s)
-    for effect in structure.effects:
-        theta = effect.parameters(theta.of(effect.name), theta)
+    theta = effective(structure, theta)
     rods = bodies(theta, state, axial=structure.axial)
     yield "rod", "inverse inertia", rods.inverse_inertia
     if structure.n_cables:

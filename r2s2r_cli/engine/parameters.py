@@ -133,6 +133,10 @@ def check_parameters(structure: Structure, theta: Parameters) -> None:
     for name in ("rod_radius", "friction", "restitution", "rod_friction", "damping", "tendon_stiffness", "speed_in",
                  "speed_out", "rest", "lag", "droop"):  # fmt: skip
         _require(theta, name, "at least 0", getattr(theta, name) >= 0)
+    if structure.axial:
+        _require_axial(theta)
+    _require(theta, "restitution", "0 to 1", theta.restitution <= 1)
+    _require(theta, "rest_min", "at most rest_max", theta.rest_min <= theta.rest_max)
     length = torch.linalg.vector_norm(theta.p_BE[..., 1, :] - theta.p_BE[..., 0, :], dim=-1)
     if not bool((length > 0).all()):
         raise EngineInputError("p_BE", "a rod of zero length", expected="two different caps", received=_where(length))
@@ -151,6 +155,21 @@ def _require(theta: Parameters, name: str, rule: str, good: Tensor) -> None:
             expected=rule,
             received=f"{float(tensor[index]):g}",
         )
+
+
+def _require_axial(theta: Parameters) -> None:
+    """Structure.axial leaves out what a body of revolution has not: it must not be there."""
+    diagonal = torch.diagonal(theta.inertia, dim1=-2, dim2=-1)
+    slack = 1e-9 * diagonal.amax()
+    off = (theta.inertia - torch.diag_embed(diagonal)).abs().amax()
+    if bool(off > slack) or bool((diagonal[..., 0] - diagonal[..., 1]).abs().amax() > slack):
+        raise EngineInputError(
+            "inertia", "not that of a body of revolution",
+            expected="diag(transverse, transverse, axial), or Structure(axial=False)", received="another",
+        )  # fmt: skip
+    if bool(theta.p_BE[..., :2].abs().amax() > 1e-12):
+        raise EngineInputError("p_BE", "caps off the rod's axis", expected="x = y = 0, or Structure(axial=False)",
+                               received=f"{float(theta.p_BE[..., :2].abs().amax()):g} m off it")  # fmt: skip
 
 
 def _where(tensor: Tensor) -> str:

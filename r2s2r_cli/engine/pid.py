@@ -163,7 +163,7 @@ def ticks(seconds: Tensor, period: float) -> Tensor:
 
 def steps_a_tick(period: float, step: float) -> int:
     """Engine steps in one control tick. Raises EngineInputError where the step [s] does not divide the period [s]."""
-    steps = round(period / step)
+    steps = round(period / step) if math.isfinite(step) and step > 0 else 0
     if steps < 1 or not math.isclose(steps * step, period, rel_tol=1e-9):
         raise EngineInputError("step", "the engine step does not divide the control period",
                                expected=f"{period:g} s over a whole number", received=f"{step:g} s")  # fmt: skip

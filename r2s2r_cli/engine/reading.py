@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import roma
 import torch
@@ -12,6 +12,7 @@ from r2s2r_cli.engine.body import angular_change, bodies, gyroscopic
 from r2s2r_cli.engine.cable import cable_rows, pulled, rest_lengths, spring_force, tension_impulse
 from r2s2r_cli.engine.contact import contact_rows
 from r2s2r_cli.engine.friction_solve import solve
+from r2s2r_cli.engine.hooks import effective
 from r2s2r_cli.engine.parameters import Parameters
 from r2s2r_cli.engine.state import State, cable_ends
 from r2s2r_cli.engine.structure import Structure
@@ -33,15 +34,14 @@ def read(structure: Structure, theta: Parameters, state: State, h: float = 1e-3)
     """Tensions and ground forces of a state in frame G, as a step of h seconds would apply them. Effects that act on
     parameters, cable forces and friction are included."""
     dt = state.p_WB.new_full((1, 1), h)
-    for effect in structure.effects:
-        theta = effect.parameters(theta.of(effect.name), theta)
+    theta = effective(structure, theta)
     rods = bodies(theta, state, axial=structure.axial)
     rows = cable_rows(structure, theta, rods)
     rest = rest_lengths(structure, theta, state.rest)
     terms = spring_force(structure, theta, rows, rest)
     force = terms.force
     for effect in structure.effects:
-        force, _ = effect.cable(theta.of(effect.name), state.of(effect.name), terms, dt)
+        force, _ = effect.cable(theta.of(effect.name), state.of(effect.name), replace(terms, force=force), dt)
     impulse = tension_impulse(structure, theta, rows, terms, force, dt)
     dv, dw = pulled(structure, rods, rows, impulse)
     v = rods.v + h * theta.gravity[:, None] + dv
@@ -58,7 +58,8 @@ def cap_lengths(cable_caps: tuple[tuple[int, int], ...], p_WE: Tensor) -> Tensor
 
 
 def energy(structure: Structure, theta: Parameters, state: State) -> Tensor:
-    """Kinetic, gravitational and elastic energy [J], (B,); frame G, effects not included."""
+    """Kinetic, gravitational and elastic energy [J], (B,); frame G. Effects count as far as they change parameters."""
+    theta = effective(structure, theta)
     rods = bodies(theta, state, axial=structure.axial)
     kinetic = 0.5 * (theta.mass[..., None] * rods.v * rods.v).sum((-2, -1))
     kinetic = kinetic + 0.5 * torch.einsum(
@@ -88,6 +89,7 @@ def surely_stable_step(structure: Structure, theta: Parameters, state: State) ->
     if structure.n_cables == 0 or structure.cubic or structure.tendons:
         return 0.0
     with torch.no_grad():
+        theta = effective(structure, theta)
         rows = cable_rows(structure, theta, bodies(theta, state, axial=structure.axial))
         most = float((theta.stiffness * rows.mobility).sum(-1).max())
     return 1.1 / most**0.5 if most > 0 else 0.0
@@ -99,6 +101,7 @@ def longest_step(structure: Structure, theta: Parameters, state: State) -> float
     if structure.n_cables == 0:
         return float("inf")
     with torch.no_grad():
+        theta = effective(structure, theta)
         rods = bodies(theta, state, axial=structure.axial)
         rows = cable_rows(structure, theta, rods)
         stretch = torch.relu(rows.length - rest_lengths(structure, theta, state.rest))

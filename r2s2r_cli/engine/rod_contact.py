@@ -14,7 +14,7 @@ from torch import Tensor
 
 from r2s2r_cli.engine.body import Bodies, angular_change
 from r2s2r_cli.engine.contact import PUSH_OUT, GroundRows, applied
-from r2s2r_cli.engine.friction_solve import clip, sweep
+from r2s2r_cli.engine.friction_solve import clip, directions, sweep
 from r2s2r_cli.engine.guarded import guarded
 from r2s2r_cli.engine.parameters import Parameters
 from r2s2r_cli.engine.structure import Structure
@@ -162,8 +162,12 @@ def _relax_pair(axial: bool, *inputs: Tensor) -> tuple[Tensor, ...]:
     x = one.ends[:, 0] + s * (one.ends[:, 1] - one.ends[:, 0])
     y = two.ends[:, 0] + t * (two.ends[:, 1] - two.ends[:, 0])
     d = y - x
-    distance = torch.sqrt((d * d).sum(-1, keepdim=True) + _TINY)
-    normal, gap = d / distance, distance - r_a - r_b
+    # Axes that cross have no direction between them: up, then, and the push-out does the rest.
+    apart = (d * d).sum(-1, keepdim=True)
+    crossed = apart < _TINY
+    distance = torch.sqrt(torch.where(crossed, torch.ones_like(apart), apart))
+    normal = torch.where(crossed, torch.cat([torch.zeros_like(apart), apart * 0.0, apart * 0.0 + 1.0], 1), d / distance)
+    gap = torch.where(crossed, torch.zeros_like(apart), distance) - r_a - r_b
     # Rows: the normal and two directions across it; arms of the points where the surfaces meet.
     across = torch.where(normal[:, [0]].abs() < 0.6, torch.ones_like(gap), torch.zeros_like(gap))
     axis = torch.cat([across, 1.0 - across, torch.zeros_like(gap)], dim=1)
@@ -182,7 +186,7 @@ def _relax_pair(axial: bool, *inputs: Tensor) -> tuple[Tensor, ...]:
 
     before = relative()[:, [0]]
     active = gap + h * before < 0
-    speed = torch.where(before < 0, -before, torch.ones_like(before))
+    speed = torch.where(active & (before < 0), -before, torch.ones_like(before))
     toi = torch.where(active, torch.relu(gap) / (h * speed), torch.zeros_like(gap))
     target = torch.where(active, restitution * torch.clamp((-before - threshold) / threshold, 0.0, 1.0) * -before, 0.0)
     stiff = mobility[:, 0, 0, None]
@@ -194,7 +198,7 @@ def _relax_pair(axial: bool, *inputs: Tensor) -> tuple[Tensor, ...]:
         pushed = torch.where(active, torch.relu(push - (u[:, [0]] - target) / stiff), torch.zeros_like(push))
         u = u + mobility[:, :, 0] * (pushed - push)
         wish = slide - u[:, 1:] * tangent
-        sx, sy = clip(wish[:, 0], wish[:, 1], friction[:, 0] * pushed[:, 0])
+        sx, sy, _, _ = clip(wish[:, 0], wish[:, 1], friction[:, 0] * pushed[:, 0])
         slid = torch.where(active, torch.stack([sx, sy], dim=1), torch.zeros_like(slide))
         change = torch.cat([pushed - push, slid - slide], dim=1)
         push, slide = pushed, slid
@@ -251,7 +255,7 @@ class _Rod:
         zero = torch.zeros_like(self.target[:, :1])
         aim = torch.cat([zero, zero, self.target[:, :1], zero, zero, self.target[:, 1:]], dim=1)
         residual = torch.cat([v, v], dim=-1) + (self.arm * w[:, None]).sum(-1) - aim
-        after = sweep(self.reach, self.friction, self.active, impulse, residual, sweeps=1)
+        after = sweep(self.reach, self.friction, self.active, impulse, directions(impulse), residual, sweeps=1)
         change = after - impulse
         v = v + self.inverse_mass * (change[:, :3] + change[:, 3:])
         return after, v, w + angular_change(self.inverse_inertia, (self.arm * change[..., None]).sum(1))

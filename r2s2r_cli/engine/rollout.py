@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
-import inspect
 import math
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass
 from pathlib import Path
 
 import torch
 from torch import Tensor
 
+from r2s2r_cli.engine.batch import common_batch, tensors_of
 from r2s2r_cli.engine.errors import EngineInputError
 from r2s2r_cli.engine.flat import (
     flat_step,
@@ -24,12 +22,14 @@ from r2s2r_cli.engine.flat import (
     unpack_state,
 )
 from r2s2r_cli.engine.ground import Ground
+from r2s2r_cli.engine.hooks import effective
 from r2s2r_cli.engine.native import NativeStep, rollout
 from r2s2r_cli.engine.nonfinite import require_finite
 from r2s2r_cli.engine.parameters import Parameters, check_parameters
 from r2s2r_cli.engine.reading import longest_step, surely_stable_step
 from r2s2r_cli.engine.state import State, check_state, end_caps
 from r2s2r_cli.engine.structure import Detach, Structure
+from r2s2r_cli.engine.trace_key import trace_key
 
 IMPULSE_WINDOW = 0.5
 """[s] beyond it the tangent with detached impulses has left every bound (contact.md section 5: 22 after 1 s)."""
@@ -55,7 +55,9 @@ class Trajectory:
         flat = pack_state_frames(self.structure, self.states)
         batch, frames = flat.shape[:2]
         merged = unpack_state(self.structure, flat.flatten(0, 1))
-        theta = self.theta.map(lambda x: x.expand(batch, *x.shape[1:]).repeat_interleave(frames, dim=0))
+        theta = effective(self.structure, self.theta).map(
+            lambda x: x.expand(batch, *x.shape[1:]).repeat_interleave(frames, dim=0)
+        )
         return end_caps(theta, merged).unflatten(0, (batch, frames))
 
 
@@ -80,7 +82,7 @@ class Simulator:
         self.structure = structure
         self.threads = threads
         self.native = native is not False
-        self._checked: Parameters | None = None
+        self._checked: tuple[Parameters, int] | None = None
         self.kernels = NativeStep(
             flat_step(structure), size(state_slots(structure)), structure.n_actuated, size(parameter_slots(structure)),
             key=trace_key(structure), cache_dir=cache_dir, twins=twins(structure),
@@ -105,13 +107,12 @@ class Simulator:
         says how contacts count). substeps: engine steps a `step`; None: as many as stiff cables need.
         Raises EngineInputError for wrong inputs, NonFiniteError where the simulation leaves the finite numbers.
         """
-        batch = max(len(commands), len(state0.p_WB), len(theta.mass))
-        self._check(theta, state0, commands, step, hold, every)
+        batch = self._checked_batch(theta, state0, commands, step, hold, every)
+        if substeps is not None and substeps < 1:
+            raise EngineInputError("substeps", "no step", expected="at least 1", received=str(substeps))
         if ground is not None:
             theta, state0 = ground.parameters(theta), ground.to_ground(state0)
         n = substeps or self.substeps(theta, state0, step)
-        if self.structure.detach == Detach.IMPULSE and commands.shape[1] * hold * step > IMPULSE_WINDOW:
-            _warn_of_impulse(commands.shape[1] * hold * step)
         s0 = pack_state(self.structure, state0).expand(batch, -1)
         u = commands.expand(batch, -1, -1)
         p = pack_parameters(self.structure, theta)
@@ -153,8 +154,9 @@ class Simulator:
         (NS, D) likewise of `pack_state`; d_commands: (row, actuated, D). None: zero. Returns the trajectory and the
         tangents of its flat states (B, frame, NS, D).
         """
-        batch = max(len(commands), len(state0.p_WB), len(theta.mass))
-        self._check(theta, state0, commands, step, hold, every)
+        batch = self._checked_batch(theta, state0, commands, step, hold, every)
+        if substeps is not None and substeps < 1:
+            raise EngineInputError("substeps", "no step", expected="at least 1", received=str(substeps))
         n = substeps or self.substeps(theta, state0, step)
         s0 = pack_state(self.structure, state0).expand(batch, -1).contiguous()
         u, p = commands.expand(batch, -1, -1).contiguous(), pack_parameters(self.structure, theta)
@@ -165,17 +167,27 @@ class Simulator:
         # What no direction changes needs no tangent: less to compile, and less to compute.
         active = None if d_parameters is None else tuple(torch.nonzero(d_parameters.abs().amax(1)).flatten().tolist())
         d_s0, d_u, d_p = spread(d_state), spread(d_commands), spread(d_parameters)
-        frames, tangents = self.kernels.jvp(
+        run = self.kernels.jvp if self.native else self.kernels.torch_jvp
+        frames, tangents = run(
             s0, u, p, ds0=d_s0, du=d_u, dp=d_p, active=active, h=step / n, hold=hold * n, every=every * n
         )
         require_finite(self.structure, self.kernels.fn, frames, u, p, h=step / n, hold=hold * n, every=every * n)
-        t = torch.arange(frames.shape[1], dtype=frames.dtype) * (step * every)
+        t = torch.arange(frames.shape[1], dtype=frames.dtype, device=frames.device) * (step * every)
         return Trajectory(self.structure, theta, t, unpack_state(self.structure, frames), step, n), tangents
 
-    def _check(self, theta: Parameters, state0: State, commands: Tensor, step: float, hold: int, every: int) -> None:
-        if theta is not self._checked:
+    def warn_of_impulse(self, duration: float) -> None:
+        """Warn where detached impulses would be differentiated over more than they can bear [s]."""
+        if self.structure.detach == Detach.IMPULSE and duration > IMPULSE_WINDOW:
+            _warn_of_impulse(duration)
+
+    def _checked_batch(
+        self, theta: Parameters, state0: State, commands: Tensor, step: float, hold: int, every: int
+    ) -> int:
+        """The size of the batch, after all inputs were looked at. Raises EngineInputError."""
+        looked_at = (theta, sum(x._version for x in tensors_of(theta).values()))
+        if self._checked is None or self._checked[0] is not theta or self._checked[1] != looked_at[1]:
             check_parameters(self.structure, theta)
-            self._checked = theta
+            self._checked = looked_at
         check_state(self.structure, state0)
         if commands.ndim != 3 or commands.shape[2] != self.structure.n_actuated or commands.shape[1] < 1:
             raise EngineInputError(
@@ -191,28 +203,8 @@ class Simulator:
                 "every", "frames do not fit", expected="a divisor of all steps, rows x hold",
                 received=f"every {every}, rows {commands.shape[1]}, hold {hold}",
             )  # fmt: skip
-        sizes = {len(x) for x in (commands, state0.p_WB, theta.mass)} - {1}
-        if len(sizes) > 1:
-            raise EngineInputError("batch", "different batches", expected="one size, or 1", received=str(sorted(sizes)))
-
-
-def trace_key(structure: Structure) -> str:
-    """What a compiled step depends on: the structure, the engine's sources, and those of its effects."""
-    plain = replace(structure, effects=())
-    digest = hashlib.sha256(repr(plain).encode())
-    digest.update(_sources())
-    for effect in structure.effects:
-        digest.update(repr(effect).encode())
-        digest.update(Path(inspect.getfile(type(effect))).read_bytes())
-    return digest.hexdigest()
-
-
-@lru_cache(maxsize=1)
-def _sources() -> bytes:
-    digest = hashlib.sha256(torch.__version__.encode())
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(path.name.encode() + path.read_bytes())
-    return digest.digest()
+        self.warn_of_impulse(commands.shape[1] * hold * step)
+        return common_batch({"commands": commands, **tensors_of(state0), **tensors_of(theta)})
 
 
 def _warn_of_impulse(duration: float) -> None:

@@ -148,9 +148,10 @@ def window_state(
         state = roll_relaxed(simulator, theta, state)
     state = consistent(structure, theta, state, slack=rest)
     v, w = (carried.v_WB, carried.w_R) if v_WE is None else _velocities(theta, state, v_WE)
+    memory = {name: x.expand(len(p_WE), *x.shape[1:]) for name, x in carried.extra.items()}
     return replace(
         state, v_WB=v.expand_as(state.v_WB), w_R=w.expand_as(state.w_R),
-        winding=carried.winding.expand_as(state.rest), extra=dict(carried.extra),
+        winding=carried.winding.expand_as(state.rest), extra=memory,
     )  # fmt: skip
 
 

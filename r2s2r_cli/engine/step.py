@@ -15,7 +15,7 @@ from r2s2r_cli.engine.body import Bodies, angular_change, bodies, gyroscopic, mo
 from r2s2r_cli.engine.cable import cable_rows, pulled, rest_lengths, spring_force, tension_impulse
 from r2s2r_cli.engine.contact import contact_rows, pose_velocity
 from r2s2r_cli.engine.friction_solve import solve
-from r2s2r_cli.engine.hooks import Values, WorldTerms
+from r2s2r_cli.engine.hooks import Values, WorldTerms, effective
 from r2s2r_cli.engine.parameters import Parameters
 from r2s2r_cli.engine.rod_contact import collide
 from r2s2r_cli.engine.state import State
@@ -29,8 +29,7 @@ def step(structure: Structure, theta: Parameters, state: State, u: Tensor, h: Te
     theta: batch B or 1. u: motor commands in [-1, 1], +1 reels in, (B, actuated). h: (B, 1) or (1, 1) [s].
     Frame G throughout: z up from the ground plane. Differentiable; `Structure.detach` says what of.
     """
-    for effect in structure.effects:
-        theta = effect.parameters(theta.of(effect.name), theta)
+    theta = effective(structure, theta)
     memory: dict[str, Values] = {effect.name: state.of(effect.name) for effect in structure.effects}
     rods = bodies(theta, state, axial=structure.axial)
 

@@ -12,7 +12,7 @@ from torch import Tensor
 from r2s2r_cli.effects import CATALOGUE, Effect, with_off_values
 from r2s2r_cli.effects.ground_slope import GroundSlope
 from r2s2r_cli.engine import Channel, State, end_caps, flat_step, pack_parameters, pack_state, tilted
-from r2s2r_cli.engine.rollout import trace_key
+from r2s2r_cli.engine.trace_key import trace_key
 from tests.support import parity
 from tests.support.engine import lowest_gap, random_gait, simulator
 from tests.support.phases import STEP, expanded, phases, raised, shaken, stirred

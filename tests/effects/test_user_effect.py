@@ -14,7 +14,7 @@ from torch import Tensor
 from r2s2r_cli.effects import Effect, EffectParameter, with_off_values
 from r2s2r_cli.engine import Channel, LatchedPid, Parameters, Simulator, Structure, closed_loop
 from r2s2r_cli.engine.hooks import CableTerms, ContactTerms, Values, WorldTerms
-from r2s2r_cli.engine.rollout import trace_key
+from r2s2r_cli.engine.trace_key import trace_key
 from tests.support import parity
 from tests.support.phases import STEP, expanded, phases
 from tests.support.variants import Variant, pair, shifted, with_memory

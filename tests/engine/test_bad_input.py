@@ -44,11 +44,13 @@ PARAMETERS: dict[str, tuple[str, Callable[[Parameters], Parameters]]] = {
     "negative damping": ("damping.8", with_parameter("damping", (0, 8), -1.0)),
     "negative friction": ("friction.1.0", with_parameter("friction", (0, 1, 0), -0.1)),
     "negative rest length": ("rest.0", with_parameter("rest", (0, 0), -0.1)),
+    "restitution above 1": ("restitution.0", with_parameter("restitution", (0, 0), 1.2)),
     "cap of no size": ("cap_radius.0.1", with_parameter("cap_radius", (0, 0, 1), 0.0)),
     "rod of zero length": ("p_BE", lambda theta: replace(theta, p_BE=0 * theta.p_BE)),
     "no inertia": ("inertia", lambda theta: replace(theta, inertia=0 * theta.inertia)),
     "NaN stiffness": ("stiffness", with_parameter("stiffness", (0, 4), math.nan)),
     "infinite speed": ("speed_in", with_parameter("speed_in", (0, 0), math.inf)),
+    "winch ends crossed": ("rest_min.3", with_parameter("rest_min", (0, 3), 0.5)),
     "too few masses": ("mass", lambda theta: replace(theta, mass=theta.mass[:, :2])),
     "no batch axis": ("mass", lambda theta: replace(theta, mass=theta.mass[0])),
     "gravity of two numbers": ("gravity", lambda theta: replace(theta, gravity=theta.gravity[:, :2])),
@@ -102,7 +104,8 @@ def test_impossible_states(case: str) -> None:
         ("step", {"step": math.nan}),
         ("every", {"every": 7}),
         ("every", {"hold": 0}),
-        ("batch", {"commands": STILL.expand(3, -1, -1), "state0": "two"}),
+        ("substeps", {"substeps": -1}),
+        ("p_WB", {"commands": STILL.expand(3, -1, -1), "state0": "two"}),
     ],
 )
 def test_impossible_rollouts(field: str, how: dict[str, object]) -> None:

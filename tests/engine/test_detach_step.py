@@ -30,8 +30,8 @@ def slope(value: Tensor, of: Tensor) -> list[float]:
 
 
 def test_no_mode_changes_a_value() -> None:
-    """Forty steps of a tilted rod that lands and slips are equal in all modes: in torch to the last bit, in machine code
-    to rounding (a detached product is not fused with the sum that follows)."""
+    """Forty steps of a tilted rod that lands and slips agree in all modes: in torch to the last bit, in machine
+    code to rounding (a detached product is not fused with the sum that follows)."""
     ends = []
     for structure in MODES.values():
         start = state(

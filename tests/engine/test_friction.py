@@ -29,6 +29,18 @@ ROD = free_rods(rod_contact=False)
 H = 1e-3
 
 
+def test_sliding_distance() -> None:
+    """Pushed along its axis a rod slides v^2 / (2 mu g), for every mu and v, up to half a step's path."""
+    v, mu = torch.meshgrid(vector(0.3, 0.6, 0.9), vector(0.3, 0.6, 1.0), indexing="ij")
+    v, mu = v.flatten(), mu.flatten()
+    start = lying(ROD, batch=len(v), v=torch.stack([v, 0 * v, 0 * v], -1)[:, None])
+    end = after(ROD, parameters(ROD, friction=mu[:, None, None].expand(-1, 1, 2)), start, 320, H)
+    assert float(end.v_WB.abs().max()) < 1e-7
+    distance = v * v / (2 * mu * G)
+    assert bool(((end.p_WB[:, 0, 0] - distance).abs() <= v * H / 2 + 1e-6).all())
+    assert float(end.p_WB[:, 0, 1:].sub(vector(0.0, RADIUS)).abs().max()) < 1e-8
+
+
 def test_the_derivative_of_a_sliding_distance() -> None:
     """dd/dv = v / (mu g) and dd/dmu = -v^2 / (2 mu^2 g), within the step's share of the slide."""
     v, mu = (torch.tensor([x], dtype=torch.float64, requires_grad=True) for x in (0.6, 0.6))
@@ -38,6 +50,28 @@ def test_the_derivative_of_a_sliding_distance() -> None:
     # The slide lasts 102 steps, and the last of them is cut.
     assert float(found[0]) == pytest.approx(0.6 / (0.6 * G), rel=0.01)
     assert float(found[1]) == pytest.approx(-(0.6**2) / (2 * 0.6**2 * G), rel=0.02)
+
+
+def test_slope_below_and_above_the_angle_of_friction() -> None:
+    """A rod along the fall line rests at 0.98 atan(mu) and slides at 1.02 atan(mu), with g (sin a - mu cos a)."""
+    mu = vector(0.3, 0.6, 1.0).repeat(2)
+    angle = torch.atan(mu) * vector(*[0.98] * 3, *[1.02] * 3)
+    theta = parameters(ROD, friction=mu[:, None, None].expand(-1, 1, 2), gravity=slope(angle))
+    end = after(ROD, theta, lying(ROD, batch=6), 300, H)
+    assert float(end.p_WB[:3, 0, 0].abs().max()) < 1e-6
+    assert float(end.v_WB[:3].abs().max()) < 1e-6
+    along = G * (torch.sin(angle) - mu * torch.cos(angle))[3:]
+    assert torch.allclose(end.v_WB[3:, 0, 0], 0.3 * along, rtol=0.01, atol=0)
+
+
+def test_acceleration_on_a_steep_slope() -> None:
+    """40 degrees, mu 0.6: the acceleration is g (sin a - mu cos a) within 0.1 %, straight down the slope; the rod does
+    not rise or sink by more than two sweeps leave, 1 mm/s."""
+    a = math.radians(40)
+    end = after(ROD, parameters(ROD, friction=0.6, gravity=slope(a)), lying(ROD), 300, H)
+    assert float(end.v_WB[0, 0, 0]) / 0.3 == pytest.approx(G * (math.sin(a) - 0.6 * math.cos(a)), rel=1e-3)
+    assert abs(float(end.v_WB[0, 0, 1])) < 1e-9
+    assert abs(float(end.v_WB[0, 0, 2])) < 1e-3
 
 
 def test_slides_along_any_direction_of_the_plane() -> None:

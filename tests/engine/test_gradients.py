@@ -106,7 +106,9 @@ def test_impact(e: float) -> None:
         vector(0.0, 0.0, RADIUS + reach + 0.01), axis=slant, v=vector(0.3, 0.1, -1.0), w=vector(1.0, -0.5, 2.0)
     )
     theta = parameters(LEASHED, rest=cable, restitution=e, friction=0.5)
-    before, after = (simulator(LEASHED).rollout(theta, start, torch.zeros(1, n, 0)).at(-1) for n in (8, 12))
+    before, after = (
+        simulator(LEASHED).rollout(theta, start, torch.zeros(1, n, 0, dtype=torch.float64)).at(-1) for n in (8, 12)
+    )
     assert float(after.v_WB[0, 0, 2] - before.v_WB[0, 0, 2]) > 0.2
     assert discrepancy(LEASHED, theta, start, 15) < TOLERANCE
 

@@ -161,3 +161,13 @@ def test_a_rod_lies_on_two_others() -> None:
     p_WB = simulate(pile, theta, state(pile, p, axis=torch.stack([X, Y, Y])), 3000, 1e-3, every=1000).states.p_WB[0]
     assert float(p_WB[-1, 0, 2]) == pytest.approx(0.0175 + 2 * SHAFT, abs=2e-4)
     assert float((p_WB[-1] - p_WB[-2]).abs().max()) < 1e-4
+
+
+def test_axes_that_cross_are_pushed_apart() -> None:
+    """Two rods whose axes cross in one point have no direction between them: the step stays finite and parts them."""
+    structure = free_rods(2)
+    theta = parameters(structure)
+    start = state(structure, vector(0.0, 0.0, 1.0).expand(2, 3), axis=torch.stack([vector(1, 0, 0), vector(0, 1, 0)]))
+    end = after(structure, theta, start, 20, 1e-3)
+    assert torch.isfinite(end.p_WB).all() and torch.isfinite(end.v_WB).all()
+    assert float((end.p_WB[0, 1] - end.p_WB[0, 0]).abs().max()) > 1e-4

@@ -237,6 +237,25 @@ class NativeStep:
         kinds = Active(ds0 is not None, du is not None, places)
         return self._jvp(s0, u, p, tangents, kinds, Schedule(h, hold, every, threads))
 
+    def torch_jvp(
+        self,
+        s0: Tensor,
+        u: Tensor,
+        p: Tensor,
+        *,
+        ds0: Tensor | None = None,
+        du: Tensor | None = None,
+        dp: Tensor | None = None,
+        active: tuple[int, ...] | None = None,
+        h: float,
+        hold: int = 1,
+        every: int = 1,
+    ) -> tuple[Tensor, Tensor]:
+        """The same as `jvp` in plain torch, on any device."""
+        s0, u, p = checked(self.sizes, s0, u, p, h, hold, every)
+        tangents = self.sizes.tangents(s0, u, ds0, du, dp)
+        return eager.jvp(self.fn, s0, u, p, tangents, active, h=h, hold=hold, every=every)
+
     def _jvp(
         self, s0: Tensor, u: Tensor, p: Tensor, tangents: tuple[Tensor, Tensor, Tensor], kinds: Active, plan: Schedule
     ) -> tuple[Tensor, Tensor]:

@@ -5,6 +5,7 @@ Run `python examples/05_engine_library/run.py`; docs/guides/engine-as-a-library.
 
 from __future__ import annotations
 
+import argparse
 import tomllib
 from dataclasses import replace
 from typing import NamedTuple
@@ -54,11 +55,11 @@ def bench() -> Bench:
 
 
 def gait() -> Tensor:
-    """Motor commands (1, 8, 6), each held for 0.2 s: reel in cables 1, 3, 4 and 5, then pay 1 out and reel 2 in."""
+    """Motor commands (1, 7, 6), each held for 0.2 s: reel in cables 1, 3, 4 and 5, then pay 1 out and reel 2 in."""
     first, second = torch.zeros(2, 6, dtype=torch.float64)
     first[[1, 3, 4, 5]] = 1.0
     second[1], second[2] = -1.0, 1.0
-    return torch.stack([first] * 6 + [second] * 2)[None]
+    return torch.stack([first] * 5 + [second] * 2)[None]
 
 
 def displacement(theta: Parameters, run: Trajectory) -> Tensor:
@@ -77,7 +78,7 @@ def moved_by(b: Bench, friction: Tensor, speed: Tensor) -> Tensor:
         b.theta, friction=each[..., None] * torch.ones_like(b.theta.friction),
         speed_in=speed[:, None] * b.theta.speed_in, speed_out=speed[:, None] * b.theta.speed_out,
     )  # fmt: skip
-    run = b.simulator.rollout(theta, b.start, gait().expand(len(friction), -1, -1), step=1e-3, hold=200, every=1600)
+    run = b.simulator.rollout(theta, b.start, gait().expand(len(friction), -1, -1), step=1e-3, hold=200, every=1400)
     return displacement(b.theta, run)
 
 
@@ -162,4 +163,5 @@ def _mm(x: Tensor) -> str:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     main()

@@ -26,7 +26,7 @@ from r2s2r_cli.engine.hooks import effective
 from r2s2r_cli.engine.native import NativeStep, rollout
 from r2s2r_cli.engine.nonfinite import require_finite
 from r2s2r_cli.engine.parameters import Parameters, check_parameters
-from r2s2r_cli.engine.reading import longest_step, surely_stable_step
+from r2s2r_cli.engine.reading import always_stable_step, longest_step
 from r2s2r_cli.engine.state import State, check_state, end_caps
 from r2s2r_cli.engine.structure import Detach, Structure
 from r2s2r_cli.engine.trace_key import trace_key
@@ -83,6 +83,7 @@ class Simulator:
         self.threads = threads
         self.native = native is not False
         self._checked: tuple[Parameters, int] | None = None
+        self._always = 0.0
         self.kernels = NativeStep(
             flat_step(structure), size(state_slots(structure)), structure.n_actuated, size(parameter_slots(structure)),
             key=trace_key(structure), cache_dir=cache_dir, twins=twins(structure),
@@ -130,7 +131,8 @@ class Simulator:
 
     def substeps(self, theta: Parameters, state: State, step: float) -> int:
         """Engine steps per `step` that keep explicit stiff cables stable at this state (see `longest_step`)."""
-        if step <= surely_stable_step(self.structure, theta, state):
+        known = self._checked is not None and self._checked[0] is theta
+        if step <= (self._always if known else always_stable_step(self.structure, theta)):
             return 1
         return max(1, math.ceil(step / longest_step(self.structure, theta, state) - 1e-9))
 
@@ -187,7 +189,7 @@ class Simulator:
         looked_at = (theta, sum(x._version for x in tensors_of(theta).values()))
         if self._checked is None or self._checked[0] is not theta or self._checked[1] != looked_at[1]:
             check_parameters(self.structure, theta)
-            self._checked = looked_at
+            self._checked, self._always = looked_at, always_stable_step(self.structure, theta)
         check_state(self.structure, state0)
         if commands.ndim != 3 or commands.shape[2] != self.structure.n_actuated or commands.shape[1] < 1:
             raise EngineInputError(

@@ -9,7 +9,19 @@ import pytest
 import torch
 from torch import Tensor
 
-from r2s2r_cli.engine import Parameters, State, Structure, cap_lengths, energy, longest_step, momentum, read, step
+from r2s2r_cli.engine import (
+    Parameters,
+    State,
+    Structure,
+    cap_lengths,
+    energy,
+    longest_step,
+    momentum,
+    pose_state,
+    read,
+    step,
+)
+from r2s2r_cli.engine.reading import always_stable_step
 from tests.support.engine import (
     AXIAL,
     HALF,
@@ -24,7 +36,7 @@ from tests.support.engine import (
     state,
     vector,
 )
-from tests.support.robots import rested, subject
+from tests.support.robots import frames, rested, subject
 
 K, C, REST, LENGTH = 300.0, 4.0, 0.2, 0.23
 
@@ -196,3 +208,15 @@ def test_the_limit_is_where_an_explicit_spring_blows_up(share: float, stable: bo
     farthest = max(float((s.p_WB[:, 1] - s.p_WB[:, 0]).norm()) for s in states)
     assert (farthest < 10) if stable else (farthest > 1e6)
     assert share > 0.55 or farthest < 0.26
+
+
+def test_the_step_that_is_always_stable_is_a_lower_bound() -> None:
+    """In random poses of the robot no exact limit is below the one that holds in every pose, and that is not idle."""
+    model = subject()
+    always = always_stable_step(model.structure, model.theta)
+    generator = torch.Generator().manual_seed(2)
+    for _ in range(20):
+        p_WE = model.p_WE + 0.05 * torch.randn(model.p_WE.shape, generator=generator, dtype=torch.float64)
+        lying = pose_state(model.structure, model.theta, p_WE, frames(p_WE), rest=rested().state.rest)
+        assert longest_step(model.structure, model.theta, lying) >= always
+    assert always > 1e-3

@@ -59,7 +59,8 @@ class Asked:
                 )
             except OSError as error:
                 raise InputError("the policy cannot be read", where=str(path), expected="a policy file or an artifact",
-                                 received=error.strerror or str(error), hint="ls policies") from error  # fmt: skip
+                                 received=error.strerror or str(error),
+                                 hint="r2s2r simulate --random 15") from error  # fmt: skip
             refs[ref.path] = ref
         if self._recorded is not None:
             ref = artifact_ref(self.project, self._recorded, whole_header(self._recorded))

@@ -69,7 +69,8 @@ def test_detached_geometry_stays_bounded_and_detached_impulses_do_not() -> None:
     """`geometry` keeps the constraint in the tangent and is as bounded as the whole derivative; `impulse` leaves it
     out, and its tangent is beyond all bounds after a few seconds: why it is for short windows only."""
     assert float(growth(Detach.GEOMETRY)[1].max()) < 1000.0
-    assert float(growth(Detach.IMPULSE)[1][:, 3].median()) > 1e4
+    with pytest.warns(RuntimeWarning, match="impulse"):
+        assert float(growth(Detach.IMPULSE)[1][:, 3].median()) > 1e4
 
 
 @pytest.mark.parametrize("seconds", [1, 2])

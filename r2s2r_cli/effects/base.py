@@ -82,5 +82,7 @@ def with_off_values(structure: Structure, theta: Parameters) -> Parameters:
     for effect in structure.effects:
         off = effect.off(structure)
         for name, n in effect.sizes(structure).items():
-            values.setdefault(f"{effect.name}.{name}", torch.full((1, n), off[name], dtype=theta.mass.dtype))
+            values.setdefault(
+                f"{effect.name}.{name}", torch.full((1, n), off[name], dtype=theta.mass.dtype, device=theta.mass.device)
+            )
     return theta.with_values(values)

@@ -81,7 +81,7 @@ def _ground_wrenches(structure: Structure, theta: Parameters, rods: Bodies) -> T
     batch, n = len(rods.p), structure.n_rods
     wrench = rods.p.new_zeros(batch, n, 6, n, 2, 3)
     near = (rows.gap < TOUCHING).to(rods.p.dtype)
-    unit = torch.eye(3, dtype=rods.p.dtype)
+    unit = torch.eye(3, dtype=rods.p.dtype, device=rods.p.device)
     arm = rows.arm.unflatten(2, (2, 3))
     for rod in range(n):
         for cap in (0, 1):
@@ -94,10 +94,10 @@ def _ground_wrenches(structure: Structure, theta: Parameters, rods: Bodies) -> T
 def _least(matrix: Tensor, load: Tensor, structure: Structure) -> Tensor:
     """Minimum of |load + matrix x|^2 + SHRINK |x|^2 with tensions and normal forces at least 0."""
     n = structure.n_actuated
-    free = torch.ones(matrix.shape[-1], dtype=torch.bool)
+    free = torch.ones(matrix.shape[-1], dtype=torch.bool, device=matrix.device)
     free[:n] = False
     free[n + 2 :: 3] = False
-    normal = matrix.mT @ matrix + SHRINK * torch.eye(matrix.shape[-1], dtype=matrix.dtype)
+    normal = matrix.mT @ matrix + SHRINK * torch.eye(matrix.shape[-1], dtype=matrix.dtype, device=matrix.device)
     pull = (matrix.mT @ load[..., None])[..., 0]
     rate = 1.0 / torch.linalg.eigvalsh(normal)[..., -1:]
     x = torch.zeros_like(pull)

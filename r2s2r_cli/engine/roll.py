@@ -76,8 +76,8 @@ def roll_relaxed(simulator: Simulator, theta: Parameters, state: State, *, round
 def _rolled(simulator: Simulator, theta: Parameters, state: State) -> State:
     structure = simulator.structure
     p = pack_parameters(structure, theta)
-    idle = torch.zeros(len(state.p_WB), 1, structure.n_actuated, dtype=state.p_WB.dtype)
-    before = torch.zeros(len(state.p_WB), dtype=state.p_WB.dtype)
+    idle = state.p_WB.new_zeros(len(state.p_WB), 1, structure.n_actuated)
+    before = state.p_WB.new_zeros(len(state.p_WB))
     for _ in range(60):
         frames = simulator.advance(pack_state(structure, state), idle, p, h=5e-4, hold=10, every=10)
         require_finite(structure, simulator.kernels.fn, frames, idle, p, h=5e-4, hold=10, every=10)

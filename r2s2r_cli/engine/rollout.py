@@ -60,6 +60,13 @@ class Trajectory:
         )
         return end_caps(theta, merged).unflatten(0, (batch, frames))
 
+    def observed(self) -> Tensor:
+        """End caps as the camera sees them, (B, frame, cap, 3) [m]: effects of channel observation included."""
+        p_WE = self.end_caps()
+        for effect in self.structure.effects:
+            p_WE = effect.observation(self.theta.of(effect.name), self.t, p_WE)
+        return p_WE
+
 
 def pack_state_frames(structure: Structure, states: State) -> Tensor:
     """Flat states (B, frame, NS) of a State whose fields are (B, frame, ...)."""

@@ -78,8 +78,8 @@ def settled(
     winched = list(structure.actuated)
     p, h = pack_parameters(structure, theta), step / simulator.substeps(theta, state, step)
     count = max(1, round(SPELL / h))
-    idle = torch.zeros(len(p_WE), 1, structure.n_actuated, dtype=p_WE.dtype)
-    before = torch.zeros(len(p_WE), dtype=p_WE.dtype)
+    idle = p_WE.new_zeros(len(p_WE), 1, structure.n_actuated)
+    before = p_WE.new_zeros(len(p_WE))
     speed, used = before, 0
     while used < spells:
         used += 1

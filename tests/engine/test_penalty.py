@@ -74,7 +74,7 @@ def compared() -> tuple[dict[float, Tensor], Tensor]:
 @pytest.mark.slow
 def test_random_gait_steps_agree_with_the_penalty_integration() -> None:
     """288 random gait steps of 1 s (median motion 8 cm) at 1 ms: the median of the largest cap error is below 0.3 mm
-    over all; where the robot stays on its feet 97 % are below 1 mm."""
+    over all; where the robot stays on its feet 98 % are below 1 mm."""
     errors, standing = compared()
     assert float(errors[1e-3].median()) < 3e-4
     assert float(standing.to(torch.float64).mean()) > 0.7

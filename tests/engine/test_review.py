@@ -141,3 +141,28 @@ def test_detached_impulses_warn_wherever_they_run() -> None:
         Simulator(structure, native=False).jvp(
             theta, start, idle, d_state=torch.zeros(13, 1, dtype=torch.float64), step=0.1, hold=6
         )
+
+
+class _Shifted(Effect):
+    name = "shifted"
+    channel = Channel.OBSERVATION
+    title = "a camera that stands elsewhere"
+    own = (EffectParameter("offset_m", "m", -1.0, 1.0, off=0.0, scale=0.01, what="along x"),)
+
+    @classmethod
+    def signature(cls) -> str:
+        """Everything is elsewhere."""
+        return "everything is elsewhere"
+
+    def observation(self, x: Values, t: Tensor, p_WE: Tensor) -> Tensor:
+        """Caps moved along x."""
+        return p_WE + x["offset_m"][:, None, None] * vector(1.0, 0.0, 0.0)
+
+
+def test_a_trajectory_is_observed_through_its_effects() -> None:
+    """An effect of channel observation moves what is observed, and not what is."""
+    structure = free_rods().with_effects(_Shifted())
+    theta = parameters(free_rods()).with_values({"shifted.offset_m": torch.full((1, 1), 0.02, dtype=torch.float64)})
+    idle = torch.zeros(1, 3, 0, dtype=torch.float64)
+    run = Simulator(structure, native=False).rollout(theta, state(structure, vector(0.0, 0.0, 1.0)[None]), idle)
+    assert torch.allclose(run.observed() - run.end_caps(), 0.02 * vector(1.0, 0.0, 0.0).expand(1, 4, 2, 3))

@@ -103,11 +103,11 @@ def unpack_parameters(structure: Structure, p: Tensor) -> Parameters:
     return Parameters(**named, extra=extra)
 
 
-def pack_state(structure: Structure, state: State) -> Tensor:
-    """Flat state vector (B, NS); differentiable."""
+def pack_state(structure: Structure, state: State, *, leading: int = 1) -> Tensor:
+    """Flat state vector (B, NS); differentiable. leading: axes before those of a field, 2 for frames (B, F, NS)."""
     names = state_slots(structure)
-    parts = [(state.extra[name] if "." in name else getattr(state, name)).flatten(1) for name in names]
-    return torch.cat(parts, dim=1)
+    parts = [(state.extra[name] if "." in name else getattr(state, name)).flatten(leading) for name in names]
+    return torch.cat(parts, dim=leading)
 
 
 def unpack_state(structure: Structure, s: Tensor) -> State:

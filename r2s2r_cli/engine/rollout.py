@@ -48,11 +48,11 @@ class Trajectory:
 
     def at(self, frame: int) -> State:
         """The state at one frame, batch first."""
-        return unpack_state(self.structure, pack_state_frames(self.structure, self.states)[:, frame])
+        return unpack_state(self.structure, pack_state(self.structure, self.states, leading=2)[:, frame])
 
     def end_caps(self) -> Tensor:
         """End-cap centres p_WE [m], (B, frame, cap, 3)."""
-        flat = pack_state_frames(self.structure, self.states)
+        flat = pack_state(self.structure, self.states, leading=2)
         batch, frames = flat.shape[:2]
         merged = unpack_state(self.structure, flat.flatten(0, 1))
         theta = effective(self.structure, self.theta).map(
@@ -66,14 +66,6 @@ class Trajectory:
         for effect in self.structure.effects:
             p_WE = effect.observation(self.theta.of(effect.name), self.t, p_WE)
         return p_WE
-
-
-def pack_state_frames(structure: Structure, states: State) -> Tensor:
-    """Flat states (B, frame, NS) of a State whose fields are (B, frame, ...)."""
-    parts = [
-        (states.extra[name] if "." in name else getattr(states, name)).flatten(2) for name in state_slots(structure)
-    ]
-    return torch.cat(parts, dim=2)
 
 
 class Simulator:
@@ -115,9 +107,7 @@ class Simulator:
         says how contacts count). substeps: engine steps a `step`; None: as many as stiff cables need.
         Raises EngineInputError for wrong inputs, NonFiniteError where the simulation leaves the finite numbers.
         """
-        batch = self._checked_batch(theta, state0, commands, step, hold, every)
-        if substeps is not None and substeps < 1:
-            raise EngineInputError("substeps", "no step", expected="at least 1", received=str(substeps))
+        batch = self._checked_batch(theta, state0, commands, step, hold, every, substeps)
         if ground is not None:
             theta, state0 = ground.parameters(theta), ground.to_ground(state0)
         n = substeps or self.substeps(theta, state0, step)
@@ -163,9 +153,7 @@ class Simulator:
         (NS, D) likewise of `pack_state`; d_commands: (row, actuated, D). None: zero. Returns the trajectory and the
         tangents of its flat states (B, frame, NS, D).
         """
-        batch = self._checked_batch(theta, state0, commands, step, hold, every)
-        if substeps is not None and substeps < 1:
-            raise EngineInputError("substeps", "no step", expected="at least 1", received=str(substeps))
+        batch = self._checked_batch(theta, state0, commands, step, hold, every, substeps)
         n = substeps or self.substeps(theta, state0, step)
         s0 = pack_state(self.structure, state0).expand(batch, -1).contiguous()
         u, p = commands.expand(batch, -1, -1).contiguous(), pack_parameters(self.structure, theta)
@@ -184,15 +172,19 @@ class Simulator:
         t = torch.arange(frames.shape[1], dtype=frames.dtype, device=frames.device) * (step * every)
         return Trajectory(self.structure, theta, t, unpack_state(self.structure, frames), step, n), tangents
 
-    def warn_of_impulse(self, duration: float) -> None:
-        """Warn where detached impulses would be differentiated over more than they can bear [s]."""
-        if self.structure.detach == Detach.IMPULSE and duration > IMPULSE_WINDOW:
-            _warn_of_impulse(duration)
-
     def _checked_batch(
-        self, theta: Parameters, state0: State, commands: Tensor, step: float, hold: int, every: int
+        self,
+        theta: Parameters,
+        state0: State,
+        commands: Tensor,
+        step: float,
+        hold: int,
+        every: int,
+        substeps: int | None,
     ) -> int:
         """The size of the batch, after all inputs were looked at. Raises EngineInputError."""
+        if substeps is not None and substeps < 1:
+            raise EngineInputError("substeps", "no step", expected="at least 1", received=str(substeps))
         looked_at = (theta, sum(x._version for x in tensors_of(theta).values()))
         if self._checked is None or self._checked[0] is not theta or self._checked[1] != looked_at[1]:
             check_parameters(self.structure, theta)
@@ -212,7 +204,9 @@ class Simulator:
                 "every", "frames do not fit", expected="a divisor of all steps, rows x hold",
                 received=f"every {every}, rows {commands.shape[1]}, hold {hold}",
             )  # fmt: skip
-        self.warn_of_impulse(commands.shape[1] * hold * step)
+        duration = commands.shape[1] * hold * step
+        if self.structure.detach == Detach.IMPULSE and duration > IMPULSE_WINDOW:
+            _warn_of_impulse(duration)
         return common_batch({"commands": commands, **tensors_of(state0), **tensors_of(theta)})
 
 

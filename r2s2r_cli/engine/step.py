@@ -59,11 +59,10 @@ def step(structure: Structure, theta: Parameters, state: State, u: Tensor, h: Te
     # The pose turns with the mean of w over what the gyroscopic torque does: angular momentum to second order.
     p_GB, q_GR = moved(state, along + after.shift, turning + after.turn - 0.5 * spin, h)
 
-    winding = commanded_rate(structure, theta, u, impulse[:, list(structure.actuated)] / h)
+    tension = impulse[:, list(structure.actuated)] / h
+    winding = commanded_rate(structure, theta, u, tension)
     for effect in structure.effects:
-        winding, memory[effect.name] = effect.motor(
-            theta.of(effect.name), memory[effect.name], winding, impulse[:, list(structure.actuated)] / h, h
-        )
+        winding, memory[effect.name] = effect.motor(theta.of(effect.name), memory[effect.name], winding, tension, h)
     if structure.lag:
         winding = lagged(theta, state.winding, winding, h)
     rest = wound(theta, state.rest, winding, h)

@@ -227,10 +227,10 @@ class NativeStep:
 
         active: places of the parameter vector that may carry a tangent, all by default; dp is read there only.
         """
+        if not self.native(s0):
+            return self.torch_jvp(s0, u, p, ds0=ds0, du=du, dp=dp, active=active, h=h, hold=hold, every=every)
         s0, u, p = checked(self.sizes, s0, u, p, h, hold, every)
         tangents = self.sizes.tangents(s0, u, ds0, du, dp)
-        if not self.native(s0):
-            return eager.jvp(self.fn, s0, u, p, tangents, active, h=h, hold=hold, every=every)
         places = () if dp is None else tuple(range(self.sizes.n_param)) if active is None else active
         if dp is not None:
             tangents = (*tangents[:2], tangents[2][:, list(places)])

@@ -1,0 +1,44 @@
+"""What a fit knows of the recorded runs: observations, smoothed states, commands, segments; and which segments it may use."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.stages.segments import Intervals, Segments
+
+
+@dataclass(frozen=True)
+class RunData:
+    """One recorded run; frames are the kept frames, frame W has the ground at z = 0.
+
+    t: (frame,) [s]. observed: end caps as the tracker gave them, moved on to the ground [m], (frame, cap, 3); noise:
+    their sd [m], (cap, 3). p_WE, sd_p, v_WE, sd_v: smoothed end caps [m], [m/s] and sd per axis, (frame, cap, 3): they
+    know later frames, so no test segment may start from them. quality: codes of schemas/estimate.py, (frame, cap).
+    t_command: (row,) [s]; control, target: (row, actuated), a row holds until the next. intervals, segments: of the
+    design.
+    """
+
+    name: str
+    t: np.ndarray
+    observed: np.ndarray
+    noise: np.ndarray
+    p_WE: np.ndarray
+    sd_p: np.ndarray
+    v_WE: np.ndarray
+    sd_v: np.ndarray
+    quality: np.ndarray
+    t_command: np.ndarray
+    control: np.ndarray
+    target: np.ndarray
+    intervals: Intervals
+    segments: Segments
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Target intervals of one run, 1-based, ascending: `crawl:1-7` is Selection("crawl", (1, ..., 7))."""
+
+    run: str
+    intervals: tuple[int, ...]

@@ -1,0 +1,81 @@
+"""One number that a fit may change: its name, range, prior, and the coordinate it is searched in."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+
+class Coordinate(StrEnum):
+    """How a number x in (lower, upper) becomes a coordinate z that an optimiser moves freely."""
+
+    LINEAR = "linear"
+    """z = x: for numbers of either sign."""
+    LOG = "log"
+    """z = ln x: a step is a share of the value. For positive numbers whose range is wide."""
+    LOGIT = "logit"
+    """z = ln((x - lower) / (upper - x)): cannot leave its range. For shares."""
+
+
+@dataclass(frozen=True)
+class Free:
+    """A parameter that is free in a fit. All numbers in `unit`.
+
+    start: value of robot.toml, where a fit begins. lower, upper: hard bounds. prior_sd: standard deviation of a normal
+    prior about `start`, in the coordinate (for LOG: relative); inf: flat within the bounds. what: for people.
+    """
+
+    name: str
+    unit: str
+    start: float
+    lower: float
+    upper: float
+    coordinate: Coordinate = Coordinate.LOG
+    prior_sd: float = math.inf
+    what: str = ""
+
+    def to_z(self, value: float) -> float:
+        """The coordinate of a value strictly inside the bounds (or on them, where the coordinate is not LOGIT)."""
+        if self.coordinate is Coordinate.LOG:
+            return math.log(value)
+        if self.coordinate is Coordinate.LOGIT:
+            return math.log((value - self.lower) / (self.upper - value))
+        return value
+
+    def from_z(self, z: float) -> float:
+        """The value of a coordinate."""
+        if self.coordinate is Coordinate.LOG:
+            return math.exp(z)
+        if self.coordinate is Coordinate.LOGIT:
+            return self.lower + (self.upper - self.lower) / (1.0 + math.exp(-z))
+        return z
+
+    def slope(self, z: float) -> float:
+        """d value / d z."""
+        if self.coordinate is Coordinate.LOG:
+            return math.exp(z)
+        if self.coordinate is Coordinate.LOGIT:
+            share = 1.0 / (1.0 + math.exp(-z))
+            return (self.upper - self.lower) * share * (1.0 - share)
+        return 1.0
+
+    def bounds_z(self) -> tuple[float, float]:
+        """Bounds of the coordinate; LOGIT has none that is finite."""
+        if self.coordinate is Coordinate.LOGIT:
+            return -math.inf, math.inf
+        if self.coordinate is Coordinate.LOG:
+            return (math.log(self.lower) if self.lower > 0 else -math.inf), math.log(self.upper)
+        return self.lower, self.upper
+
+
+def values_of(frees: tuple[Free, ...], z: np.ndarray) -> np.ndarray:
+    """Values of coordinates (n,)."""
+    return np.array([free.from_z(float(one)) for free, one in zip(frees, z, strict=True)])
+
+
+def slopes_of(frees: tuple[Free, ...], z: np.ndarray) -> np.ndarray:
+    """d value / d coordinate, (n,)."""
+    return np.array([free.slope(float(one)) for free, one in zip(frees, z, strict=True)])

@@ -12,9 +12,9 @@ import numpy as np
 class Evaluation:
     """Residuals at one point.
 
-    residual: (m,), each divided by its standard deviation, priors not included. jacobian: d residual / d z, (m, n); None
-    where it was not asked for. block: (m,) int, residuals with one number share one robust weight (the three axes of one
-    cap at one frame).
+    residual: (m,), each divided by its standard deviation, priors not included. jacobian: d residual / d z, (m, n);
+    None where it was not asked for. block: (m,) int, residuals with one number share one robust weight (the three axes
+    of one cap at one frame).
     """
 
     residual: np.ndarray
@@ -36,5 +36,5 @@ class Problem(Protocol):
     prior_sd: np.ndarray
 
     def evaluate(self, z: np.ndarray, *, jacobian: bool = True) -> Evaluation:
-        """Residuals at z. Raises NumericalError where the simulation leaves the finite numbers: a step to be refused."""
+        """Residuals at z. Raises NumericalError where the simulation is not finite: a step to be refused."""
         ...

@@ -1,0 +1,145 @@
+"""A recorded and estimated run as what a fit knows of it, or why nothing can be learned from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.identify.data import RunData
+from r2s2r_cli.stages.segments import Intervals, Segments
+
+STILL = 3.0
+"""A run whose smoothed caps move less than this many standard deviations of the noise (all axes) shows no motion."""
+
+
+def run_data(recording: ArtifactData | None, estimate: ArtifactData, run: str, *, name: str = "") -> RunData:
+    """The run of both artifacts; `name`: what it is called in the fit (default: as there).
+
+    observed: the recording's end caps at the frames that the estimate kept, moved on to its ground. Without end caps
+    in the recording (a tracker made them on the way), the smoothed ones of the estimate.
+
+    Raises InputError where there are no kept frames, target intervals or motor commands, where the recording is another
+    one, for numbers that are not finite, and where no cap moves.
+    """
+    frames, tracks, commands = (_group(estimate, run, stream) for stream in ("frames", "tracks", "commands"))
+    if not len(frames["t"]):
+        raise InputError(
+            f"run {run} has no frame left", where=f"runs/{run}/frames/t", expected="kept frames", received="none",
+            hint="r2s2r inspect 10-record.h5   # drop_reason: why rows were left out",
+        )  # fmt: skip
+    intervals = Intervals.from_group(_group(estimate, run, "intervals"))
+    if not len(intervals):
+        raise InputError(
+            f"run {run} has no target intervals", where=f"runs/{run}/intervals", expected="targets in its log",
+            received="no interval", hint="r2s2r import run.csv   # with columns target0, target1, ...",
+        )  # fmt: skip
+    caps = None if recording is None else recording.group(run, "caps")
+    found = RunData(
+        name=name or run,
+        t=frames["t"],
+        observed=frames["p_WE"] if caps is None else _observed(caps, frames, _group(estimate, run, "ground"), run),
+        noise=tracks["noise_sd"],
+        p_WE=frames["p_WE"],
+        sd_p=np.sqrt(np.diagonal(frames["cov_p_WE"], axis1=-2, axis2=-1)),
+        v_WE=frames["v_WE"],
+        sd_v=frames["sd_v_WE"],
+        quality=frames["quality"],
+        t_command=commands["t"],
+        control=_control(commands, run),
+        target=commands["target"],
+        intervals=intervals,
+        segments=Segments.from_group(_group(estimate, run, "segments")),
+        sampled=caps is not None and bool(np.isin(commands["t"], caps["t"]).all()),
+    )
+    _require_finite(found, run)
+    _require_rows(found, run)
+    _require_motion(found, run)
+    return found
+
+
+def require_two_intervals(runs: Sequence[RunData]) -> None:
+    """Raises InputError where all runs together have fewer than two complete intervals: no test beside a training."""
+    complete = sum(int(run.intervals.complete.sum()) for run in runs)
+    if complete >= 2:
+        return
+    names = ", ".join(run.name for run in runs) or "none"
+    targets = np.concatenate([run.target[np.isfinite(run.target).all(axis=1)] for run in runs]) if runs else np.zeros(0)
+    if len(targets) and len(np.unique(targets, axis=0)) == 1:
+        what, received = "the targets never change", f"one target vector in all of {names}"
+    else:
+        what, received = "one target interval is not enough", f"{complete} complete in {names}"
+    raise InputError(
+        what, where="intervals/target", received=received,
+        expected="at least two complete target intervals, one to train on and one to test",
+        hint="r2s2r import run.csv   # a log of a gait with several targets",
+    )  # fmt: skip
+
+
+def _group(data: ArtifactData, run: str, stream: str) -> Group:
+    group = data.group(run, stream)
+    if group is None:
+        raise InputError(
+            f"run {run} has no {stream}", where=f"runs/{run}/{stream}", expected=f"{stream} in the {data.kind}",
+            received=", ".join(name for name, _ in data.streams(run) if name) or "nothing",
+            hint="r2s2r import run.csv   # a log with end caps, targets and controls",
+        )  # fmt: skip
+    return group
+
+
+def _observed(caps: Group, frames: Group, ground: Group, run: str) -> np.ndarray:
+    """End caps of the recording at the kept frames, with the ground at z = 0."""
+    rows = frames["source_frame"]
+    if int(rows.max()) >= len(caps["p_WE"]) or not np.array_equal(caps["t"][rows], frames["t"]):
+        raise InputError(
+            "the estimate was made of another recording", where=f"runs/{run}/frames/source_frame",
+            expected=f"rows 0 to {len(caps['p_WE']) - 1} of the recording, with its stamps",
+            received=f"rows up to {int(rows.max())}", hint="r2s2r estimate",
+        )  # fmt: skip
+    return caps["p_WE"][rows] + np.array([0.0, 0.0, float(ground.attributes["shift"])])
+
+
+def _control(commands: Group, run: str) -> np.ndarray:
+    """Motor commands with what was not logged as 0, as `simulate --replay` takes it."""
+    if "control" not in commands or not np.isfinite(commands["control"]).any():
+        raise InputError(
+            f"run {run} has no motor commands to replay", where=f"runs/{run}/commands/control",
+            expected="control, +1 reels in", received="nothing logged",
+            hint="r2s2r import run.csv   # with columns control0, control1, ...",
+        )  # fmt: skip
+    return np.nan_to_num(commands["control"])
+
+
+def _require_finite(data: RunData, run: str) -> None:
+    for name in ("t", "observed", "noise", "p_WE", "sd_p", "v_WE", "sd_v", "t_command"):
+        bad = ~np.isfinite(getattr(data, name))
+        if bad.any():
+            place = np.argwhere(bad)[0].tolist()
+            raise InputError(
+                f"run {run} has numbers that are not finite", where=f"runs/{run}: {name}{place}",
+                expected="finite numbers", received=f"{int(bad.sum())} that are not", hint="r2s2r validate",
+            )  # fmt: skip
+
+
+def _require_rows(data: RunData, run: str) -> None:
+    last = int(data.intervals.last.max())
+    if last >= len(data.t):
+        raise InputError(
+            f"the target intervals of run {run} count more frames than were kept", where=f"runs/{run}/intervals/last",
+            expected=f"at most {len(data.t) - 1}", received=str(last), hint="r2s2r estimate --force",
+        )  # fmt: skip
+
+
+def _require_motion(data: RunData, run: str) -> None:
+    moved = np.linalg.norm(data.p_WE - data.p_WE[0], axis=-1).max(axis=0)
+    noise = np.linalg.norm(data.noise, axis=-1)
+    if (moved < STILL * noise).all():
+        cap = int(np.argmax(moved / noise))
+        raise InputError(
+            f"nothing moves in run {run}", where=f"runs/{run}/frames/p_WE",
+            expected=f"an end cap that moves more than {STILL:g} times its noise ({1e3 * STILL * noise[cap]:.1f} mm)",
+            received=f"at most {1e3 * moved[cap]:.1f} mm, cap {cap}",
+            hint="r2s2r inspect 20-estimate.h5   # frames/p_WE",
+        )  # fmt: skip

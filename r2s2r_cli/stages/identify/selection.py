@@ -1,0 +1,142 @@
+"""Which target intervals are trained on and which are tested: `RUN:1-7`, `RUN:1,3,5-7`, `RUN`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from difflib import get_close_matches
+
+from r2s2r_cli.errors import UsageError
+from r2s2r_cli.stages.identify.data import RunData, Selection
+from r2s2r_cli.stages.identify.load import require_two_intervals
+
+TRAIN_SHARE = 2 / 3
+"""Of the complete intervals of a run, from its start, where neither side is named: the rest is tested."""
+
+_SPANS = re.compile(r"\d+(-\d+)?(,\d+(-\d+)?)*")
+
+
+def complete(run: RunData) -> tuple[int, ...]:
+    """The complete target intervals of a run, 1-based."""
+    return tuple(i + 1 for i, whole in enumerate(run.intervals.complete.tolist()) if whole)
+
+
+def default_split(run: RunData, train_share: float = TRAIN_SHARE) -> tuple[Selection, Selection]:
+    """The first intervals to train on, those after them to test: a robot is predicted, not interpolated.
+
+    Both sides have one interval at least where the run has two.
+    """
+    have = complete(run)
+    count = min(max(1, round(train_share * len(have))), max(1, len(have) - 1))
+    return Selection(run.name, have[:count]), Selection(run.name, have[count:])
+
+
+def split(
+    runs: Sequence[RunData], train: Sequence[str], test: Sequence[str], train_share: float = TRAIN_SHARE
+) -> tuple[tuple[Selection, ...], tuple[Selection, ...]]:
+    """Target intervals to train on and to test on, of the texts of --train and --test.
+
+    Without both: `default_split` of every run. Without --train: what is complete and not tested, of every run. Without
+    --test: what is complete and not trained on, of the runs that are trained on; maybe nothing. Raises UsageError where
+    intervals do not exist, stand on both sides, or nothing is left to train on; InputError where the runs have fewer
+    than two intervals to choose from.
+    """
+    require_two_intervals(runs)
+    if not train and not test:
+        both = [default_split(run, train_share) for run in runs]
+        return tuple(a for a, _ in both if a.intervals), tuple(b for _, b in both if b.intervals)
+    trained = {one.run: one.intervals for one in parse_selection(train, runs, "--train")}
+    tested = {one.run: one.intervals for one in parse_selection(test, runs, "--test")}
+    have = {run.name: complete(run) for run in runs}
+    if not train:
+        trained = {name: _without(all_of, tested.get(name, ())) for name, all_of in have.items()}
+    if not test:
+        tested = {name: _without(have[name], chosen) for name, chosen in trained.items()}
+    for name, chosen in trained.items():
+        twice = sorted(set(chosen) & set(tested.get(name, ())))
+        if twice:
+            left = _without(chosen, twice) or _without(have[name], twice)
+            raise UsageError(
+                "an interval is trained on and tested", where="--train, --test", expected="each on one side",
+                received=f"{name}:{in_words(twice)}",
+                hint=f"--train {name}:{in_words(left)}" if left else f"--test {name}:{have[name][-1]}",
+            )  # fmt: skip
+    if not any(trained.values()):
+        name = max(have, key=lambda run: len(have[run]))
+        raise UsageError(
+            "nothing is left to train on", where="--train", expected=_all_of(runs), received="no interval",
+            hint=f"--test {name}:{have[name][-1]}",
+        )  # fmt: skip
+    return _selections(trained), _selections(tested)
+
+
+def parse_selection(texts: Sequence[str], runs: Sequence[RunData], option: str = "--train") -> tuple[Selection, ...]:
+    """`crawl:1-7`, `crawl:1,3,5-7`, or `crawl` (all complete intervals); texts of one run are put together.
+
+    Raises UsageError for a run or an interval that does not exist or is not complete, an empty or a backward span.
+    """
+    by_name = {run.name: run for run in runs}
+    found: dict[str, tuple[int, ...]] = {}
+    for text in texts:
+        name, _, spans = text.partition(":")
+        if name not in by_name:
+            near = get_close_matches(name, by_name, 1, 0.0)
+            raise UsageError(
+                "there is no such run", where=option, expected=" | ".join(by_name), received=name or "nothing",
+                hint=f"{option} {near[0]}{':' + spans if spans else ''}" if near else "r2s2r status",
+            )  # fmt: skip
+        have = complete(by_name[name])
+        valid = f"{name}:{in_words(have)}" if have else "none"
+        hint = f"{option} {valid}" if have else "r2s2r inspect 20-estimate.h5"
+        asked = _numbers(spans, len(by_name[name].intervals)) if ":" in text else have
+        if not asked:
+            raise UsageError(
+                "these are no target intervals", where=option, expected=f"RUN:1-7 or RUN:1,3,5-7, of {valid}",
+                received=text, hint=hint,
+            )  # fmt: skip
+        missing = [number for number in asked if number not in have]
+        if missing:
+            raise UsageError(
+                "an interval does not exist, or did not move to its end", where=option, expected=valid,
+                received=f"{name}:{in_words(missing)}", hint=hint,
+            )  # fmt: skip
+        found[name] = tuple(sorted({*found.get(name, ()), *asked}))
+    return _selections(found)
+
+
+def in_words(numbers: Sequence[int]) -> str:
+    """`1-3,5` of (1, 2, 3, 5)."""
+    spans: list[list[int]] = []
+    for number in numbers:
+        if spans and number == spans[-1][1] + 1:
+            spans[-1][1] = number
+        else:
+            spans.append([number, number])
+    return ",".join(f"{a}" if a == b else f"{a}-{b}" for a, b in spans)
+
+
+def _numbers(spans: str, count: int) -> tuple[int, ...]:
+    """The numbers of `1,3,5-7`; nothing where the text is none of these or a span runs backwards.
+
+    A span ends one beyond the `count` intervals of the run at most, which is as wrong as a thousand.
+    """
+    found: list[int] = []
+    for span in spans.split(",") if _SPANS.fullmatch(spans) else ():
+        first, _, last = span.partition("-")
+        start, end = int(first), int(last or first)
+        if end < start:
+            return ()
+        found += range(start, max(start, min(end, count + 1)) + 1)
+    return tuple(found)
+
+
+def _without(have: Sequence[int], taken: Sequence[int]) -> tuple[int, ...]:
+    return tuple(number for number in have if number not in set(taken))
+
+
+def _all_of(runs: Sequence[RunData]) -> str:
+    return " | ".join(f"{run.name}:{in_words(complete(run))}" for run in runs if complete(run))
+
+
+def _selections(by_run: dict[str, tuple[int, ...]]) -> tuple[Selection, ...]:
+    return tuple(Selection(name, chosen) for name, chosen in by_run.items() if chosen)

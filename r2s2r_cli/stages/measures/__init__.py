@@ -1,0 +1,1 @@
+"""The measures of the design, computed the same way everywhere: errors, gap, baselines, floor, intervals."""

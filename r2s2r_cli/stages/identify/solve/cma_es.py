@@ -1,0 +1,107 @@
+"""CMA-ES: the gradient-free cross-check of a fit (ADR 9)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.errors import NumericalError
+from r2s2r_cli.stages.identify.solve.linearised import cost_of, not_finite
+from r2s2r_cli.stages.identify.solve.loss import LOSSES, Loss
+from r2s2r_cli.stages.identify.solve.problem import Problem
+from r2s2r_cli.stages.identify.solve.record import Counts, Progress, names_on_bound
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """The best point that was sampled.
+
+    z: (n,), its nuisances as given. cost: robust, priors included. costs: the best so far after each generation.
+    reason: the package's own word for why it ended, 'budget' where that was the cause.
+    """
+
+    z: np.ndarray
+    cost: float
+    costs: tuple[float, ...]
+    counts: Counts
+    reason: str
+    seed: int
+    on_bound: tuple[str, ...]
+
+
+def cma_es(
+    problem: Problem,
+    z0: np.ndarray,
+    *,
+    sd0: float | np.ndarray,
+    budget: int,
+    seed: int,
+    loss: Loss = LOSSES["none"],
+    tolerance: float = 1e-6,
+    progress: Callable[[Progress], None] | None = None,
+) -> Sampled:
+    """Minimise the same cost as `levenberg_marquardt` over the parameters, without derivatives.
+
+    The nuisances, hundreds of unknowns about which the parameters hardly disagree, stay at z0: give the solution of
+    Levenberg-Marquardt, and this says whether other parameters explain the data better with the same start states. A
+    lower cost found here is a defect there; an equal one says nothing about minima further than the samples reach.
+
+    z0: (n,). sd0: of the first samples, in z, one number or (parameters,). budget: evaluations at most. Points where
+    the simulation is not finite are worse than all others. tolerance: of the cost, ends the search. Uses no global
+    random numbers, writes no file and prints nothing. Raises NumericalError where no sample is finite.
+    """
+    import cma
+
+    count = len(problem.names)
+    z0 = np.clip(np.asarray(z0, dtype=float), problem.lower, problem.upper)
+    unit = np.broadcast_to(np.asarray(sd0, dtype=float), (count,))
+    lower, upper = problem.lower[:count], problem.upper[:count]
+    draw = np.random.default_rng(seed)
+
+    def whole(u: np.ndarray) -> np.ndarray:
+        return np.concatenate([np.clip(z0[:count] + unit * u, lower, upper), z0[count:]])
+
+    def cost(u: np.ndarray) -> float:
+        try:
+            return cost_of(problem, whole(u), problem.evaluate(whole(u), jacobian=False), loss)[0]
+        except NumericalError:
+            return np.inf
+
+    options = {
+        "bounds": [_list((lower - z0[:count]) / unit), _list((upper - z0[:count]) / unit)],
+        "maxfevals": budget,
+        "tolfun": tolerance,
+        "seed": np.nan,  # do not seed numpy's global generator
+        "randn": lambda *shape: draw.standard_normal(shape),
+        "verbose": -9,
+        "verb_log": 0,
+        "verb_disp": 0,
+        "signals_filename": None,
+    }
+    search = cma.CMAEvolutionStrategy(np.zeros(count), 1.0, options)
+    best_u, best, costs, spent = np.zeros(count), np.inf, [], 0
+    while not search.stop() and spent < budget:
+        samples = search.ask()
+        values = [cost(u) for u in samples]
+        search.tell(samples, values)
+        spent += len(samples)
+        least = int(np.argmin(values))
+        if values[least] < best:
+            best_u, best = np.array(samples[least]), values[least]
+        costs.append(best)
+        if progress is not None:
+            generations = max(budget // len(samples), 1)
+            progress(Progress(len(costs), generations, best, 0.0, float(search.sigma), Counts(plain=spent)))
+    if not np.isfinite(best):
+        raise not_finite("no sample of the parameters gives a finite simulation", np.full(spent, np.nan))
+    z = whole(best_u)
+    reason = "budget" if spent >= budget else ", ".join(search.stop())
+    on_bound = names_on_bound(z, problem.lower, problem.upper, problem.names)
+    return Sampled(z, best, tuple(costs), Counts(plain=spent), reason, seed, on_bound)
+
+
+def _list(bounds: np.ndarray) -> list[float | None]:
+    """The package's way to write bounds: None where there is none."""
+    return [float(one) if np.isfinite(one) else None for one in bounds]

@@ -54,7 +54,7 @@ class Free:
         return z
 
     def slope(self, z: float) -> float:
-        """d value / d z."""
+        """Derivative of the value by the coordinate, d value / d z."""
         if self.coordinate is Coordinate.LOG:
             return math.exp(z)
         if self.coordinate is Coordinate.LOGIT:
@@ -77,5 +77,5 @@ def values_of(frees: tuple[Free, ...], z: np.ndarray) -> np.ndarray:
 
 
 def slopes_of(frees: tuple[Free, ...], z: np.ndarray) -> np.ndarray:
-    """d value / d coordinate, (n,)."""
+    """Derivatives of values by their coordinates, (n,)."""
     return np.array([free.slope(float(one)) for free, one in zip(frees, z, strict=True)])

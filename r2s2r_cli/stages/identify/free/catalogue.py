@@ -1,0 +1,59 @@
+"""Which numbers of a robot, its ground, its observation and the effects can be free, by name."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+
+from r2s2r_cli.errors import UsageError
+from r2s2r_cli.stages.identify.free.base import Free
+from r2s2r_cli.stages.identify.free.entry import Entry
+from r2s2r_cli.stages.identify.free.mechanics import cable_entries, motor_entries, rod_entries
+from r2s2r_cli.stages.identify.free.surroundings import (
+    effect_entries,
+    ground_entries,
+    observation_entries,
+    pid_entries,
+)
+from schemas.robot import Robot
+
+
+def catalogue(robot: Robot, effects: tuple[str, ...] = ()) -> dict[str, Free]:
+    """Every number that can be free, by name, in the order of docs/concepts/free-parameters.md.
+
+    Those of all effects are there; effects: ids that are in the simulator anyway. Raises UsageError for an unknown id.
+    """
+    require_effects(effects)
+    return {name: entry.free for name, entry in entries(robot).items()}
+
+
+def entries(robot: Robot) -> dict[str, Entry]:
+    """The catalogue with what each number does."""
+    found = motor_entries(robot) + cable_entries(robot) + rod_entries(robot) + ground_entries(robot)
+    found += observation_entries() + pid_entries(robot) + effect_entries(robot)
+    return {entry.free.name: entry for entry in found}
+
+
+def require_effects(effects: Sequence[str]) -> None:
+    """Raises UsageError for an effect that is not in the catalogue of effects."""
+    from r2s2r_cli.effects import CATALOGUE
+
+    known = [effect.name for effect in CATALOGUE]
+    for name in effects:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
+            raise UsageError(
+                f"unknown effect {name!r}", where="--with-effect", expected=", ".join(known), received=name,
+                hint=f"r2s2r identify --with-effect {near}",
+            )  # fmt: skip
+
+
+def unknown(name: str, known: Sequence[str], option: str = "--free") -> UsageError:
+    """The error for a name that the catalogue lacks, with the names nearest to it."""
+    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5) or list(dict.fromkeys(known))[:3]
+    value = "=0.5" if option == "--fix" else ""
+    return UsageError(
+        f"unknown parameter {name!r}", where=option,
+        expected=f"{', '.join(near)} ... (docs/concepts/free-parameters.md lists {len(known)})", received=name,
+        hint=f"r2s2r identify {option} {near[0]}{value}",
+    )  # fmt: skip

@@ -1,0 +1,196 @@
+"""Values of free numbers -> what the engine reads, with exact derivatives; and what lies outside the engine."""
+
+from __future__ import annotations
+
+import collections.abc
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.stages.identify.free.actions import Outside, Place
+from r2s2r_cli.stages.identify.free.base import Free
+from r2s2r_cli.stages.identify.free.catalogue import entries, require_effects, unknown
+from r2s2r_cli.stages.identify.free.entry import Entry
+from schemas.robot import Robot
+
+if TYPE_CHECKING:
+    import numpy as np
+    import torch
+    from torch import Tensor
+
+    from r2s2r_cli.engine import LatchedPid, Parameters, Structure
+
+    Vector = np.ndarray | Tensor
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Between the simulated robot and the log. ground_height [m]: an observed cap lies so much over the simulated one.
+    command_delay [s]: a logged command reaches the winch so much later. camera_delay [s]: a frame stamped t shows the
+    robot at t - camera_delay."""
+
+    ground_height: float = 0.0
+    command_delay: float = 0.0
+    camera_delay: float = 0.0
+
+
+class Mapping:
+    """Free numbers of one robot at work: values x (n,) in the order of `frees` -> Parameters of `structure`.
+
+    structure: laws that a free or fixed number needs are switched on, and its effects plugged in, after those named in
+    `effects`, in the order of the catalogue. names: of the free numbers. in_engine: (n,) bool, whether the engine reads
+    it; others are in `observation` or `pid`. Numbers that are neither free nor fixed keep what robot.toml has, effects
+    their off values; ends of the winches (`rest_min`, `rest_max`) always do.
+    """
+
+    def __init__(
+        self, robot: Robot, frees: collections.abc.Sequence[Free], effects: tuple[str, ...] = (), *,
+        fixed: collections.abc.Mapping[str, float] | None = None, structure: Structure | None = None,
+    ) -> None:  # fmt: skip
+        """fixed: values that are given, by name; a free number may be a part of a fixed one (fixed motor_speed, free
+        motor_speed.2), then it goes before. structure: of the robot, if another than structure_of(robot).
+
+        Raises UsageError for unknown names and for numbers that contradict each other, InputError for a fixed value
+        out of its bounds or a robot that cannot be simulated.
+        """
+        from r2s2r_cli.effects import CATALOGUE, with_off_values
+        from r2s2r_cli.stages.model import parameters_of, structure_of
+
+        require_effects(effects)
+        known = entries(robot)
+        self.robot = robot
+        self.frees = tuple(frees)
+        self.names = tuple(free.name for free in frees)
+        self.fixed = dict(fixed or {})
+        for name in (*self.names, *self.fixed):
+            if name not in known:
+                raise unknown(name, tuple(known), "--fix" if name in self.fixed else "--free")
+        self._entries = tuple(known[name] for name in self.names)
+        given = [known[name] for name in self.fixed]
+        require_apart(self._entries)
+        require_apart(given, "--fix")
+        self._require_fixed(given)
+        used = [*self._entries, *given]
+        wanted = {*effects, *(entry.effect for entry in used if entry.effect)}
+        base = structure or structure_of(robot)
+        laws = {entry.law: True for entry in used if entry.law}
+        self.structure: Structure = replace(base, **laws).with_effects(
+            *(effect for effect in CATALOGUE if effect.name in wanted)
+        )
+        self._own = with_off_values(self.structure, parameters_of(robot))
+        self._order = sorted(range(len(self.names)), key=lambda k: list(known).index(self.names[k]))
+        self._base = self._own
+        for name in sorted(self.fixed, key=list(known).index):
+            value = self._own.mass.new_full((1, 1), self.fixed[name])
+            self._base = known[name].action.apply(self._base, self._own, value)
+        self._curved = tuple(k for k, entry in enumerate(self._entries) if not entry.action.affine)
+        self._constant: dict[tuple[torch.dtype, torch.device], Tensor] = {}
+        self.in_engine = tuple(not isinstance(entry.action, Outside) for entry in self._entries)
+
+    def theta(self, values: Vector) -> Parameters:
+        """Parameters at values (n,) or (B, n): batch 1 or B. Differentiable by the values."""
+        import torch
+
+        x = torch.as_tensor(values, dtype=None if isinstance(values, torch.Tensor) else torch.float64)
+        x = x if x.ndim == 2 else x[None]
+        here = {"dtype": x.dtype, "device": x.device}
+        theta, own = (made.map(lambda one: one.to(**here)) for made in (self._base, self._own))
+        for k in self._order:
+            theta = self._entries[k].action.apply(theta, own, x[:, k : k + 1])
+        return theta
+
+    def packed(self, values: Vector) -> Tensor:
+        """The flat parameter vector, (NP,) of values (n,) or (B, NP) of (B, n); differentiable."""
+        from r2s2r_cli.engine.flat import pack_parameters
+
+        flat = pack_parameters(self.structure, self.theta(values))
+        return flat if values.ndim == 2 else flat[0]
+
+    def jacobian(self, values: Vector) -> Tensor:
+        """d packed / d values, (NP, n), of values (n,); columns of numbers outside the engine are 0.
+
+        Columns of affine numbers are computed once (see Action.affine), the others at each call.
+        """
+        import torch
+
+        x = torch.as_tensor(values).detach()
+        key = (x.dtype, x.device)
+        if key not in self._constant:
+            none = x.new_zeros(len(self.packed(x)), 0)
+            self._constant[key] = torch.func.jacfwd(self.packed)(x) if len(x) else none
+        jacobian = self._constant[key].clone()
+        if self._curved:
+            curved = list(self._curved)
+
+            def packed(part: Tensor) -> Tensor:
+                return self.packed(x.index_put((torch.tensor(curved),), part))
+
+            jacobian[:, curved] = torch.func.jacfwd(packed)(x[curved])
+        return jacobian
+
+    def observation(self, values: Vector) -> Observation:
+        """What lies between the simulated robot and the log, of values (n,)."""
+        return Observation(**{key: float(value) for key, value in self._outside("observation", values).items()})
+
+    def pid(self, values: Vector) -> LatchedPid:
+        """The low-level controller, of values (n,) or (B, n); free gains are tensors (B, 1), differentiable."""
+        import torch
+
+        from r2s2r_cli.engine import LatchedPid
+
+        pid = self.robot.pid
+        x = torch.as_tensor(values)
+        gains: dict[str, Any] = {
+            "p": pid.p, "i": pid.i, "d": pid.d, "tolerance": pid.tolerance, "min_length": pid.min_length_m,
+            "range": pid.range_m,
+        }  # fmt: skip
+        gains.update(self._outside("pid", x if x.ndim == 2 else x[None]))
+        return LatchedPid(
+            **gains, period=1.0 / pid.rate_hz, cable_caps=tuple(cable.caps for cable in self.robot.cables),
+            actuated=self.robot.actuated,
+        )  # fmt: skip
+
+    def _outside(self, of: str, values: Vector) -> dict[str, Any]:
+        """Fixed and free numbers outside the engine, by key; of values (B, n) tensors (B, 1)."""
+        known = entries(self.robot)
+        found: dict[str, Any] = {}
+        for name, value in self.fixed.items():
+            action = known[name].action
+            if isinstance(action, Outside) and action.of == of:
+                found[action.key] = value
+        for k, entry in enumerate(self._entries):
+            if isinstance(entry.action, Outside) and entry.action.of == of:
+                found[entry.action.key] = values[:, k : k + 1] if values.ndim == 2 else values[k]
+        return found
+
+    def _require_fixed(self, given: list[Entry]) -> None:
+        """Fixed numbers are within their bounds, and no free number undoes one."""
+        for entry in given:
+            free, value = entry.free, self.fixed[entry.free.name]
+            if not free.lower <= value <= free.upper:
+                raise InputError(
+                    f"the fixed {free.name} is out of its bounds", where="--fix",
+                    expected=f"{free.lower:g} to {free.upper:g} {free.unit}", received=f"{value:g}",
+                    hint=f"--fix {free.name}={entry.nominal:g}",
+                )  # fmt: skip
+            for other in self._entries:
+                if entry.action.touches <= other.action.touches:
+                    raise UsageError(
+                        f"{other.free.name} is free and {free.name} is fixed: they set the same number",
+                        where="--free, --fix", expected="one of them", received=f"{other.free.name}, {free.name}",
+                        hint=f"r2s2r identify --fix {free.name}={value:g}",
+                    )  # fmt: skip
+
+
+def require_apart(chosen: collections.abc.Sequence[Entry], option: str = "--free") -> None:
+    """Raises UsageError where two numbers set the same: motor_speed and motor_speed.2, or the same one twice."""
+    owner: dict[Place, str] = {}
+    for entry in chosen:
+        name = entry.free.name
+        for place in sorted(entry.action.touches):
+            before = owner.setdefault(place, name)
+            if before != name:
+                raise UsageError(
+                    f"{before} and {name} set the same number", where=option, expected="one of them",
+                    received=f"{before}, {name}", hint=f"r2s2r identify {option} {name}",
+                )  # fmt: skip

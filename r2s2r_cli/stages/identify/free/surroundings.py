@@ -1,0 +1,115 @@
+"""Entries of the catalogue that belong to the ground, the observation, the controller and the effects."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from r2s2r_cli.stages.identify.free.actions import Assign, Outside, Place, Slope
+from r2s2r_cli.stages.identify.free.base import Coordinate, Free
+from r2s2r_cli.stages.identify.free.entry import Element, Entry, Kind, common, each, inside
+from schemas.robot import Robot
+
+STEEPEST = 0.1745
+"""[rad] 10 degrees: on more a robot that stands does not stay."""
+
+
+def ground_entries(robot: Robot) -> list[Entry]:
+    """Friction, restitution and lie of the ground."""
+    kind = Kind("friction", "1", 20.0, 0.5, 0.1, "Coulomb friction of {} on the ground.", at_least=0.02, at_most=5.0)
+    mu = robot.contact.friction
+    caps = [Element(f"cap{c}", c, mu, (("friction", c),)) for c in range(robot.n_caps)]
+    found = common(kind, caps, "all caps") + each(kind, caps, "cap")
+    e = robot.contact.restitution
+    found.append(
+        Entry(
+            Free("restitution", "1", inside(e, 0.0, 1.0, 0.3), 0.0, 1.0, Coordinate.LOGIT, 1.5,
+                 "Coefficient of restitution of impacts with the ground and between rods."),
+            Assign((("restitution", 0),)), e, "restitution",
+        )
+    )  # fmt: skip
+    for name, axis in (("ground_slope_y", 1), ("ground_slope_x", 0)):
+        free = Free(name, "rad", 0.0, -STEEPEST, STEEPEST, Coordinate.LINEAR, 0.02,
+                    f"Rotation of the ground about the world's {'xy'[axis]} axis.")  # fmt: skip
+        found.append(Entry(free, Slope(axis), 0.0, name))
+    return found
+
+
+def observation_entries() -> list[Entry]:
+    """What lies between the simulated robot and what the camera sees."""
+    rows = (
+        ("ground_height", "m", 0.0, -0.05, 0.05, 0.005, "Height of the observed end caps over the simulated ones."),
+        (
+            "command_delay",
+            "s",
+            0.0,
+            0.0,
+            0.5,
+            0.03,
+            "Time from a motor command in the log to its arrival at the winch.",
+        ),
+        ("camera_delay", "s", 0.0, -0.2, 0.5, 0.03, "Time by which an observed frame is older than its time stamp."),
+    )
+    return [
+        Entry(
+            Free(name, unit, inside(nominal, lower, upper, sd), lower, upper, Coordinate.LINEAR, sd, what),
+            Outside("observation", name), nominal, name,
+        )
+        for name, unit, nominal, lower, upper, sd, what in rows
+    ]  # fmt: skip
+
+
+def pid_entries(robot: Robot) -> list[Entry]:
+    """The low-level controller; read in closed loop only."""
+    pid = robot.pid
+    rows = (
+        ("p", "1", pid.p, 10.0, 0.5, 1.0, np.inf, "Proportional gain of the controller."),
+        ("i", "1", pid.i, 100.0, 1.0, 0.01, np.inf, "Integral gain of the controller, a tick."),
+        ("d", "1", pid.d, 20.0, 1.0, 0.1, np.inf, "Differential gain of the controller, a tick."),
+        ("tolerance", "1", pid.tolerance, 10.0, 0.3, 0.1, 1.0, "Share of the range within which a cable is done."),
+        ("min_length", "m", pid.min_length_m, 3.0, 0.1, 0.1, np.inf, "Cap distance at position 0."),
+        ("range", "m", pid.range_m, 3.0, 0.1, 0.1, np.inf, "Cap distance from position 0 to position 1."),
+    )
+    found = []
+    for key, unit, nominal, factor, sd, scale, at_most, what in rows:
+        kind = Kind(f"pid_{key}", unit, factor, sd, scale, what, at_most=at_most)
+        (entry,) = common(kind, [Element(key, 0, nominal, ())], "")
+        found.append(Entry(entry.free, Outside("pid", key), nominal, entry.family))
+    return found
+
+
+def effect_entries(robot: Robot) -> list[Entry]:
+    """Every number of every effect: EFFECT.PARAMETER for all its elements, EFFECT.PARAMETER.K for one."""
+    from r2s2r_cli.effects import CATALOGUE
+    from r2s2r_cli.stages.model import structure_of
+
+    structure = structure_of(robot)
+    found = []
+    for effect in CATALOGUE:
+        for own in effect.own:
+            family, count = f"{effect.name}.{own.name}", own.count(structure)
+            start = inside(own.off, own.lower, own.upper, own.scale)
+            parts = list(robot.actuated) if own.per == "actuated" else list(range(count))
+            elements: list[tuple[int | None, tuple[Place, ...]]] = [(None, tuple((family, i) for i in range(count)))]
+            if own.per != "robot":
+                elements += [(k, ((family, i),)) for i, k in enumerate(parts)]
+            for number, places in elements:
+                name = family if number is None else f"{family}.{number}"
+                where = "" if own.per == "robot" else f" ({_part(own.per)} {'each' if number is None else number})"
+                what = f"Effect {effect.title}: {own.what}{where}."
+                free = Free(name, own.unit, start, own.lower, own.upper, Coordinate.LINEAR, own.scale, what)
+                action = Assign(places, _same(name, structure.n_actuated))
+                found.append(Entry(free, action, own.off, family, number, effect=effect.name))
+    return found
+
+
+def _part(per: str) -> str:
+    return "winched cable" if per == "actuated" else per
+
+
+def _same(name: str, winches: int) -> frozenset[Place]:
+    """What an effect's number decides that a number of the robot decides as well: the two cannot be told apart."""
+    if name == "motor_lag.tau_s":
+        return frozenset(("lag", k) for k in range(winches))
+    if name in ("ground_slope.angle_x_rad", "ground_slope.angle_y_rad"):
+        return frozenset({("gravity", 0 if "_x_" in name else 1)})
+    return frozenset()

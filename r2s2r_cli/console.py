@@ -102,8 +102,25 @@ class Console:
 
         Silent when piped, with --quiet, or where R2S2R_NO_PROGRESS is set.
         """
+        with self.parts() as show:
+            done = 0
+
+            def advance(more: int) -> None:
+                nonlocal done
+                done += more
+                show(title, done, total, "")
+
+            show(title, 0, total, "")
+            yield advance
+
+    @contextmanager
+    def parts(self) -> Iterator[Callable[[str, int, int, str], None]]:
+        """The same for work of several parts: yields a function of part, items done and in all, and a word beside them.
+
+        A part gets its bar when it is first named; parts that were done stay until all are.
+        """
         if self.quiet or not sys.stderr.isatty() or os.environ.get(NO_PROGRESS):
-            yield lambda done: None
+            yield lambda part, done, total, word: None
             return
         from rich.console import Console as RichConsole
         from rich.progress import (
@@ -112,6 +129,7 @@ class Console:
             Progress,
             ProgressColumn,
             Task,
+            TaskID,
             TextColumn,
             TimeRemainingColumn,
         )
@@ -123,10 +141,29 @@ class Console:
             def render(self, task: Task) -> Text:
                 return Text("" if task.speed is None else f"{task.speed:.1f}/s")
 
-        columns = (TextColumn(title), BarColumn(), MofNCompleteColumn(), Rate(), TimeRemainingColumn())
+        class Word(ProgressColumn):
+            """What stands beside the bar; never read as markup."""
+
+            def render(self, task: Task) -> Text:
+                return Text(str(task.fields["word"]))
+
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            Rate(),
+            TimeRemainingColumn(),
+            Word(),
+        )
         with Progress(*columns, console=RichConsole(stderr=True), transient=True) as bar:
-            task = bar.add_task(title, total=total)
-            yield lambda done: bar.update(task, advance=done)
+            tasks: dict[str, TaskID] = {}
+
+            def show(part: str, done: int, total: int, word: str) -> None:
+                if part not in tasks:
+                    tasks[part] = bar.add_task(part, total=total, word=word)
+                bar.update(tasks[part], completed=done, total=total, word=word)
+
+            yield show
 
 
 def print_error(error: R2S2RError, *, as_json: bool) -> None:

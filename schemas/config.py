@@ -43,6 +43,33 @@ class SimulateSettings(Frozen):
     """Whether rods collide with each other."""
 
 
+class IdentifySettings(Frozen):
+    """Settings of `identify`. What each does to a fit: docs/guides/identify.md."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
+    step_s: Annotated[float, Field(strict=True, gt=0, le=0.01)] = 0.001
+    """Step of the engine [s]; must divide the controller's period. Where cables are stiff it is divided further."""
+    rod_contact: Annotated[bool, Field(strict=True)] = True
+    """Whether rods collide with each other."""
+    free: tuple[Annotated[str, Field(min_length=1)], ...] = ()
+    """Free parameters, as after --free; empty: the default set of the method."""
+    train_share: Annotated[float, Field(strict=True, gt=0, le=1)] = 0.65
+    """Share of the target intervals of each run, from its beginning, that is trained on where --train is not given."""
+    max_iterations: Annotated[int, Field(strict=True, ge=1, le=10_000)] = 40
+    """Iterations of one start on one horizon; of method paper, steps of Adam."""
+    starts: Annotated[int, Field(strict=True, ge=1, le=1000)] = 3
+    """Fits from different starts: the first from robot.toml, the others drawn from the priors."""
+    redraws: Annotated[int, Field(strict=True, ge=0, le=1000)] = 8
+    """Fits of observations whose noise is drawn anew, for the range of each parameter."""
+    profiles: Annotated[int, Field(strict=True, ge=0, le=100)] = 3
+    """Weakest parameters whose profile likelihood is drawn."""
+    bootstrap: Annotated[int, Field(strict=True, ge=100, le=100_000)] = 2000
+    """Draws of segments for the intervals of the measures."""
+    self_test_cases: Annotated[int, Field(strict=True, ge=1, le=1000)] = 20
+    """Planted robots of --self-test."""
+
+
 class RunConfig(Frozen):
     """The settings of every stage; a stage stores its own section in what it writes."""
 
@@ -50,6 +77,7 @@ class RunConfig(Frozen):
     calibrate: CalibrateSettings = CalibrateSettings()
     estimate: EstimateSettings = EstimateSettings()
     simulate: SimulateSettings = SimulateSettings()
+    identify: IdentifySettings = IdentifySettings()
 
 
 class ProjectFile(RunConfig):

@@ -11,11 +11,14 @@ from typing import Any
 from schemas.base import ArtifactSpec
 from schemas.calibration import CALIBRATION
 from schemas.estimate import ESTIMATE
+from schemas.identification import IDENTIFICATION
 from schemas.policy import POLICY
 from schemas.recording import RECORDING
 from schemas.simulation import SIMULATION
 
-KINDS: dict[str, ArtifactSpec] = {spec.kind: spec for spec in (CALIBRATION, RECORDING, ESTIMATE, POLICY, SIMULATION)}
+KINDS: dict[str, ArtifactSpec] = {
+    spec.kind: spec for spec in (CALIBRATION, RECORDING, ESTIMATE, IDENTIFICATION, POLICY, SIMULATION)
+}
 """The artifact kinds by name, in the order of the data."""
 
 Groups = Mapping[str, Any]
@@ -53,5 +56,5 @@ def chain(
     return steps
 
 
-STAGE_VERSIONS: dict[str, int] = {"import": 1, "calibrate": 1, "estimate": 1, "simulate": 1}
+STAGE_VERSIONS: dict[str, int] = {"import": 1, "calibrate": 1, "estimate": 1, "identify": 1, "simulate": 1}
 """Raised by hand when a stage computes something else from the same input; `status` then calls its results stale."""

@@ -28,6 +28,21 @@ def command_again(made: Provenance, artifact: Path, *, force: bool = False) -> s
         words += [word for option in ("random", "seed", "from") if flags.get(option) is not None
                   for word in (f"--{option}", str(flags[option]))]  # fmt: skip
         words += [word for run in flags.get("replay", ()) for word in ("--replay", run)]
+    elif made.stage == "identify":
+        words += _identify(flags)
     if artifact.parent.name.isdigit():
         words += ["--iteration", str(int(artifact.parent.name))]
     return shlex.join([*words, "--force"] if force else words)
+
+
+def _identify(flags: dict[str, Any]) -> list[str]:
+    """Options that differ from their defaults."""
+    repeated = (("train", "train"), ("test", "test"), ("free", "free"), ("fix", "fix"), ("with-effect", "effects"),
+                ("also", "also"))  # fmt: skip
+    words = [word for option, key in repeated for value in flags.get(key, ()) for word in (f"--{option}", str(value))]
+    if flags.get("method", "default") != "default":
+        words += ["--method", flags["method"]]
+    if flags.get("drive") == "closed loop":
+        words += ["--drive", "closed-loop"]
+    words += ["--online"] if flags.get("online") else []
+    return words + (["--seed", str(flags["seed"])] if flags.get("seed") else [])

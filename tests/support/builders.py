@@ -17,6 +17,7 @@ from r2s2r_cli.stages.init.robots import robot_toml
 from schemas.base import DIM_SIZES, ArtifactSpec, DatasetSpec, GroupSpec
 from schemas.header import InputRef, Provenance
 from schemas.robot import Robot
+from tests.support.identified import identification as identified
 from tests.support.motion import Motion, motion
 
 STARTED = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
@@ -127,9 +128,14 @@ def calibration() -> ArtifactData:
     return ArtifactData("calibration", bench_groups())
 
 
+def identification(frames: int = 24) -> ArtifactData:
+    """Four parameters, one of each sort of trust, learned from the same motion."""
+    return identified(robot(), frames)
+
+
 BUILDERS: dict[str, Callable[[], ArtifactData]] = {
-    "calibration": calibration, "recording": recording, "estimate": estimate, "policy": policy,
-    "simulation": simulation,
+    "calibration": calibration, "recording": recording, "estimate": estimate, "identification": identification,
+    "policy": policy, "simulation": simulation,
 }  # fmt: skip
 """One builder a kind."""
 

@@ -15,6 +15,7 @@ from r2s2r_cli.checks.subjects import Content, InputState, Journals, Links, Poli
 from r2s2r_cli.stages.init.robots import robot_toml
 from schemas.header import Header, InputRef, Provenance
 from schemas.robot import Robot
+from tests.support.identified import identification as identified
 
 FRAMES, SAMPLES = 6, 25
 PNG = b"\x89PNG\r\n\x1a\n" + b"image"
@@ -244,6 +245,11 @@ def calibration() -> Content:
     return Content(ArtifactData("calibration", groups))
 
 
+def identification() -> Content:
+    """Four parameters, one of each sort of trust."""
+    return Content(identified(robot()))
+
+
 def content() -> Content:
     """A whole recording of one run."""
     run = recording()
@@ -328,6 +334,7 @@ def put(place: Any, number: Any) -> Callable[[np.ndarray], None]:
 
 SOUND: Mapping[str, Callable[[], object]] = {
     "reading": Reading, "links": links, "journals": lambda: Journals(()), "recording": recording, "estimate": estimate,
-    "simulation": simulation, "calibration": calibration, "content": content, "policy": policy, "robot": robot,
+    "simulation": simulation, "calibration": calibration,
+    "identification": identification, "content": content, "policy": policy, "robot": robot,
 }  # fmt: skip
 """One sound subject of every sort."""

@@ -1,0 +1,198 @@
+"""`r2s2r identify`: recorded runs -> 30-identify.h5, the numbers of the simulator and what they are worth."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from r2s2r_cli.console import Console
+from r2s2r_cli.errors import UsageError
+from r2s2r_cli.options import (
+    DrawOption,
+    DryRunOption,
+    ForceOption,
+    IterationOption,
+    JsonOption,
+    ProjectOption,
+    QuietOption,
+    SetOption,
+    ShowConfigOption,
+    parse_overrides,
+)
+from r2s2r_cli.store.project import Project
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from r2s2r_cli.artifact import ArtifactData
+    from schemas.results import StageResult
+    from schemas.results_identify import IdentifyReport, IdentifyResult
+    from schemas.robot import Robot
+
+METHODS = ("default", "paper", "cma")
+DRIVES = {"replay": "command replay", "closed-loop": "closed loop"}
+
+
+def identify(
+    train: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--train", metavar="RUN:1-7", help="Target intervals to learn from; RUN alone: all of them. Repeatable."
+        ),
+    ] = None,
+    test: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--test", metavar="RUN:8-11", help="Target intervals to predict. Default: what is not trained on."
+        ),
+    ] = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--free", metavar="SPEC", help="Parameter that is free; repeatable. Default: the set of the method."
+        ),
+    ] = None,
+    fix: Annotated[
+        list[str] | None,
+        typer.Option("--fix", metavar="NAME=VALUE", help="Give a parameter this value and do not fit it; repeatable."),
+    ] = None,
+    with_effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--with-effect", metavar="ID", help="Put an effect of the catalogue into the simulator; repeatable."
+        ),
+    ] = None,
+    method: Annotated[
+        str,
+        typer.Option("--method", metavar="NAME", help="default, paper (Adam, Key Frame Loss) or cma (no gradients)."),
+    ] = "default",
+    drive: Annotated[
+        str,
+        typer.Option(
+            "--drive", metavar="HOW", help="replay recorded motor commands, or closed-loop: simulate the PID."
+        ),
+    ] = "replay",
+    online: Annotated[
+        bool,
+        typer.Option("--online", help="Go on from the last iteration's estimate, run after run; parameters may drift."),
+    ] = False,
+    also: Annotated[
+        list[int] | None,
+        typer.Option("--also", metavar="N", help="Also the runs of iteration N, as NNN-RUN; repeatable."),
+    ] = None,
+    self_test: Annotated[
+        bool, typer.Option("--self-test", help="Plant known values in this set-up, fit them, report bias and coverage.")
+    ] = False,
+    starts: Annotated[
+        int | None, typer.Option("--starts", metavar="N", help="Fits from N starts; same as --set identify.starts=N.")
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of starts, re-drawn noise and bootstrap.")] = 0,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where the same command was interrupted.")] = False,
+    project: ProjectOption = None,
+    iteration: IterationOption = None,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+    draw: DrawOption = True,
+    dry_run: DryRunOption = False,
+    force: ForceOption = False,
+    set_: SetOption = None,
+    show_config: ShowConfigOption = False,
+) -> None:
+    """Learn the simulator's numbers from recorded runs, and say which of them can be trusted.
+
+    Says before the fit what the runs can tell at all, and after it how sure each number is and how well intervals that
+    were not fitted are predicted. Needs estimated runs; an iteration without its own takes those of the one before.
+
+    Example: r2s2r identify --train crawl:1-7 --test crawl:8-11
+    """
+    from r2s2r_cli.commands.identify_inputs import Asked
+    from r2s2r_cli.commands.identify_run import compute, plant
+    from r2s2r_cli.commands.stage import StageRun, print_config, show_outcome, wanted
+    from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_key, checkpoint_of
+    from schemas.results_identify import IdentifyReport
+
+    console = Console(json=json, quiet=quiet)
+    here = Project.find(project)
+    place = here.iteration(iteration, create=True)
+    overrides = parse_overrides(set_, "identify")
+    if starts is not None:
+        overrides["identify.starts"] = starts
+    if show_config:
+        print_config("identify", wanted(here, place, "identify", overrides, {}).settings, console)
+        return
+    _require_one_of(method, METHODS, "--method")
+    _require_one_of(drive, tuple(DRIVES), "--drive")
+    asked = Asked(
+        here, place, train=tuple(train or ()), test=tuple(test or ()), free=tuple(free or ()), fix=tuple(fix or ()),
+        effects=tuple(with_effect or ()), method=method, drive=DRIVES[drive],  # type: ignore[arg-type]
+        online=online, also=tuple(also or ()), seed=seed,
+    )  # fmt: skip
+    settings = here.config(place, overrides).identify
+    if self_test:
+        plant(asked, settings, console)
+        return
+    unfinished = checkpoint_of(here.artifact("identification", place))
+    if resume and not unfinished.exists():
+        console.say("nothing was interrupted: there is no checkpoint to go on from")
+    run = StageRun(
+        stage="identify", kind="identification", project=here, iteration=place, find_inputs=asked.refs,
+        report_model=IdentifyReport, overrides=overrides, flags=asked.flags(), dry_run=dry_run,
+        force=force or (resume and unfinished.exists()),
+    )  # fmt: skip
+    digests = [ref.sha256 for ref in run.inputs]
+    key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
+    checkpoint = CheckpointFile(unfinished, key, resume)
+    result, report = run.run(
+        lambda: compute(asked, settings, checkpoint, console),
+        (lambda data, said: _draw(data, here.robot(), said)) if draw else None,
+        lambda said: checkpoint.clear(),
+    )
+    show_outcome(_answer(result, report), console)
+    if report is not None:
+        _show(report, console)
+
+
+def _require_one_of(value: str, known: tuple[str, ...], option: str) -> None:
+    from difflib import get_close_matches
+
+    if value not in known:
+        near = get_close_matches(value, known, 1, 0.0) or known
+        raise UsageError("there is no such choice", where=option, expected=" | ".join(known), received=value,
+                         hint=f"r2s2r identify {option} {near[0]}")  # fmt: skip
+
+
+def _answer(result: StageResult, report: IdentifyReport | None) -> IdentifyResult:
+    """The document: what every stage says, and at the top the numbers that others rely on."""
+    from schemas.results_identify import IdentifyResult
+
+    shared: dict[str, Any] = result.model_dump(exclude={"schema_"})
+    if report is None:
+        return IdentifyResult(**shared)
+    return IdentifyResult(
+        **shared, parameters=report.parameters, train=report.train, heldout=report.heldout, wall_s=report.wall_s,
+        rollouts=report.rollouts,
+    )  # fmt: skip
+
+
+def _draw(data: ArtifactData, robot: Robot, report: IdentifyReport) -> Iterator[tuple[str, bytes]]:
+    from r2s2r_cli.views.identify import draw_identification
+    from r2s2r_cli.views.identify_page import identify_page
+
+    pictures = []
+    for name, title, png in draw_identification(data, robot):
+        yield f"-{name}.png", png
+        pictures.append((title, png))
+    yield ".html", identify_page(report, data, pictures)
+
+
+def _show(report: IdentifyReport, console: Console) -> None:
+    from r2s2r_cli.views.identify_page import report_tables, verdict
+
+    for table in report_tables(report):
+        console.table(table.title, table.columns, table.rows)
+    console.data(verdict(report))
+    for text in report.warnings:
+        console.warn(text)
+    if report.computed_by == "torch":
+        console.warn("computed in plain torch, some hundred times slower: `r2s2r doctor` says what is missing")

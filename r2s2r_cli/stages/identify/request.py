@@ -1,0 +1,63 @@
+"""What one identification is asked for, and what it says on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol
+
+from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.stages.identify.data import Selection
+
+Method = Literal["default", "paper", "cma"]
+Drive = Literal["command replay", "closed loop"]
+
+
+@dataclass(frozen=True)
+class Request:
+    """The request of one command line.
+
+    train, test: target intervals by run, complete and disjoint; test may be empty. free: what is free, as after --free;
+    empty: the default set of the method. fixed: values by parameter, in its unit, not fitted. effects: ids of the
+    catalogue that are in the simulator. before: the identification to continue from (online), or None.
+    """
+
+    train: tuple[Selection, ...]
+    test: tuple[Selection, ...] = ()
+    free: tuple[str, ...] = ()
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    effects: tuple[str, ...] = ()
+    method: Method = "default"
+    drive: Drive = "command replay"
+    seed: int = 0
+    online: bool = False
+    before: ArtifactData | None = None
+
+
+@dataclass(frozen=True)
+class Step:
+    """A word on the way: `done` of `total` steps of one part (`fit`, `starts`, `ranges` ...) and the cost now."""
+
+    part: str
+    done: int
+    total: int
+    cost: float | None = None
+
+
+Progress = Callable[[Step], None]
+
+
+class Checkpoint(Protocol):
+    """Where a long fit leaves what it has done; JSON values only. What it loads was left by the same request."""
+
+    def load(self) -> dict[str, Any] | None:
+        """What was saved last, or None."""
+        ...
+
+    def save(self, values: Mapping[str, Any]) -> None:
+        """Replace what was saved."""
+        ...
+
+
+def silent(step: Step) -> None:
+    """No progress."""

@@ -1,0 +1,62 @@
+"""Work that survives an interruption: JSON values in a file beside the artifact that they will become."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.store.atomic import PARTIAL, write_text
+from r2s2r_cli.store.canonical import json_sha256
+
+_FORM = 1
+
+
+@dataclass(frozen=True)
+class CheckpointFile:
+    """The checkpoint of one artifact. key: digest of the inputs and settings that its values belong to."""
+
+    path: Path
+    key: str
+    resume: bool = False
+
+    def load(self) -> dict[str, Any] | None:
+        """The saved values; None where there are none, or where they are not wanted.
+
+        Raises InputError where the file cannot be read, UsageError where it belongs to another request.
+        """
+        if not self.resume or not self.path.exists():
+            return None
+        try:
+            kept = json.loads(self.path.read_text("utf-8"))
+            form, key, values = kept["form"], kept["key"], dict(kept["values"])
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise InputError("the checkpoint cannot be read", where=str(self.path), received=type(error).__name__,
+                             expected="what an interrupted command left",
+                             hint="run the command without --resume") from error  # fmt: skip
+        if (form, key) != (_FORM, self.key):
+            raise UsageError("the checkpoint belongs to another request", where=str(self.path),
+                             expected="the inputs, settings and options that it was made with", received="others",
+                             hint="run the command without --resume")  # fmt: skip
+        return values
+
+    def save(self, values: Mapping[str, Any]) -> None:
+        """Replace what was saved, whole or not at all; floats come back bit by bit. Raises ArtifactError."""
+        write_text(self.path, json.dumps({"form": _FORM, "key": self.key, "values": dict(values)}))
+
+    def clear(self) -> None:
+        """Remove it: the artifact stands."""
+        self.path.unlink(missing_ok=True)
+
+
+def checkpoint_of(artifact: Path) -> Path:
+    """Where the checkpoint of an artifact lies: it never has an artifact's name."""
+    return artifact.with_suffix(PARTIAL)
+
+
+def checkpoint_key(*parts: Any) -> str:
+    """Digest of what must be the same for saved work to be of use."""
+    return json_sha256(list(parts))

@@ -1,0 +1,68 @@
+"""How wrong the simulation is: key-frame errors by segment beside baselines and floor, and white or not."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.views.figure import legend_beside, new_figure, png_bytes
+from r2s2r_cli.views.identify_data import ROLE_COLORS, ROLE_WORDS, segment_names, words
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_WHITENESS = "correlation of neighbouring residuals; ! not white: something is not modelled, or the tracker drifts"
+_MARKS = ("_", "x", "+", "^", "v", "d", "s", "*")
+
+
+def draw_errors(data: ArtifactData) -> bytes:
+    """Key-frame error of each segment as a bar, baselines as marks, floor as a line; correlation per cap below."""
+    segments, measures = data.groups["segments"], data.groups["measures"]
+    figure = new_figure(15, 9)
+    top, bottom = figure.subplots(2, 1, height_ratios=(1.5, 1))
+    _bars(top, segments, measures)
+    _whiteness(figure, bottom, segments)
+    return png_bytes(figure)
+
+
+def floor_of(measures: Group) -> float:
+    """The floor of the key frames [m]; NaN where it is not known."""
+    rows = [i for i, name in enumerate(words(measures, "metric")) if name == "keyframe_cap_rmse"]
+    known = [float(measures["floor"][i]) for i in rows if math.isfinite(measures["floor"][i])]
+    return known[-1] if known else math.nan
+
+
+def _bars(axes: Axes, segments: Group, measures: Group) -> None:
+    x = np.arange(len(segments["interval"]))
+    roles = segments["role"].tolist()
+    axes.bar(x, 1e3 * segments["keyframe_cap_rmse"], color=[ROLE_COLORS[role] for role in roles], width=0.6)
+    for role in sorted(set(roles)):
+        axes.bar([0], [0], color=ROLE_COLORS[role], label=f"identified, {ROLE_WORDS[role]}")
+    for k, name in enumerate(words(measures, "baseline")):
+        error, mark = 1e3 * segments["baseline_cap_rmse"][:, k], _MARKS[k % len(_MARKS)]
+        axes.plot(x, error, mark, ms=11, mew=1.8, color="#303842", alpha=0.35 + 0.5 * (k % 2), label=name)
+    floor = floor_of(measures)
+    if math.isfinite(floor):
+        axes.axhline(1e3 * floor, color="black", lw=1, ls="--", label=f"floor {1e3 * floor:.1f} mm")
+    axes.set_xticks(x, segment_names(segments), fontsize=8)
+    axes.set(ylabel="end caps at the key frame, rms [mm]", xlabel="target interval")
+    axes.set_ylim(0, None)
+    legend_beside(axes)
+
+
+def _whiteness(figure: Figure, axes: Axes, segments: Group) -> None:
+    from matplotlib import colormaps
+
+    lag1, white = segments["lag1"].T, segments["white"].T
+    colors = colormaps["RdBu_r"].with_extremes(bad="#d5dae0")
+    image: Any = axes.imshow(np.ma.masked_invalid(lag1), cmap=colors, vmin=-1, vmax=1, aspect="auto")
+    for cap, segment in np.argwhere(~white & np.isfinite(lag1)).tolist():
+        axes.annotate("!", (segment, cap), ha="center", va="center", fontsize=8, weight="bold")
+    axes.set_yticks(range(len(lag1)), [f"cap {cap}" for cap in range(len(lag1))], fontsize=8)
+    axes.set_xticks(range(lag1.shape[1]), segment_names(segments), fontsize=8)
+    axes.set_title(_WHITENESS, fontsize=9)
+    figure.colorbar(image, ax=axes, fraction=0.03, pad=0.01)

@@ -1,0 +1,127 @@
+"""The report of `identify` as tables for the terminal, and its self-contained page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.views.identify_data import figure_of, millimetres, spread
+from r2s2r_cli.views.page import Page, PageTable, Picture, counted, render
+from schemas.results_identify import Baseline, HeldOut, IdentifyReport, Measures, ParameterFigures
+
+_STRONG = 0.9
+"""Parameters correlated by more cannot be told apart."""
+
+
+def verdict(report: IdentifyReport) -> str:
+    """What the numbers are worth, in two sentences."""
+    free = [name for name, found in report.parameters.items() if found.trust != "fixed"]
+    sure = [name for name in free if report.parameters[name].identifiable]
+    told = f"The runs determine {len(sure)} of {counted(len(free), 'free parameter')}."
+    held = report.heldout
+    if held is None:
+        return f"{told} Nothing was held out: how well it predicts is not known."
+    others = ", ".join(f"{name} {millimetres(b.keyframe_cap_rmse_m)}" for name, b in held.baselines.items())
+    count = sum(segment.role == "test" for segment in report.segments)
+    floor = "not known" if held.floor_m is None else f"{millimetres(held.floor_m)} mm"
+    error = f"{millimetres(held.keyframe_cap_rmse_m)} mm{spread(held.intervals.keyframe_cap_rmse_m)}"
+    found = f"{error} at the key frames of {counted(count, 'held-out segment')}, floor {floor}"
+    return f"{told} {found}; in mm: {others or 'no baseline'}."
+
+
+def report_tables(report: IdentifyReport) -> Iterator[PageTable]:
+    """Parameters first, then errors, then what makes them doubtful."""
+    yield PageTable(
+        "parameters",
+        ["parameter", "value", "sd", "95 % interval", "range", "unit", "start", "trust", "why"],
+        [_parameter(name, found) for name, found in report.parameters.items()],
+    )
+    yield _errors(report)
+    if report.weak:
+        yield PageTable("what the runs hardly tell, before any fit", ["information", "direction"],
+                        [[figure_of(one.eigenvalue, 3), one.words] for one in report.weak])  # fmt: skip
+    if report.correlations:
+        yield PageTable(
+            "parameters that move together", ["parameter", "and", "correlation", "meaning"],
+            [[c.one, c.other, f"{c.value:+.2f}", _meaning(c.value)] for c in report.correlations],
+        )  # fmt: skip
+    if report.profiles:
+        yield PageTable(
+            "profile likelihood of the weakest", ["parameter", "95 % interval of the profile"],
+            [[p.parameter, f"{figure_of(p.lower)} .. {figure_of(p.upper)}"] for p in report.profiles],
+        )  # fmt: skip
+    yield _segments(report)
+    if report.starts:
+        rows = [[s.kind, figure_of(s.cost, 6), str(s.iterations), s.reason] for s in report.starts]
+        yield PageTable("fits", ["from", "loss", "iterations", "ended because"], rows)
+    yield PageTable("how", ["what", "found"], list(_how(report)))
+
+
+def identify_page(report: IdentifyReport, data: ArtifactData, pictures: Sequence[tuple[str, bytes]]) -> bytes:
+    """The HTML page: verdict, warnings, tables and pictures; `pictures` are (title, PNG)."""
+    natures = {run: str(data.groups[f"runs/{run}"].attributes.get("nature", "")) for run in data.runs()}
+    labels = [f"{run}: {nature}, not a measurement" for run, nature in natures.items() if nature in _MADE]
+    return render(
+        Page(
+            title=f"Identification of {data.groups['fit'].attributes['robot']}",
+            sentence=verdict(report),
+            labels=[*labels, *report.warnings],
+            tables=list(report_tables(report)),
+            pictures=[Picture(title, png) for title, png in pictures],
+        )
+    )
+
+
+_MADE = ("simulated", "kinematic sample")
+
+
+def _parameter(name: str, found: ParameterFigures) -> list[str]:
+    interval = "-" if found.lower is None else f"{figure_of(found.lower)} .. {figure_of(found.upper)}"
+    wide = "-" if found.range is None else f"{figure_of(found.range[0])} .. {figure_of(found.range[1])}"
+    unit = "" if found.unit == "1" else found.unit
+    numbers = [figure_of(found.value), figure_of(found.sd, 2), interval, wide, unit, figure_of(found.start)]
+    return [name, *numbers, found.trust, found.reason]
+
+
+def _errors(report: IdentifyReport) -> PageTable:
+    columns = ["prediction", "key frames [mm]", "free run [mm]", "free run, controller in the loop [mm]"]
+    rows = [["identified, train", millimetres(report.train.keyframe_cap_rmse_m), "-", "-"]]
+    held = report.heldout
+    if held is not None:
+        rows.append(["identified, held out", *_three(held)])
+        rows += [[f"{name}, held out", *_three(one)] for name, one in held.baselines.items()]
+        rows.append(["floor", millimetres(held.floor_m), "-", "-"])
+    return PageTable("errors of the end caps (95 % interval by bootstrap over segments)", columns, rows)
+
+
+def _three(found: HeldOut | Baseline | Measures) -> list[str]:
+    names = ("keyframe_cap_rmse_m", "free_run_cap_mean_m", "free_run_closed_loop_cap_mean_m")
+    intervals = getattr(found, "intervals", None)
+    return [millimetres(getattr(found, name)) + spread(getattr(intervals, name, None)) for name in names]
+
+
+def _segments(report: IdentifyReport) -> PageTable:
+    names = list(dict.fromkeys(name for segment in report.segments for name in segment.baselines))
+    rows = [
+        [f"{s.run}:{s.interval}", s.role, millimetres(s.keyframe_cap_rmse_m), millimetres(s.cap_rmse_m),
+         *(millimetres(s.baselines.get(name)) for name in names), ", ".join(map(str, s.not_white)) or "none"]
+        for s in report.segments
+    ]  # fmt: skip
+    return PageTable("segments", ["interval", "role", "key frame [mm]", "all frames [mm]",
+                                  *(f"{name} [mm]" for name in names), "caps not white"], rows)  # fmt: skip
+
+
+def _meaning(value: float) -> str:
+    return "cannot be told apart by these runs" if abs(value) > _STRONG else "partly exchangeable"
+
+
+def _how(report: IdentifyReport) -> Iterator[list[str]]:
+    yield ["method", f"{report.method}, {report.drive}"]
+    yield ["loss", report.loss]
+    if report.mask is not None:
+        yield ["direction mask", report.mask]
+    yield ["effects", ", ".join(report.effects) or "none"]
+    yield ["ended", f"{'converged' if report.converged else 'not converged'}: {report.reason}"]
+    yield ["residuals", f"{report.residuals}, loss {figure_of(report.cost, 6)}"]
+    yield ["work", f"{report.rollouts} rollouts, {report.wall_s:.1f} s"
+           + "".join(f"; {part} {seconds:.1f} s" for part, seconds in report.seconds.items())]  # fmt: skip

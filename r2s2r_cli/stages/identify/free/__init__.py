@@ -9,3 +9,4 @@ from r2s2r_cli.stages.identify.free.base import (
 from r2s2r_cli.stages.identify.free.catalogue import catalogue as catalogue
 from r2s2r_cli.stages.identify.free.mapping import Mapping as Mapping, Observation as Observation
 from r2s2r_cli.stages.identify.free.select import select as select
+from r2s2r_cli.stages.identify.free.write import with_values as with_values

@@ -19,7 +19,7 @@ from schemas.robot import Robot
 
 
 def catalogue(robot: Robot, effects: tuple[str, ...] = ()) -> dict[str, Free]:
-    """Every number that can be free, by name, in the order of docs/concepts/free-parameters.md.
+    """Every number that can be free, by name, in the order of docs/reference/free-parameters.md.
 
     Those of all effects are there; effects: ids that are in the simulator anyway. Raises UsageError for an unknown id.
     """
@@ -54,6 +54,6 @@ def unknown(name: str, known: Sequence[str], option: str = "--free") -> UsageErr
     value = "=0.5" if option == "--fix" else ""
     return UsageError(
         f"unknown parameter {name!r}", where=option,
-        expected=f"{', '.join(near)} ... (docs/concepts/free-parameters.md lists {len(known)})", received=name,
+        expected=f"{', '.join(near)} ... (docs/reference/free-parameters.md lists {len(known)})", received=name,
         hint=f"r2s2r identify {option} {near[0]}{value}",
     )  # fmt: skip

@@ -37,8 +37,8 @@ class Observation:
 class Mapping:
     """Free numbers of one robot at work: values x (n,) in the order of `frees` -> Parameters of `structure`.
 
-    structure: laws that a free or fixed number needs are switched on, and its effects plugged in, after those named in
-    `effects`, in the order of the catalogue. names: of the free numbers. in_engine: (n,) bool, whether the engine reads
+    structure: laws that a free or fixed number needs are switched on, and its effects plugged in beside those named
+    in `effects`. names: of the free numbers. in_engine: (n,) bool, whether the engine reads
     it; others are in `observation` or `pid`. Numbers that are neither free nor fixed keep what robot.toml has, effects
     their off values; ends of the winches (`rest_min`, `rest_max`) always do.
     """
@@ -48,7 +48,7 @@ class Mapping:
         fixed: collections.abc.Mapping[str, float] | None = None, structure: Structure | None = None,
     ) -> None:  # fmt: skip
         """fixed: values that are given, by name; a free number may be a part of a fixed one (fixed motor_speed, free
-        motor_speed.2), then it goes before. structure: of the robot, if another than structure_of(robot).
+        motor_speed.2), then it wins there. structure: of the robot, if another than structure_of(robot).
 
         Raises UsageError for unknown names and for numbers that contradict each other, InputError for a fixed value
         out of its bounds or a robot that cannot be simulated.
@@ -71,20 +71,22 @@ class Mapping:
         require_apart(given, "--fix")
         self._require_fixed(given)
         used = [*self._entries, *given]
-        wanted = {*effects, *(entry.effect for entry in used if entry.effect)}
         base = structure or structure_of(robot)
-        laws = {entry.law: True for entry in used if entry.law}
-        self.structure: Structure = replace(base, **laws).with_effects(
-            *(effect for effect in CATALOGUE if effect.name in wanted)
-        )
+        wanted = {*effects, *(entry.effect for entry in used)} - {effect.name for effect in base.effects}
+        laws = {entry.law for entry in used}
+        base = replace(base, lag=base.lag or "lag" in laws, droop=base.droop or "droop" in laws)
+        self.structure: Structure = base.with_effects(*(effect for effect in CATALOGUE if effect.name in wanted))
         self._own = with_off_values(self.structure, parameters_of(robot))
-        self._order = sorted(range(len(self.names)), key=lambda k: list(known).index(self.names[k]))
-        self._base = self._own
-        for name in sorted(self.fixed, key=list(known).index):
-            value = self._own.mass.new_full((1, 1), self.fixed[name])
-            self._base = known[name].action.apply(self._base, self._own, value)
+        # The catalogue has the whole before its parts, so that what is set last is the more special one.
+        self._order = sorted((*self.names, *self.fixed), key=list(known).index)
+        self._actions = {entry.free.name: entry.action for entry in used}
         self._curved = tuple(k for k, entry in enumerate(self._entries) if not entry.action.affine)
         self._constant: dict[tuple[torch.dtype, torch.device], Tensor] = {}
+        self._given_outside: dict[tuple[str, str], Any] = {
+            (entry.action.of, entry.action.key): self.fixed[entry.free.name]
+            for entry in given
+            if isinstance(entry.action, Outside)
+        }
         self.in_engine = tuple(not isinstance(entry.action, Outside) for entry in self._entries)
 
     def theta(self, values: Vector) -> Parameters:
@@ -93,10 +95,15 @@ class Mapping:
 
         x = torch.as_tensor(values, dtype=None if isinstance(values, torch.Tensor) else torch.float64)
         x = x if x.ndim == 2 else x[None]
-        here = {"dtype": x.dtype, "device": x.device}
-        theta, own = (made.map(lambda one: one.to(**here)) for made in (self._base, self._own))
-        for k in self._order:
-            theta = self._entries[k].action.apply(theta, own, x[:, k : k + 1])
+        own = self._own.map(lambda one: one.to(x.device, x.dtype))
+        theta = own
+        for name in self._order:
+            if name in self.fixed:
+                value = x.new_full((1, 1), self.fixed[name])
+            else:
+                k = self.names.index(name)
+                value = x[:, k : k + 1]
+            theta = self._actions[name].apply(theta, own, value)
         return theta
 
     def packed(self, values: Vector) -> Tensor:
@@ -107,7 +114,7 @@ class Mapping:
         return flat if values.ndim == 2 else flat[0]
 
     def jacobian(self, values: Vector) -> Tensor:
-        """d packed / d values, (NP, n), of values (n,); columns of numbers outside the engine are 0.
+        """Derivatives d packed / d values, (NP, n), at values (n,); columns of numbers outside the engine are 0.
 
         Columns of affine numbers are computed once (see Action.affine), the others at each call.
         """
@@ -152,12 +159,7 @@ class Mapping:
 
     def _outside(self, of: str, values: Vector) -> dict[str, Any]:
         """Fixed and free numbers outside the engine, by key; of values (B, n) tensors (B, 1)."""
-        known = entries(self.robot)
-        found: dict[str, Any] = {}
-        for name, value in self.fixed.items():
-            action = known[name].action
-            if isinstance(action, Outside) and action.of == of:
-                found[action.key] = value
+        found = {key: value for (kind, key), value in self._given_outside.items() if kind == of}
         for k, entry in enumerate(self._entries):
             if isinstance(entry.action, Outside) and entry.action.of == of:
                 found[entry.action.key] = values[:, k : k + 1] if values.ndim == 2 else values[k]
@@ -174,7 +176,8 @@ class Mapping:
                     hint=f"--fix {free.name}={entry.nominal:g}",
                 )  # fmt: skip
             for other in self._entries:
-                if entry.action.touches <= other.action.touches:
+                both = entry.action.touches & other.action.touches
+                if both and not other.action.touches < entry.action.touches:
                     raise UsageError(
                         f"{other.free.name} is free and {free.name} is fixed: they set the same number",
                         where="--free, --fix", expected="one of them", received=f"{other.free.name}, {free.name}",

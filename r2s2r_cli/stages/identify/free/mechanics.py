@@ -52,13 +52,13 @@ def cable_entries(robot: Robot) -> list[Entry]:
         springs.append(Element(str(k), k, cable.stiffness_n_per_m, tuple((law, k) for law in laws)))
         dampers.append(Element(str(k), k, cable.damping_n_s_per_m, (("damping", k),)))
     winched = set(robot.actuated)
-    found: list[Entry] = []
+    found = common(damping, dampers, "all cables")
     for group, part in (("actuated", "the winched cables"), ("passive", "the passive cables")):
         members = [k for k in range(len(robot.cables)) if (k in winched) == (group == "actuated")]
         found += common(_named(stiffness, f"stiffness_{group}"), [springs[k] for k in members], part)
         found += common(_named(damping, f"damping_{group}"), [dampers[k] for k in members], part)
     found += each(stiffness, springs, "cable")
-    found += common(damping, dampers, "all cables") + each(damping, dampers, "cable")
+    found += each(damping, dampers, "cable")
     beside = sorted((s for s in robot.sensors if s.stiffness_n_per_m > 0), key=lambda sensor: sensor.cable)
     tendons = [Element(str(s.cable), s.cable, s.stiffness_n_per_m, (("tendon_stiffness", s.cable),)) for s in beside]
     found += common(tendon, tendons, "every winched cable") + each(tendon, tendons, "cable")

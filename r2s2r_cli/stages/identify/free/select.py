@@ -103,7 +103,7 @@ def _with(free: Free, spec: Spec, text: str) -> Free:
         raise _contradiction(free, "a start or bound is no finite number", text, expected="finite numbers")
     if not made.lower < made.upper:
         raise _contradiction(free, "the lower bound is not below the upper", text, expected="LOWER below UPPER")
-    lowest = 0.0 if free.coordinate is not Coordinate.LINEAR or free.lower == 0.0 else -math.inf
+    lowest = 0.0 if free.coordinate is not Coordinate.LINEAR or free.lower >= 0 else -math.inf
     highest = 1.0 if free.coordinate is Coordinate.LOGIT else math.inf
     if made.lower < lowest or made.upper > highest:
         raise _contradiction(free, "a bound is beyond what the number can be", text, expected=possible)

@@ -11,6 +11,8 @@ from schemas.robot import Robot
 
 STEEPEST = 0.1745
 """[rad] 10 degrees: on more a robot that stands does not stay."""
+RESTITUTION_SCALE = 0.3
+"""How far from 0 the restitution of a robot that bounces is."""
 
 
 def ground_entries(robot: Robot) -> list[Entry]:
@@ -22,7 +24,7 @@ def ground_entries(robot: Robot) -> list[Entry]:
     e = robot.contact.restitution
     found.append(
         Entry(
-            Free("restitution", "1", inside(e, 0.0, 1.0, 0.3), 0.0, 1.0, Coordinate.LOGIT, 1.5,
+            Free("restitution", "1", inside(e, 0.0, 1.0, RESTITUTION_SCALE), 0.0, 1.0, Coordinate.LOGIT, 1.5,
                  "Coefficient of restitution of impacts with the ground and between rods."),
             Assign((("restitution", 0),)), e, "restitution",
         )
@@ -94,7 +96,7 @@ def effect_entries(robot: Robot) -> list[Entry]:
                 elements += [(k, ((family, i),)) for i, k in enumerate(parts)]
             for number, places in elements:
                 name = family if number is None else f"{family}.{number}"
-                where = "" if own.per == "robot" else f" ({_part(own.per)} {'each' if number is None else number})"
+                where = "" if own.per == "robot" else f" ({_part(own.per, number)})"
                 what = f"Effect {effect.title}: {own.what}{where}."
                 free = Free(name, own.unit, start, own.lower, own.upper, Coordinate.LINEAR, own.scale, what)
                 action = Assign(places, _same(name, structure.n_actuated))
@@ -102,8 +104,9 @@ def effect_entries(robot: Robot) -> list[Entry]:
     return found
 
 
-def _part(per: str) -> str:
-    return "winched cable" if per == "actuated" else per
+def _part(per: str, number: int | None) -> str:
+    part = "winched cable" if per == "actuated" else per
+    return f"one number for every {part}" if number is None else f"{part} {number}"
 
 
 def _same(name: str, winches: int) -> frozenset[Place]:

@@ -56,10 +56,11 @@ def split(
         twice = sorted(set(chosen) & set(tested.get(name, ())))
         if twice:
             left = _without(chosen, twice) or _without(have[name], twice)
+            first, then = (in_words(one.intervals) for one in default_split(next(r for r in runs if r.name == name)))
             raise UsageError(
                 "an interval is trained on and tested", where="--train, --test", expected="each on one side",
                 received=f"{name}:{in_words(twice)}",
-                hint=f"--train {name}:{in_words(left)}" if left else f"--test {name}:{have[name][-1]}",
+                hint=f"--train {name}:{in_words(left)}" if left else f"--train {name}:{first} --test {name}:{then}",
             )  # fmt: skip
     if not any(trained.values()):
         name = max(have, key=lambda run: len(have[run]))

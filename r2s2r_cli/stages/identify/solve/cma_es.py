@@ -52,6 +52,8 @@ def cma_es(
     the simulation is not finite are worse than all others. tolerance: of the cost, ends the search. Uses no global
     random numbers, writes no file and prints nothing. Raises NumericalError where no sample is finite.
     """
+    import warnings
+
     import cma
 
     count = len(problem.names)
@@ -80,7 +82,9 @@ def cma_es(
         "verb_disp": 0,
         "signals_filename": None,
     }
-    search = cma.CMAEvolutionStrategy(np.zeros(count), 1.0, options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # its parser of options stumbles over one of its own defaults
+        search = cma.CMAEvolutionStrategy(np.zeros(count), 1.0, options)
     best_u, best, costs, spent = np.zeros(count), np.inf, [], 0
     while not search.stop() and spent < budget:
         samples = search.ask()

@@ -86,7 +86,8 @@ def solve_growing(
                 return replace(solution, counts=spent, dropped=dropped)
             spent = _add(spent, Counts(plain=2))
             following = problems[stage + 1][1]
-            if _cost(following, solution.z, loss) <= _cost(following, z, loss):
+            after, before = (_cost(following, one, loss) for one in (solution.z, z))
+            if after <= before and np.isfinite(after):
                 z = solution.z
             else:
                 dropped = (*dropped, name)

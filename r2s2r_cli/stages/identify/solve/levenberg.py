@@ -26,7 +26,7 @@ LEAST_DAMPING = 1e-9
 MOST_DAMPING = 1e12
 TOO_SHORT = 0.01
 """Share of `step_sd`: a refused step as short as that could not have mattered."""
-ROUNDING = 1e-14
+ROUNDING = 1e-15
 """Predicted relative decrease of the cost that double precision cannot see."""
 
 

@@ -25,7 +25,7 @@ class Limits:
     max_iterations: int = 40
     tolerance: float = 1e-6
     step_sd: float = 0.01
-    gradient_sd: float = 1e-3
+    gradient_sd: float = 0.01
 
 
 FULL = Limits()

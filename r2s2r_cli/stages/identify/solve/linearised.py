@@ -12,6 +12,8 @@ from r2s2r_cli.stages.identify.solve.problem import Evaluation, Problem
 
 SCALE_FLOOR = 1e-12
 """Least diagonal of the scaling, as a share of the greatest: keeps unknowns that nothing constrains in place."""
+LARGEST = 1e150
+"""Of residuals and derivatives: beyond, squares leave the finite numbers. A simulation that explodes comes by here."""
 
 
 @dataclass(frozen=True)
@@ -85,9 +87,9 @@ def solve_scaled(matrix: np.ndarray, right: np.ndarray, scale: np.ndarray, dampi
 def cost_of(problem: Problem, z: np.ndarray, evaluation: Evaluation, loss: Loss) -> tuple[float, np.ndarray]:
     """Half the robust sum plus half the squared prior residuals, and the weights (m,).
 
-    Raises NumericalError where a residual is not finite.
+    Raises NumericalError where a residual is not finite, or so large that its square is not.
     """
-    if not np.all(np.isfinite(evaluation.residual)):
+    if not np.all(np.abs(evaluation.residual) < LARGEST):
         raise not_finite("a residual of the fit is not finite", evaluation.residual)
     total, weight = robust_sum(loss, evaluation)
     prior = (z - problem.prior_mean)[np.isfinite(problem.prior_sd)] / problem.prior_sd[np.isfinite(problem.prior_sd)]
@@ -99,7 +101,7 @@ def linearise(problem: Problem, z: np.ndarray, loss: Loss) -> Linearised:
     evaluation = problem.evaluate(z, jacobian=True)
     cost, weight = cost_of(problem, z, evaluation, loss)
     jacobian = evaluation.jacobian
-    if jacobian is None or not np.all(np.isfinite(jacobian)):
+    if jacobian is None or not np.all(np.abs(jacobian) < LARGEST):
         raise not_finite("a derivative of the fit is not finite", np.array([]) if jacobian is None else jacobian)
     weighted = jacobian * weight[:, None]
     normal_data = weighted.T @ jacobian
@@ -112,6 +114,6 @@ def linearise(problem: Problem, z: np.ndarray, loss: Loss) -> Linearised:
 
 def not_finite(what: str, values: np.ndarray) -> NumericalError:
     """The error of a point where the simulation left the finite numbers."""
-    bad = int(np.count_nonzero(~np.isfinite(values)))
+    bad = int(np.count_nonzero(~(np.abs(values) < LARGEST)))
     return NumericalError(what, expected="finite numbers", received=f"{bad} of {values.size} are not",
                           hint="start nearer to the robot, or narrow the bounds: r2s2r identify --help")  # fmt: skip

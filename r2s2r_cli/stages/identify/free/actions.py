@@ -74,17 +74,16 @@ class Shift:
 
 @dataclass(frozen=True)
 class Assign:
-    """The value itself at all `places`. also: further things that it decides, see Action.touches."""
+    """The value itself at all `places`."""
 
     places: tuple[Place, ...]
-    also: frozenset[Place] = frozenset()
 
     affine: ClassVar[bool] = True
 
     @property
     def touches(self) -> frozenset[Place]:
-        """The places, and what goes with them."""
-        return frozenset(self.places) | self.also
+        """The places."""
+        return frozenset(self.places)
 
     def apply(self, theta: Parameters, own: Parameters, value: Tensor) -> Parameters:
         """The value at the places."""

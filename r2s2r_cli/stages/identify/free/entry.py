@@ -19,7 +19,8 @@ standard deviation of its prior) inside."""
 class Entry:
     """A number that can be free. nominal: its value in robot.toml, which free.start is too unless that lies on a bound.
     family, element: `motor_speed` and 2 of `motor_speed.2`; element None: of all. law: of Structure that it needs
-    (`lag`, `droop`) or "". effect: the effect that it belongs to, or ""."""
+    (`lag`, `droop`) or "". effect: the effect that it belongs to, or "". alike: what another number sets and this one
+    adds to, so that no data tell the two apart."""
 
     free: Free
     action: Action
@@ -28,6 +29,7 @@ class Entry:
     element: int | None = None
     law: str = ""
     effect: str = ""
+    alike: frozenset[Place] = frozenset()
 
 
 @dataclass(frozen=True)

@@ -135,6 +135,16 @@ class Mapping:
             jacobian[:, curved] = torch.func.jacfwd(packed)(x[curved])
         return jacobian
 
+    def com_shift(self, values: Vector) -> Tensor:
+        """How far each rod's centre of mass lies from that of robot.toml, along its axis [m], (rod,) or (B, rod).
+
+        A state's p_WB is the place of the centre of mass: a pose that was made from end caps with the robot's own
+        numbers goes to p_WB + com_shift R_WR e_z, else its caps move. Differentiable.
+        """
+        theta = self.theta(values)
+        shift = self._own.p_BE[..., 0, 2].to(theta.p_BE) - theta.p_BE[..., 0, 2]
+        return shift if values.ndim == 2 else shift[0]
+
     def observation(self, values: Vector) -> Observation:
         """What lies between the simulated robot and the log, of values (n,)."""
         return Observation(**{key: float(value) for key, value in self._outside("observation", values).items()})
@@ -186,11 +196,12 @@ class Mapping:
 
 
 def require_apart(chosen: collections.abc.Sequence[Entry], option: str = "--free") -> None:
-    """Raises UsageError where two numbers set the same: motor_speed and motor_speed.2, or the same one twice."""
+    """Raises UsageError where two free numbers set the same (motor_speed and motor_speed.2), or are alike (see Entry);
+    of fixed ones, where two set the same."""
     owner: dict[Place, str] = {}
     for entry in chosen:
         name = entry.free.name
-        for place in sorted(entry.action.touches):
+        for place in sorted(entry.action.touches | (entry.alike if option == "--free" else frozenset())):
             before = owner.setdefault(place, name)
             if before != name:
                 raise UsageError(

@@ -99,8 +99,8 @@ def effect_entries(robot: Robot) -> list[Entry]:
                 where = "" if own.per == "robot" else f" ({_part(own.per, number)})"
                 what = f"Effect {effect.title}: {own.what}{where}."
                 free = Free(name, own.unit, start, own.lower, own.upper, Coordinate.LINEAR, own.scale, what)
-                action = Assign(places, _same(name, structure.n_actuated))
-                found.append(Entry(free, action, own.off, family, number, effect=effect.name))
+                alike = _alike(name, structure.n_actuated)
+                found.append(Entry(free, Assign(places), own.off, family, number, effect=effect.name, alike=alike))
     return found
 
 
@@ -109,8 +109,8 @@ def _part(per: str, number: int | None) -> str:
     return f"one number for every {part}" if number is None else f"{part} {number}"
 
 
-def _same(name: str, winches: int) -> frozenset[Place]:
-    """What an effect's number decides that a number of the robot decides as well: the two cannot be told apart."""
+def _alike(name: str, winches: int) -> frozenset[Place]:
+    """What an effect's number adds to that a number of the robot sets."""
     if name == "motor_lag.tau_s":
         return frozenset(("lag", k) for k in range(winches))
     if name in ("ground_slope.angle_x_rad", "ground_slope.angle_y_rad"):

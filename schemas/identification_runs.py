@@ -28,9 +28,10 @@ FIT = GroupSpec(
 
 FREE_RUN = GroupSpec(
     path="runs/{run}/free_run",
-    description="one start at the first test frame and no more: simulated by command replay to the end of the test segments",
+    description="one start at the first test frame and no more: command replay to the end of the test intervals that follow",
     datasets=(
         column("t", "float64", ("free_frame",), "s", "time since the start of the run"),
+        column("chain", "int64", ("free_frame",), "count", "number of the start: test intervals that do not follow each other start anew"),
         column("observed", "float64", ("free_frame", "cap", "xyz"), "m", "end caps as the tracker saw them, ground at z = 0", frame="W",
                nan_means="not observed"),
         column("simulated", "float64", ("free_frame", "cap", "xyz"), "m", "end caps of the simulation", frame="W"),

@@ -140,5 +140,8 @@ def _of_motion(robot: Robot, frames: int) -> dict[str, Group]:
         "sites": Group({"p_RS": np.array([cable.sites_m for cable in robot.cables]).reshape(cables, 2, 3)}),
         "runs/walk": Group({}, {"robot": robot.name, "nature": "kinematic sample"}),
         "runs/walk/fit": Group(fit),
-        "runs/walk/free_run": Group({"t": m.t[half:], "observed": observed[half:], "simulated": simulated[half:]}),
+        "runs/walk/free_run": Group({
+            "t": m.t[half:], "chain": np.zeros(frames - half, np.int64), "observed": observed[half:],
+            "simulated": simulated[half:],
+        }),
     }  # fmt: skip

@@ -1,0 +1,148 @@
+"""The page of an identification: everything is on it, nothing is invented, and it needs no network."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.views.identify import draw_identification
+from r2s2r_cli.views.identify_errors import floor_of
+from r2s2r_cli.views.identify_fits import cap_rmse
+from r2s2r_cli.views.identify_information import draw_information
+from r2s2r_cli.views.identify_page import identify_page, report_tables, verdict
+from r2s2r_cli.views.identify_self_test import self_test_tables
+from schemas.results_identify import Recovered, RecoveredCase, SelfTestReport
+from tests.stages.identify.reports import report
+from tests.support import builders
+
+OPTIONAL = ("covariance", "identifiability", "trace", "starts", "profiles", "windows", "segments", "sites", "history",
+            "runs/walk/fit", "runs/walk/free_run")  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def pictures() -> dict[str, tuple[str, bytes]]:
+    """Every picture by name, with its title."""
+    drawn = draw_identification(builders.identification(), builders.robot())
+    return {name: (title, png) for name, title, png in drawn}
+
+
+def without(*groups: str) -> ArtifactData:
+    """The identification without some of its groups."""
+    data = builders.identification()
+    return replace(data, groups={path: group for path, group in data.groups.items() if path not in groups})
+
+
+def changed(path: str, name: str, value: np.ndarray) -> ArtifactData:
+    """The identification with another dataset."""
+    data = builders.identification()
+    group = data.groups[path]
+    return replace(data, groups={**data.groups, path: Group({**group.datasets, name: value}, group.attributes)})
+
+
+def test_every_part_is_drawn(pictures: dict[str, tuple[str, bytes]]) -> None:
+    """One picture for each question, every run among them, each a PNG."""
+    assert list(pictures) == ["parameters", "information", "errors", "fit-walk", "free-walk", "search", "history"]
+    assert all(png.startswith(b"\x89PNG") and len(png) > 5000 for _, png in pictures.values())
+
+
+def test_what_is_not_there_is_not_drawn() -> None:
+    """Only parameters and measures are required: the picture of the parameters is always there."""
+    assert [name for name, _, _ in draw_identification(without(*OPTIONAL), builders.robot())] == ["parameters"]
+
+
+def test_a_trace_without_values_and_without_profiles_is_drawn() -> None:
+    """Methods that keep no values along the way still show their loss."""
+    data = without("profiles", *(path for path in OPTIONAL if path not in ("trace", "profiles")))
+    bare = Group({k: v for k, v in data.groups["trace"].datasets.items() if k != "value"})
+    drawn = draw_identification(replace(data, groups={**data.groups, "trace": bare}), builders.robot())
+    assert [name for name, _, _ in drawn] == ["parameters", "search"]
+
+
+def test_the_page_is_self_contained_and_complete(pictures: dict[str, tuple[str, bytes]]) -> None:
+    """No address and no file beside it; verdict, warnings (escaped), every table and every picture are on it."""
+    data = builders.identification()
+    said = report(data)
+    page = identify_page(said, data, list(pictures.values())).decode()
+    assert not re.search(r"https?://|<link|<script|@import", page)
+    assert page.count("<img") == page.count('src="data:image/png;base64,') == len(pictures)
+    assert "cap 5 of walk is &lt;noisy&gt;" in page
+    assert "kinematic sample, not a measurement" in page
+    for title in [table.title for table in report_tables(said)] + [title for title, _ in pictures.values()]:
+        assert f"<h2>{title}</h2>" in page.replace("&#39;", "'")
+    for name in said.parameters:
+        assert f"<td>{name}</td>" in page
+
+
+def test_a_parameter_that_is_not_identifiable_has_no_interval() -> None:
+    """A dash instead of a narrow interval, the reason beside it."""
+    table = next(iter(report_tables(report(builders.identification()))))
+    row = dict(zip(table.columns, next(row for row in table.rows if row[0] == "restitution"), strict=True))
+    assert (row["sd"], row["95 % interval"], row["range"]) == ("-", "-", "-")
+    assert row["trust"] == "not identifiable" and row["why"] == "zero sensitivity: no cap bounced"
+    first = dict(zip(table.columns, table.rows[0], strict=True))
+    assert first["95 % interval"] == "0.7804 .. 0.8196"
+
+
+def test_errors_stand_beside_floor_and_baselines() -> None:
+    """Train, held out, every baseline and the floor in one table, in mm; what a baseline cannot say is a dash."""
+    said = report(builders.identification())
+    table = next(table for table in report_tables(said) if table.title.startswith("errors"))
+    assert [row[0] for row in table.rows] == [
+        "identified, train", "identified, held out", "nothing moves, held out", "repeat the same phase, held out",
+        "nominal, held out", "refit of two parameters, held out", "floor",
+    ]  # fmt: skip
+    assert table.rows[1][1:3] == ["8.0 (6.4 .. 10.4)", "11.0"]
+    assert table.rows[3][2] == "-"
+
+
+def test_the_verdict_is_about_what_was_not_fitted() -> None:
+    """How many parameters the runs determine, the held-out error with its interval, floor and baselines."""
+    said = report(builders.identification())
+    text = verdict(said)
+    assert "determine 3 of 4 free parameters" in text
+    assert "8.0 mm (6.4 .. 10.4)" in text and "floor 5.0 mm" in text and "nothing moves 48.0" in text
+    assert "Nothing was held out" in verdict(said.model_copy(update={"heldout": None}))
+
+
+def test_an_endless_interval_does_not_hide_the_others() -> None:
+    """A parameter that is off by a factor of a million leaves the picture drawable."""
+    data = changed("parameters", "upper", np.array([0.82, 1e6, np.nan, np.nan]))
+    name, _, png = next(draw_identification(data, builders.robot()))
+    assert name == "parameters" and len(png) > 5000
+
+
+def test_nothing_known_of_the_information_is_drawn() -> None:
+    """A spectrum of zeros (no run says anything) has no logarithm, and is drawn."""
+    data = changed("identifiability", "eigenvalue", np.zeros(4))
+    assert draw_information(data) != draw_information(builders.identification())
+
+
+def test_the_error_of_a_frame_is_over_the_caps_that_are_seen() -> None:
+    """Root of the mean square distance: 3-4-5, a cap that is not seen does not count, none seen is NaN."""
+    error = np.array([[[3, 4, 0], [0, 0, 0]], [[3, 4, 0], [np.nan] * 3], [[np.nan] * 3] * 2])
+    assert cap_rmse(error) == pytest.approx([np.sqrt(12.5), 5.0, np.nan], nan_ok=True)
+
+
+def test_the_floor_is_that_of_the_key_frames() -> None:
+    """The last one that is known; NaN where none is."""
+    measures = builders.identification().groups["measures"]
+    assert floor_of(measures) == 0.005
+    unknown = changed("measures", "floor", np.full(3, np.nan)).groups["measures"]
+    assert np.isnan(floor_of(unknown))
+
+
+def test_the_self_test_as_a_table() -> None:
+    """Bias with its sign, coverage in per cent; what was never identifiable has neither sd nor coverage."""
+    sure = Recovered(unit="1", bias=-0.002, rmse=0.01, sd_reported=0.011, coverage=0.95, identifiable=1.0)
+    never = Recovered(unit="N s/m", bias=0.5, rmse=1.0, sd_reported=None, coverage=None, identifiable=0.0)
+    case = RecoveredCase(truth={}, value={}, sd={}, covered={}, converged=True, rollouts=10)
+    found = SelfTestReport(cases=(case,) * 20, parameters={"friction": sure, "damping": never}, noise_m=0.001,
+                           converged=0.95, seed=0)  # fmt: skip
+    (table,) = self_test_tables(found)
+    assert table.rows == [["friction", "", "-0.002", "0.01", "0.011", "95%", "100%"],
+                          ["damping", "N s/m", "+0.5", "1", "-", "-", "0%"]]  # fmt: skip
+    assert table.title == "self-test, simulated: 20 planted robots, noise 1.0 mm, 95% converged"

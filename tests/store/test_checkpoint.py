@@ -1,0 +1,58 @@
+"""Checkpoints: what comes back is what was left, or it is refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_key, checkpoint_of
+
+VALUES = {"z": [0.1, 1 / 3, -math.pi, 5e-324], "stage": 2, "reason": None, "words": "größer"}
+
+
+def test_values_come_back_bit_by_bit(tmp_path: Path) -> None:
+    """Floats, text and None; nothing else is left in the folder, and it never has an artifact's name."""
+    path = checkpoint_of(tmp_path / "30-identify.h5")
+    CheckpointFile(path, "a").save({"old": True})
+    CheckpointFile(path, "a").save(VALUES)
+    assert [p.name for p in tmp_path.iterdir()] == ["30-identify.partial"]
+    assert CheckpointFile(path, "a", resume=True).load() == VALUES
+
+
+def test_without_resume_or_without_a_file_there_is_nothing(tmp_path: Path) -> None:
+    """A checkpoint is taken up only where that is asked for."""
+    path = tmp_path / "x.partial"
+    assert CheckpointFile(path, "a", resume=True).load() is None
+    CheckpointFile(path, "a").save(VALUES)
+    assert CheckpointFile(path, "a").load() is None
+
+
+def test_another_request_is_refused(tmp_path: Path) -> None:
+    """Work of other inputs or settings is never gone on with."""
+    path = tmp_path / "x.partial"
+    CheckpointFile(path, checkpoint_key({"starts": 3}, ["sha"])).save(VALUES)
+    with pytest.raises(UsageError, match="another request"):
+        CheckpointFile(path, checkpoint_key({"starts": 4}, ["sha"]), resume=True).load()
+    assert CheckpointFile(path, checkpoint_key({"starts": 3}, ["sha"]), resume=True).load() == VALUES
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"form": 1}', '{"form": 1, "key": "a", "values": 3}', "\x00"])
+def test_a_broken_file_is_said(tmp_path: Path, content: str) -> None:
+    """Exit code 4 with the way out."""
+    path = tmp_path / "x.partial"
+    path.write_text(content)
+    with pytest.raises(InputError) as caught:
+        CheckpointFile(path, "a", resume=True).load()
+    assert caught.value.hint == "run the command without --resume"
+
+
+def test_clear_removes_it(tmp_path: Path) -> None:
+    """Once the artifact stands nothing is left to resume; twice is no error."""
+    file = CheckpointFile(tmp_path / "x.partial", "a")
+    file.save(VALUES)
+    file.clear()
+    file.clear()
+    assert not list(tmp_path.iterdir())

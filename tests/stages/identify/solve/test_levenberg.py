@@ -209,6 +209,15 @@ def test_default_limits_end_within_a_share_of_a_standard_deviation() -> None:
         assert solution.counts.jacobian <= 12
 
 
+def test_two_short_steps_in_a_row_end_the_fit() -> None:
+    """Asked to stop on steps alone, it stops at the second step in a row that is shorter than the share of an sd."""
+    lengths = []
+    solution = levenberg_marquardt(decay(), DECAY_START, loss=Huber(0.5), tolerance=0.0, gradient_sd=0.0, step_sd=0.05,
+                                   progress=lambda step: lengths.append(step.step_sd))  # fmt: skip
+    assert solution.reason is Reason.STEP
+    assert max(lengths[-2:]) <= 0.05 < min(lengths[:-2])
+
+
 def test_two_solves_give_the_same_bits() -> None:
     """The same call twice gives the same bits everywhere."""
     first, second = (levenberg_marquardt(decay(), DECAY_START, loss=StudentT()) for _ in range(2))

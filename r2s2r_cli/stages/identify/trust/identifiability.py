@@ -181,7 +181,7 @@ def _words(frees: Sequence[Free], z: np.ndarray, width: np.ndarray, row: np.ndar
     """The direction, its largest part one width long."""
     step = row / np.abs(row).max()
     seen = float(np.sqrt(eigenvalue) / np.abs(row).max())
-    return direction(frees, z, step * width, np.abs(step), seen, weak=eigenvalue < THRESHOLD)
+    return direction(frees, z, step * width, np.abs(step), seen, weak=bool(eigenvalue < THRESHOLD))
 
 
 def _trust(sd: float) -> Trust:

@@ -1,0 +1,214 @@
+"""How sure a fit is of its parameters: covariance that also counts what the noise model leaves out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.stages.identify.free.base import Coordinate, Free, slopes_of, values_of
+from r2s2r_cli.stages.identify.solve.loss import LOSSES, Loss, Squares
+from r2s2r_cli.stages.identify.solve.problem import Problem
+from r2s2r_cli.stages.identify.solve.record import Solution
+from r2s2r_cli.stages.identify.trust.clusters import Inflation, Scores, pooled, projection, sandwich, scores
+from r2s2r_cli.stages.identify.trust.information import held, inverse, precision, sd_flat, spectrum, widths
+from r2s2r_cli.stages.identify.trust.robust import bread_share, score_share
+
+MANY = 20
+"""Clusters from which their own scores are the covariance; there must also be twice as many as parameters."""
+ALIKE = 0.95
+"""Correlation of two parameters that the data can hardly tell apart."""
+MOST_Z = 700.0
+"""Coordinates beyond overflow."""
+
+
+@dataclass(frozen=True)
+class Covariance:
+    """Of p parameters. covariance: (p, p), of z, nuisances marginalised; naive: the same if residuals were independent
+    with the variance they were divided by. sd: (p,), in units; lower, upper: (p,), ends of the interval, units.
+    quantile: (p,), of Student's t, that they lie from z in sd_z. inflation: of the variance of the residuals over that
+    of the noise as given. dof: (p,), of its estimate. clusters: that showed it, 0 where none were given. how: in words.
+    on_bound: names.
+    """
+
+    names: tuple[str, ...]
+    z: np.ndarray
+    covariance: np.ndarray
+    naive: np.ndarray
+    value: np.ndarray
+    sd: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    level: float
+    quantile: np.ndarray
+    inflation: float
+    dof: np.ndarray
+    clusters: int
+    how: str
+    on_bound: tuple[str, ...]
+
+    @property
+    def sd_z(self) -> np.ndarray:
+        """Standard deviations of the coordinates, (p,)."""
+        found: np.ndarray = np.sqrt(np.diag(self.covariance))
+        return found
+
+    @property
+    def correlation(self) -> np.ndarray:
+        """Of the coordinates, (p, p); nan beside a parameter that cannot move or of which nothing is known."""
+        sd = self.sd_z
+        sd = np.where((sd > 0) & np.isfinite(sd), sd, np.nan)
+        found: np.ndarray = np.clip(self.covariance / np.outer(sd, sd), -1.0, 1.0)
+        return found
+
+    def alike(self, least: float = ALIKE) -> tuple[tuple[str, str, float], ...]:
+        """Pairs of parameters with a correlation of at least that size, the strongest first."""
+        correlation = self.correlation
+        pairs = [
+            (self.names[j], self.names[i], float(correlation[i, j])) for i in range(len(self.names)) for j in range(i)
+        ]
+        return tuple(sorted((one for one in pairs if abs(one[2]) >= least), key=lambda one: -abs(one[2])))
+
+
+def covariance(
+    problem: Problem,
+    solution: Solution,
+    frees: Sequence[Free],
+    *,
+    loss: Loss = LOSSES["none"],
+    block: np.ndarray | None = None,
+    cluster: np.ndarray | None = None,
+    level: float = 0.95,
+    least: float = 1.0,
+) -> Covariance:
+    """Posterior covariance at a solution, in the form bread * meat * bread (Huber 1967, White 1982).
+
+    Bread: inverse curvature of the robust cost with priors. Meat: variance of the scores, that of the data from the
+    residuals themselves, that of the priors as they were given, so that a parameter of which the data say nothing keeps
+    its prior. Of the data: with `MANY` clusters and twice as many as parameters, their outer products; with fewer, the
+    model's, times one inflation, the greater of chi^2 / dof and the pooled one of the clusters.
+
+    block: as in Evaluation, needed with a robust loss. cluster: (m,) int, windows: residuals in different ones are
+    independent. least: inflation is not below (noise may be over-estimated). Intervals are quantiles of Student's t in
+    z, mapped to units and cut at the bounds: not symmetric for log and logit.
+    """
+    p = len(problem.names)
+    share, normal = (1.0, 1.0)
+    if block is not None and not isinstance(loss, Squares):
+        share, normal = bread_share(loss, solution.residual, block), score_share(loss, block)
+    parts = _parts(problem, solution, share)
+    found = None
+    if cluster is not None:
+        pulled = parts.prior * np.where(parts.prior > 0, solution.z - problem.prior_mean, 0.0)
+        nuisance = np.arange(len(parts.prior)) >= p
+        found = scores(
+            parts.weighted, parts.pull, parts.hessian, (nuisance * parts.prior, nuisance * pulled), cluster, p
+        )
+    bread = inverse(parts.curvature)
+    fixed = np.diag(parts.prior[:p])
+    naive = bread @ (normal * parts.information + fixed) @ bread
+    inflation, how = _inflation(solution, parts, found, bread, least * normal)
+    total = bread @ (inflation.value * parts.information + fixed) @ bread
+    dof = np.full(p, inflation.dof)
+    if found is not None and found.count >= max(MANY, 2 * p):
+        meat, dof = sandwich(found, bread, parts.information)
+        total, how = _no_less(bread @ (meat + fixed) @ bread, total), f"scores of {found.count} windows"
+    unknown = _unknown(parts.curvature, widths(problem, frees))
+    total, naive = (_blank(one, unknown) for one in (total, naive))
+    quantile = _quantile(level, dof)
+    reach = np.where(unknown, np.inf, quantile * np.sqrt(np.maximum(np.diag(total), 0.0)))
+    z = solution.z[:p]
+    ends = [_ends(free, float(one), float(far)) for free, one, far in zip(frees, z, reach, strict=True)]
+    return Covariance(
+        names=problem.names, z=z, covariance=total, naive=naive, value=values_of(tuple(frees), z),
+        sd=np.sqrt(np.diag(total)) * slopes_of(tuple(frees), z), lower=np.array([low for low, _ in ends]),
+        upper=np.array([high for _, high in ends]), level=level, quantile=quantile,
+        inflation=inflation.value / normal, dof=dof, clusters=0 if found is None else found.count, how=how, on_bound=solution.on_bound,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """weighted: sqrt(w) J (m, n); pull: sqrt(w) r (m,); prior: precisions (n,); hessian: (n, n), of the robust cost and
+    priors. Of the parameters alone (p, p), nuisances marginalised: information, covariance of the data's scores if
+    residuals had variance 1, and curvature, own priors included. used: degrees of freedom that the fit took."""
+
+    weighted: np.ndarray
+    pull: np.ndarray
+    prior: np.ndarray
+    hessian: np.ndarray
+    information: np.ndarray
+    curvature: np.ndarray
+    used: float
+
+
+def _parts(problem: Problem, solution: Solution, share: float) -> _Parts:
+    p = len(problem.names)
+    root = np.sqrt(solution.weight)
+    weighted = solution.jacobian * root[:, None] * ~held(problem)
+    prior = precision(problem)
+    data = weighted.T @ weighted
+    hessian = share * data + np.diag(prior)
+    project = projection(hessian, p)
+    nuisance = np.diag(np.where(np.arange(len(prior)) < p, 0.0, prior))
+    return _Parts(
+        weighted, solution.residual * root, prior, hessian, project @ (data + nuisance) @ project.T,
+        project @ hessian @ project.T, float(np.sum(inverse(data + np.diag(prior)) * data)),
+    )  # fmt: skip
+
+
+def _inflation(
+    solution: Solution, parts: _Parts, found: Scores | None, bread: np.ndarray, least: float
+) -> tuple[Inflation, str]:
+    """The greater of chi^2 / dof and what the windows show, but not below `least`; and its name."""
+    m, weight = len(solution.residual), solution.weight
+    left = m - parts.used
+    size = float(np.sum((weight * solution.residual) ** 2) / np.sum(weight))
+    candidates = [(Inflation(least, np.inf), "noise as given")]
+    if left >= 1.0:
+        candidates.append((Inflation(size * m / left, left), "chi^2 / dof of the residuals"))
+    of_windows = None if found is None else pooled(found, bread)
+    if of_windows is not None and found is not None:
+        candidates.append((of_windows, f"pooled scores of {found.count} windows"))
+    return max(candidates, key=lambda one: one[0].value)
+
+
+def _no_less(robust: np.ndarray, model: np.ndarray) -> np.ndarray:
+    """The robust covariance, rows and columns raised until no standard deviation is below the model's."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.sqrt(np.diag(model) / np.diag(robust))
+    raised = np.where(np.isfinite(share), np.maximum(share, 1.0), 1.0)
+    return robust * np.outer(raised, raised)
+
+
+def _unknown(curvature: np.ndarray, width: np.ndarray) -> np.ndarray:
+    """(p,) bool: nothing, not even a prior, says where the parameter is."""
+    scaled = curvature * np.outer(width, width)
+    found: np.ndarray = ~np.isfinite(sd_flat(*spectrum(scaled))) & (width > 0)
+    return found
+
+
+def _blank(covariance: np.ndarray, unknown: np.ndarray) -> np.ndarray:
+    blank = np.where(unknown[:, None] | unknown, np.nan, 0.5 * (covariance + covariance.T))
+    blank[np.diag_indices_from(blank)] = np.where(unknown, np.inf, np.diag(covariance))
+    return blank
+
+
+def _quantile(level: float, dof: np.ndarray) -> np.ndarray:
+    """Of Student's t, two-sided; normal for infinitely many degrees of freedom. Below one degree, that of one."""
+    from scipy.special import ndtri, stdtrit
+
+    upper = 0.5 + 0.5 * level
+    finite = np.isfinite(dof)
+    found: np.ndarray = np.where(finite, stdtrit(np.where(finite, np.maximum(dof, 1.0), 1.0), upper), ndtri(upper))
+    return found
+
+
+def _ends(free: Free, z: float, reach: float) -> tuple[float, float]:
+    """Values at z -+ reach, not beyond the bounds."""
+    low, high = max(z - reach, -MOST_Z), min(z + reach, MOST_Z)
+    if free.coordinate is Coordinate.LINEAR:
+        low, high = z - reach, z + reach
+    value = free.from_z(z)
+    return min(max(free.from_z(low), free.lower), value), max(min(free.from_z(high), free.upper), value)

@@ -20,7 +20,8 @@ Place = tuple[str, int]
 
 class Action(Protocol):
     """How one value acts. touches: what it sets; two values that set the same contradict each other. affine: what it
-    sets is affine in the value and depends on no other value: its derivatives are constants."""
+    sets is affine in the value and depends on no other value: its derivatives are constants. Otherwise it is affine in
+    sine and cosine of the value."""
 
     affine: ClassVar[bool]
 

@@ -29,8 +29,13 @@ def catalogue(robot: Robot, effects: tuple[str, ...] = ()) -> dict[str, Free]:
 
 def entries(robot: Robot) -> dict[str, Entry]:
     """The catalogue with what each number does."""
+    return {**own_entries(robot), **{entry.free.name: entry for entry in effect_entries(robot)}}
+
+
+def own_entries(robot: Robot) -> dict[str, Entry]:
+    """The catalogue without the effects; without torch."""
     found = motor_entries(robot) + cable_entries(robot) + rod_entries(robot) + ground_entries(robot)
-    found += observation_entries() + pid_entries(robot) + effect_entries(robot)
+    found += observation_entries() + pid_entries(robot)
     return {entry.free.name: entry for entry in found}
 
 

@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Sequence
 
 from r2s2r_cli.stages.identify.free.base import Coordinate
-from r2s2r_cli.stages.identify.free.catalogue import entries
+from r2s2r_cli.stages.identify.free.catalogue import own_entries
 from r2s2r_cli.stages.identify.free.entry import INSIDE, Entry
 from r2s2r_cli.stages.identify.free.surroundings import RESTITUTION_SCALE
 from r2s2r_cli.stages.init.robots import robot_toml
@@ -42,18 +42,25 @@ Rules:
   off), the start is {inside:g} of the prior's scale inside; for restitution that is {bounce:g}. A START that lies on a
   bound or outside, or bounds the wrong way round: exit code 4.
 - Numbers of the controller act in closed loop only; those of the log lie between the robot and what was logged.
-- An effect's number puts the effect into the simulator. `EFFECT.PARAMETER` is one number for all its elements.
 - Elements are numbered as in robot.toml: K a cable (also for its winch), R a rod, capK an end cap.
 """
 
-_TITLES = {"robot": "Robot and ground", "log": "Log", "controller": "Controller", "effects": "Effects"}
+_EFFECTS = """\
+## Effects
+
+Every number of every effect in `r2s2r_cli/effects` as well: `EFFECT.PARAMETER` (`motor_lag.tau_s`), and one number an
+element where it has elements (`cap_friction.factor.3` for cap 3; `cap_friction.factor` is one number for all caps).
+Bounds and the prior's scale are those of the effect, the coordinate is linear, and the fit starts at the effect's off
+value. A free number of an effect puts the effect into the simulator.
+"""
+_TITLES = {"robot": "Robot and ground", "log": "Log", "controller": "Controller"}
 
 
 def free_parameters_page() -> str:
     """The whole page but for the note that it is generated."""
     robot = Robot.model_validate(tomllib.loads(robot_toml("threebar")))
     grouped: dict[str, list[list[Entry]]] = {name: [] for name in _TITLES}
-    for entry in entries(robot).values():
+    for entry in own_entries(robot).values():
         rows = grouped[_group(entry)]
         one_row = rows and entry.element is not None and _row_name(rows[-1][0]) == _row_name(entry)
         if one_row:
@@ -61,12 +68,10 @@ def free_parameters_page() -> str:
         else:
             rows.append([entry])
     tables = "\n".join(f"## {_TITLES[name]}\n\n{_table(rows)}" for name, rows in grouped.items())
-    return f"{_HEAD.format(inside=INSIDE, bounce=INSIDE * RESTITUTION_SCALE)}\n{tables}"
+    return f"{_HEAD.format(inside=INSIDE, bounce=INSIDE * RESTITUTION_SCALE)}\n{tables}\n{_EFFECTS}"
 
 
 def _group(entry: Entry) -> str:
-    if entry.effect:
-        return "effects"
     of = getattr(entry.action, "of", "robot")
     return {"observation": "log", "pid": "controller"}.get(of, "robot")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from r2s2r_cli.stages.identify.free import catalogue
+from r2s2r_cli.stages.identify.free.catalogue import own_entries
 from r2s2r_cli.stages.identify.free.page import free_parameters_page
 from tests.support.engine import threebar
 
@@ -17,9 +17,9 @@ def test_the_committed_page_is_the_present_one() -> None:
 
 
 def test_every_name_has_its_row() -> None:
-    """With a letter for the number of the element."""
+    """With a letter for the number of the element. Effects have theirs in the effects' own files."""
     page = free_parameters_page()
-    for name in catalogue(threebar()):
+    for name in own_entries(threebar()):
         stem, _, last = name.rpartition(".")
         digits = last.removeprefix("cap")
         shown = [f"{stem}.{last.removesuffix(digits)}{letter}" for letter in "KR"] if digits.isdigit() else [name]

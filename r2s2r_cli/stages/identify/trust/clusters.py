@@ -43,6 +43,12 @@ def projection(hessian: np.ndarray, p: int) -> np.ndarray:
     return found
 
 
+def owners(jacobian: np.ndarray, cluster: np.ndarray, p: int) -> np.ndarray:
+    """(n,) int: which of the sorted clusters an unknown belongs to, the one that depends on it most; parameters: -1."""
+    energy = np.array([np.sum(jacobian[cluster == one, p:] ** 2, axis=0) for one in np.unique(cluster)])
+    return np.concatenate([np.full(p, -1), np.argmax(energy, axis=0)])
+
+
 def scores(
     weighted: np.ndarray, pull: np.ndarray, hessian: np.ndarray, prior: tuple[np.ndarray, np.ndarray],
     cluster: np.ndarray, p: int,
@@ -50,14 +56,13 @@ def scores(
     """Of clusters (m,) int. weighted: (m, n), sqrt(w) J; pull: (m,), sqrt(w) r; hessian: (n, n), priors included.
 
     prior: precision (n,) and score precision * (z - mean) (n,) of the nuisances' priors, 0 for parameters. A nuisance
-    counts as an observation of the cluster that depends on it most: the start of a window belongs to the window.
+    counts as an observation of its owner: the start of a window belongs to the window.
     """
     precision, prior_score = prior
     project = projection(hessian, p)
     inside = inverse(hessian)
     found = np.unique(cluster)
-    energy = np.array([np.sum(weighted[cluster == one, p:] ** 2, axis=0) for one in found])
-    owner = np.concatenate([np.full(p, -1), np.argmax(energy, axis=0)])
+    owner = owners(weighted, cluster, p)
     score, expected = np.empty((len(found), p)), np.empty((len(found), p, p))
     for k, one in enumerate(found):
         rows, mine = weighted[cluster == one], owner == k

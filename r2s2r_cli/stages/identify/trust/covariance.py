@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.stages.identify.free.base import Coordinate, Free, slopes_of, values_of
-from r2s2r_cli.stages.identify.solve.loss import LOSSES, Loss, Squares
+from r2s2r_cli.stages.identify.solve.loss import LOSSES, Loss
 from r2s2r_cli.stages.identify.solve.problem import Problem
 from r2s2r_cli.stages.identify.solve.record import Solution
-from r2s2r_cli.stages.identify.trust.clusters import Inflation, Scores, pooled, projection, sandwich, scores
-from r2s2r_cli.stages.identify.trust.information import held, inverse, precision, sd_flat, spectrum, widths
-from r2s2r_cli.stages.identify.trust.robust import bread_share, score_share
+from r2s2r_cli.stages.identify.trust.clusters import Inflation, Scores, pooled, sandwich
+from r2s2r_cli.stages.identify.trust.information import sd_flat, spectrum, widths
+from r2s2r_cli.stages.identify.trust.parts import Parts, parts_of, scores_of
 
 MANY = 20
 """Clusters from which their own scores are the covariance; there must also be twice as many as parameters."""
@@ -26,16 +26,17 @@ MOST_Z = 700.0
 @dataclass(frozen=True)
 class Covariance:
     """Of p parameters. covariance: (p, p), of z, nuisances marginalised; naive: the same if residuals were independent
-    with the variance they were divided by. sd: (p,), in units; lower, upper: (p,), ends of the interval, units.
-    quantile: (p,), of Student's t, that they lie from z in sd_z. inflation: of the variance of the residuals over that
-    of the noise as given. dof: (p,), of its estimate. clusters: that showed it, 0 where none were given. how: in words.
-    on_bound: names.
+    with the variance they were divided by; bread: inverse curvature of the cost. value, sd: (p,), in units. lower,
+    upper: (p,), ends of the interval, units. quantile: (p,), of Student's t, that they lie from z in sd_z. inflation: of
+    the variance of the residuals over that of the noise as given. dof: (p,), of its estimate. clusters: that showed it,
+    0 where none were given. how: in words. on_bound: names.
     """
 
     names: tuple[str, ...]
     z: np.ndarray
     covariance: np.ndarray
     naive: np.ndarray
+    bread: np.ndarray
     value: np.ndarray
     sd: np.ndarray
     lower: np.ndarray
@@ -94,21 +95,11 @@ def covariance(
     z, mapped to units and cut at the bounds: not symmetric for log and logit.
     """
     p = len(problem.names)
-    share, normal = (1.0, 1.0)
-    if block is not None and not isinstance(loss, Squares):
-        share, normal = bread_share(loss, solution.residual, block), score_share(loss, block)
-    parts = _parts(problem, solution, share)
-    found = None
-    if cluster is not None:
-        pulled = parts.prior * np.where(parts.prior > 0, solution.z - problem.prior_mean, 0.0)
-        nuisance = np.arange(len(parts.prior)) >= p
-        found = scores(
-            parts.weighted, parts.pull, parts.hessian, (nuisance * parts.prior, nuisance * pulled), cluster, p
-        )
-    bread = inverse(parts.curvature)
-    fixed = np.diag(parts.prior[:p])
-    naive = bread @ (normal * parts.information + fixed) @ bread
-    inflation, how = _inflation(solution, parts, found, bread, least * normal)
+    parts = parts_of(problem, solution, loss, block)
+    found = None if cluster is None else scores_of(problem, solution, parts, cluster)
+    bread, fixed = parts.bread, parts.own_prior
+    naive = bread @ (parts.normal * parts.information + fixed) @ bread
+    inflation, how = _inflation(solution, parts, found, least)
     total = bread @ (inflation.value * parts.information + fixed) @ bread
     dof = np.full(p, inflation.dof)
     if found is not None and found.count >= max(MANY, 2 * p):
@@ -121,54 +112,23 @@ def covariance(
     z = solution.z[:p]
     ends = [_ends(free, float(one), float(far)) for free, one, far in zip(frees, z, reach, strict=True)]
     return Covariance(
-        names=problem.names, z=z, covariance=total, naive=naive, value=values_of(tuple(frees), z),
+        names=problem.names, z=z, covariance=total, naive=naive, bread=bread, value=values_of(tuple(frees), z),
         sd=np.sqrt(np.diag(total)) * slopes_of(tuple(frees), z), lower=np.array([low for low, _ in ends]),
         upper=np.array([high for _, high in ends]), level=level, quantile=quantile,
-        inflation=inflation.value / normal, dof=dof, clusters=0 if found is None else found.count, how=how, on_bound=solution.on_bound,
+        inflation=inflation.value / parts.normal, dof=dof,
+        clusters=0 if found is None else found.count, how=how, on_bound=solution.on_bound,
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Parts:
-    """weighted: sqrt(w) J (m, n); pull: sqrt(w) r (m,); prior: precisions (n,); hessian: (n, n), of the robust cost and
-    priors. Of the parameters alone (p, p), nuisances marginalised: information, covariance of the data's scores if
-    residuals had variance 1, and curvature, own priors included. used: degrees of freedom that the fit took."""
-
-    weighted: np.ndarray
-    pull: np.ndarray
-    prior: np.ndarray
-    hessian: np.ndarray
-    information: np.ndarray
-    curvature: np.ndarray
-    used: float
-
-
-def _parts(problem: Problem, solution: Solution, share: float) -> _Parts:
-    p = len(problem.names)
-    root = np.sqrt(solution.weight)
-    weighted = solution.jacobian * root[:, None] * ~held(problem)
-    prior = precision(problem)
-    data = weighted.T @ weighted
-    hessian = share * data + np.diag(prior)
-    project = projection(hessian, p)
-    nuisance = np.diag(np.where(np.arange(len(prior)) < p, 0.0, prior))
-    return _Parts(
-        weighted, solution.residual * root, prior, hessian, project @ (data + nuisance) @ project.T,
-        project @ hessian @ project.T, float(np.sum(inverse(data + np.diag(prior)) * data)),
-    )  # fmt: skip
-
-
-def _inflation(
-    solution: Solution, parts: _Parts, found: Scores | None, bread: np.ndarray, least: float
-) -> tuple[Inflation, str]:
+def _inflation(solution: Solution, parts: Parts, found: Scores | None, least: float) -> tuple[Inflation, str]:
     """The greater of chi^2 / dof and what the windows show, but not below `least`; and its name."""
     m, weight = len(solution.residual), solution.weight
     left = m - parts.used
     size = float(np.sum((weight * solution.residual) ** 2) / np.sum(weight))
-    candidates = [(Inflation(least, np.inf), "noise as given")]
+    candidates = [(Inflation(least * parts.normal, np.inf), "noise as given")]
     if left >= 1.0:
         candidates.append((Inflation(size * m / left, left), "chi^2 / dof of the residuals"))
-    of_windows = None if found is None else pooled(found, bread)
+    of_windows = None if found is None else pooled(found, parts.bread)
     if of_windows is not None and found is not None:
         candidates.append((of_windows, f"pooled scores of {found.count} windows"))
     return max(candidates, key=lambda one: one[0].value)

@@ -126,6 +126,8 @@ class IdentifyReport(Frozen):
     """In words."""
     mask: str | None = None
     """Direction mask of the Key Frame Loss, in words; method paper only."""
+    uncertainty: str = ""
+    """How the standard deviations came about: misfit and correlated residuals counted or not."""
     effects: tuple[str, ...] = ()
     parameters: dict[str, ParameterFigures]
     train: Measures

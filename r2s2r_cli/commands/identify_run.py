@@ -23,9 +23,9 @@ def compute(
     asked: Asked, settings: IdentifySettings, checkpoint: CheckpointFile, console: Console
 ) -> tuple[ArtifactData, IdentifyReport]:
     """Fit; the report knows how long each part took. An interrupt says how to go on."""
-    (stage,) = whole_items(_loaded())
     runs = asked.runs()
     request = asked.request(runs, settings.train_share)
+    (stage,) = whole_items(_loaded())
     clock = Clock()
     try:
         with _shown(console, clock) as progress:
@@ -45,9 +45,9 @@ def plant(asked: Asked, settings: IdentifySettings, console: Console) -> None:
     from r2s2r_cli.views.identify_self_test import self_test_tables
     from schemas.results_identify import SelfTestReport, SelfTestResult
 
-    (stage,) = whole_items(_loaded())
     runs = asked.runs()
     request = asked.request(runs, settings.train_share)
+    (stage,) = whole_items(_loaded())
     clock = Clock()
     with _shown(console, clock) as progress:
         report: SelfTestReport = stage.self_test(

@@ -55,7 +55,8 @@ def _spectrum(axes: Axes, info: Group) -> None:
     labels = ["\n".join(textwrap.wrap(text, _WRAP)) for text in words(info, "words")]
     axes.set_yticks(rows, labels, fontsize=7)
     axes.set_ylim(len(value) - 0.5, -0.5)
-    axes.set_xlabel("information (eigenvalue of the scaled normal matrix); red: weak")
+    axes.set_title("spectrum of the scaled normal matrix", fontsize=9, loc="right")
+    axes.set_xlabel("information (eigenvalue), red: weak")
 
 
 def _matrix(figure: Figure, axes: Axes, values: np.ndarray, title: str) -> None:

@@ -84,13 +84,22 @@ def _parameter(name: str, found: ParameterFigures) -> list[str]:
 
 
 def _errors(report: IdentifyReport) -> PageTable:
-    columns = ["prediction", "key frames [mm]", "free run [mm]", "free run, controller in the loop [mm]"]
-    rows = [["identified, train", millimetres(report.train.keyframe_cap_rmse_m), "-", "-"]]
+    columns = [
+        "prediction",
+        "key frames [mm]",
+        "identified minus this [mm]",
+        "free run [mm]",
+        "free run, PID in the loop [mm]",
+    ]
+    rows = [["identified, train", millimetres(report.train.keyframe_cap_rmse_m), "-", "-", "-"]]
     held = report.heldout
     if held is not None:
-        rows.append(["identified, held out", *_three(held)])
-        rows += [[f"{name}, held out", *_three(one)] for name, one in held.baselines.items()]
-        rows.append(["floor", millimetres(held.floor_m), "-", "-"])
+        key, *free = _three(held)
+        rows.append(["identified, held out", key, "-", *free])
+        for name, one in held.baselines.items():
+            key, *free = _three(one)
+            rows.append([f"{name}, held out", key, _against(one), *free])
+        rows.append(["floor", millimetres(held.floor_m), "-", "-", "-"])
     return PageTable("errors of the end caps (95 % interval by bootstrap over segments)", columns, rows)
 
 
@@ -98,6 +107,14 @@ def _three(found: HeldOut | Baseline | Measures) -> list[str]:
     names = ("keyframe_cap_rmse_m", "free_run_cap_mean_m", "free_run_closed_loop_cap_mean_m")
     intervals = getattr(found, "intervals", None)
     return [millimetres(getattr(found, name)) + spread(getattr(intervals, name, None)) for name in names]
+
+
+def _against(one: Baseline) -> str:
+    """`-36.1 .. -21.0, better in 100%` of the resampled segments."""
+    ends = one.difference.keyframe_cap_rmse_m
+    if ends is None or one.ours_better is None:
+        return "-"
+    return f"{millimetres(ends[0])} .. {millimetres(ends[1])}, better in {one.ours_better:.0%}"
 
 
 def _segments(report: IdentifyReport) -> PageTable:
@@ -120,6 +137,8 @@ def _how(report: IdentifyReport) -> Iterator[list[str]]:
     yield ["loss", report.loss]
     if report.mask is not None:
         yield ["direction mask", report.mask]
+    if report.uncertainty:
+        yield ["standard deviations", report.uncertainty]
     yield ["effects", ", ".join(report.effects) or "none"]
     yield ["ended", f"{'converged' if report.converged else 'not converged'}: {report.reason}"]
     yield ["residuals", f"{report.residuals}, loss {figure_of(report.cost, 6)}"]

@@ -131,7 +131,7 @@ class Found:
     information: before the fit. train,
     test: rows of predictors (measures.judge) over the steps of `train_segments` and `test_segments`, OURS among them;
     test empty where nothing was held out. closed_loop_m: mean error of the free run with the controller in the loop.
-    natures: what each run is, in words. p_RS: attachment points (cable, 2, 3) [m].
+    uncertainty: how sd came about, in words. natures: what each run is. p_RS: attachment points (cable, 2, 3) [m].
     """
 
     request: Request
@@ -161,6 +161,7 @@ class Found:
     updates: tuple[Update, ...] = ()
     p_RS: np.ndarray | None = None
     mask: str | None = None
+    uncertainty: str = ""
     natures: Mapping[str, str] | None = None
     computed_by_torch: bool = False
     warnings: tuple[str, ...] = ()

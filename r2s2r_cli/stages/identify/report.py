@@ -37,6 +37,7 @@ def report_of(found: Found) -> IdentifyReport:
         drive=found.request.drive,
         loss=found.loss,
         mask=found.mask,
+        uncertainty=found.uncertainty,
         effects=found.request.effects,
         parameters={one.free.name: _parameter(one) for one in found.parameters},
         train=Measures(keyframe_cap_rmse_m=_rmse(found.train.get(OURS))),

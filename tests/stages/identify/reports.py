@@ -40,7 +40,8 @@ def report(data: ArtifactData) -> IdentifyReport:
     measures = data.groups["measures"]
     others = {
         name: Baseline(keyframe_cap_rmse_m=_number(measures["baseline_value"][1, k]),
-                       free_run_cap_mean_m=_number(measures["baseline_value"][2, k]))
+                       free_run_cap_mean_m=_number(measures["baseline_value"][2, k]),
+                       difference=Intervals(keyframe_cap_rmse_m=(-0.06, -0.02)), ours_better=1.0)
         for k, name in enumerate(BASELINES)
     }  # fmt: skip
     held = HeldOut(
@@ -63,7 +64,8 @@ def report(data: ArtifactData) -> IdentifyReport:
         correlations=(Correlation(one="motor_speed", other="damping", value=0.97),),
         profiles=(ProfileFigures(parameter="damping", lower=None, upper=None),),
         starts=(StartFigures(kind="start", cost=21.0, iterations=4, reason="the step is small"),), cost=21.0,
-        residuals=36, converged=True, reason="the step is small", rollouts=120, wall_s=3.5, seconds={"fit": 3.0, "ranges": 0.5},
+        residuals=36, converged=True, reason="the step is small", rollouts=120, wall_s=3.5,
+        seconds={"fit": 3.0, "ranges": 0.5},
         warnings=("cap 5 of walk is <noisy>",),
     )  # fmt: skip
 

@@ -95,8 +95,9 @@ def test_errors_stand_beside_floor_and_baselines() -> None:
         "identified, train", "identified, held out", "nothing moves, held out", "repeat the same phase, held out",
         "nominal, held out", "refit of two parameters, held out", "floor",
     ]  # fmt: skip
-    assert table.rows[1][1:3] == ["8.0 (6.4 .. 10.4)", "11.0"]
-    assert table.rows[3][2] == "-"
+    assert table.rows[1][1:4] == ["8.0 (6.4 .. 10.4)", "-", "11.0"]
+    assert table.rows[2][1:4] == ["48.0", "-60.0 .. -20.0, better in 100%", "50.0"]
+    assert table.rows[3][3] == "-"
 
 
 def test_the_verdict_is_about_what_was_not_fitted() -> None:

@@ -27,9 +27,9 @@ MOST_Z = 700.0
 class Covariance:
     """Of p parameters. covariance: (p, p), of z, nuisances marginalised; naive: the same if residuals were independent
     with the variance they were divided by; bread: inverse curvature of the cost. value, sd: (p,), in units. lower,
-    upper: (p,), ends of the interval, units. quantile: (p,), of Student's t, that they lie from z in sd_z. inflation: of
-    the variance of the residuals over that of the noise as given. dof: (p,), of its estimate. clusters: that showed it,
-    0 where none were given. how: in words. on_bound: names.
+    upper: (p,), ends of the interval, units. quantile: (p,), of Student's t, that they lie from z in sd_z. inflation:
+    variance of the residuals over that of the noise as given. dof: (p,), of its estimate. clusters: that showed it, 0
+    where none were given. how: in words. on_bound: names.
     """
 
     names: tuple[str, ...]

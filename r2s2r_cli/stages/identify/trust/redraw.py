@@ -27,8 +27,8 @@ MANY = 40
 
 @dataclass(frozen=True)
 class Redrawn:
-    """z: parameters of each draw, (draw, p); solutions: of the full fits, () for linearised ones. failed: draws without a
-    fit."""
+    """z: parameters of each draw, (draw, p); solutions: of the full fits, () for linearised ones. failed: draws without
+    a fit."""
 
     z: np.ndarray
     solutions: tuple[Solution, ...] = ()

@@ -13,9 +13,10 @@ import numpy as np
 LAGS = 3
 GAP = 1.5
 """Frames further apart than this many median gaps are no neighbours."""
-DRAWS = 400
+DRAWS = (400, 4000)
+"""Shuffles of a series: of every one, and of one that few of those are as correlated as."""
 COUNTED = 12
-"""Shuffled series that are as correlated, from which their share is the chance; below, a gamma distribution tells it."""
+"""Shuffles as correlated as the series, from which their share is its chance."""
 LEAST = 5
 """Frames of a series below which nothing is said."""
 
@@ -46,7 +47,7 @@ def whiteness(
 
     The axes of a cap share a test. Correlation is the Ljung-Box statistic (1978) summed over axes, over pairs of frames
     whose distance is that many median gaps, within half of one. Its chance is found by shuffling the frames of the
-    series, since they are few and irregular, with a gamma distribution of the same mean and variance for its far tail.
+    series, since they are few and irregular, with a gamma distribution of the same mean and variance beyond the last.
     """
     from scipy.special import betainc
 
@@ -114,17 +115,25 @@ def _chance(e: np.ndarray, near: list[np.ndarray], rng: np.random.Generator) -> 
     from scipy.special import gammaincc
 
     n = len(e)
-    order = np.concatenate([np.arange(n)[None], rng.permuted(np.tile(np.arange(n), (DRAWS, 1)), axis=1)])
-    drawn = e[order]
-    q = np.zeros(DRAWS + 1)
+    drawn = np.empty(0)
+    found = _correlated(e[None], near)[0]
+    for draws in DRAWS:
+        order = rng.permuted(np.tile(np.arange(n), (draws, 1)), axis=1)
+        drawn = np.concatenate([drawn, _correlated(e[order], near)])
+        above = int(np.sum(drawn >= found))
+        if above >= COUNTED:
+            break
+    if above or np.ptp(drawn) == 0:
+        return (above + 1) / (len(drawn) + 1)
+    mean, variance = float(drawn.mean()), float(drawn.var())
+    return min(float(gammaincc(mean**2 / variance, found * mean / variance)), 1.0 / (len(drawn) + 1))
+
+
+def _correlated(e: np.ndarray, near: list[np.ndarray]) -> np.ndarray:
+    """The statistic of series e (draw, n, axis), up to a factor, (draw,)."""
+    q: np.ndarray = np.zeros(len(e))
     for pairs in near:
         if len(pairs):
-            r = np.sum(drawn[:, pairs[:, 0]] * drawn[:, pairs[:, 1]], axis=1)
+            r = np.sum(e[:, pairs[:, 0]] * e[:, pairs[:, 1]], axis=1)
             q += np.sum(r**2, axis=1) / len(pairs)
-    above = int(np.sum(q[1:] >= q[0]))
-    if above >= COUNTED:
-        return (above + 1) / (DRAWS + 1)
-    mean, variance = float(q[1:].mean()), float(q[1:].var())
-    if variance <= 0:
-        return 1.0
-    return min(float(gammaincc(mean**2 / variance, q[0] * mean / variance)), COUNTED / (DRAWS + 1))
+    return q

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import torch
@@ -150,21 +151,22 @@ class Simulator:
         """A rollout and its forward sensitivities along D directions in one pass; frame G.
 
         d_parameters: (NP, D), the Jacobian of `pack_parameters` with respect to what is differentiated; d_state:
-        (NS, D) likewise of `pack_state`; d_commands: (row, actuated, D). None: zero. Returns the trajectory and the
-        tangents of its flat states (B, frame, NS, D).
+        (NS, D) likewise of `pack_state`; d_commands: (row, actuated, D); each may have a batch axis before. None: zero.
+        Returns the trajectory and the tangents of its flat states (B, frame, NS, D).
         """
         batch = self._checked_batch(theta, state0, commands, step, hold, every, substeps)
         n = substeps or self.substeps(theta, state0, step)
         s0 = pack_state(self.structure, state0).expand(batch, -1).contiguous()
         u, p = commands.expand(batch, -1, -1).contiguous(), pack_parameters(self.structure, theta)
 
-        def spread(x: Tensor | None) -> Tensor | None:
-            return None if x is None else x.expand(batch, *x.shape)
+        def spread(x: Tensor | None, axes: int) -> Tensor | None:
+            return None if x is None else x.expand(batch, *x.shape[-axes:])
 
         # What no direction changes needs no tangent: less to compile, and less to compute.
-        active = None if d_parameters is None else tuple(torch.nonzero(d_parameters.abs().amax(1)).flatten().tolist())
-        d_s0, d_u, d_p = spread(d_state), spread(d_commands), spread(d_parameters)
-        run = self.kernels.jvp if self.native else self.kernels.torch_jvp
+        moved = None if d_parameters is None else d_parameters.abs().amax(-1).reshape(-1, d_parameters.shape[-2]).amax(0)
+        active = None if moved is None else tuple(torch.nonzero(moved).flatten().tolist())
+        d_s0, d_u, d_p = spread(d_state, 2), spread(d_commands, 3), spread(d_parameters, 2)
+        run = partial(self.kernels.jvp, threads=self.threads) if self.native else self.kernels.torch_jvp
         frames, tangents = run(
             s0, u, p, ds0=d_s0, du=d_u, dp=d_p, active=active, h=step / n, hold=hold * n, every=every * n
         )

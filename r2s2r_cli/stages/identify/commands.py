@@ -1,0 +1,43 @@
+"""Recorded motor commands on the grid of the engine, shifted by a delay, with the derivative by that delay."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from r2s2r_cli.stages.identify.data import RunData
+
+
+class CommandLog:
+    """The commands of one run as a function of time: 0 before the first row, then piecewise constant.
+
+    Where the rows are commands as they were sent, each holds from its stamp. Where they are what the camera frames found
+    in force (`RunData.sampled`), a command was switched at an unknown moment between two rows; half-way is the guess of
+    least variance, and holding until the row that shows it would be half a frame late at every switch.
+    """
+
+    def __init__(self, run: RunData) -> None:
+        control = np.nan_to_num(run.control)
+        switched = np.concatenate([run.t_command[:1], (run.t_command[1:] + run.t_command[:-1]) / 2])
+        self._knots = switched if run.sampled else run.t_command
+        self._control = np.vstack([np.zeros((1, control.shape[1])), control])
+        spans = np.diff(self._knots)[:, None] * control[:-1]
+        self._wound = np.vstack([np.zeros((1, control.shape[1])), np.cumsum(spans, axis=0)])
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """Commands in force at times t (n,) [s], (n, actuated)."""
+        return np.asarray(self._control[np.searchsorted(self._knots, t, side="right")])
+
+    def rows(self, start: float, count: int, *, step: float, delay: float) -> tuple[np.ndarray, np.ndarray]:
+        """`count` commands of `step` seconds from `start` [s], each (row, actuated), and their derivatives by the delay.
+
+        A row is the mean of the delayed command over its step: so the derivative exists where a switch falls into it.
+        """
+        edges = start + step * np.arange(count + 1) - delay
+        return np.diff(self._integral(edges), axis=0) / step, -np.diff(self.at(edges), axis=0) / step
+
+    def _integral(self, t: np.ndarray) -> np.ndarray:
+        """Integral of the commands from the first row to t (n,) [s], (n, actuated)."""
+        row = np.searchsorted(self._knots, t, side="right")
+        since = t - self._knots[np.maximum(row - 1, 0)]
+        before = np.where(row > 0, since, 0.0)[:, None]
+        return np.asarray(self._wound[np.maximum(row - 1, 0)] + before * self._control[row])

@@ -1,0 +1,146 @@
+"""The default fit: windows from filtered start states, growing horizon, Levenberg-Marquardt, starts made again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from r2s2r_cli.stages.identify.data import RunData, Selection
+from r2s2r_cli.stages.identify.free.base import values_of
+from r2s2r_cli.stages.identify.predict import Predictor
+from r2s2r_cli.stages.identify.recipe import Recipe
+from r2s2r_cli.stages.identify.residuals import CapResiduals
+from r2s2r_cli.stages.identify.solve.horizon import EARLY, Limits
+from r2s2r_cli.stages.identify.solve.loss import LOSSES
+from r2s2r_cli.stages.identify.solve.record import Checkpoint, Progress, Solution
+from r2s2r_cli.stages.identify.solve.starts import MultiStart, multi_start, starts
+from r2s2r_cli.stages.identify.start import states_at
+from r2s2r_cli.stages.identify.windows import Window, selected, window
+
+if TYPE_CHECKING:
+    from r2s2r_cli.engine import State
+
+START_SPREAD = 0.4
+"""Starts are drawn this far from the first in coordinates without a prior: for a logarithm, a factor of 1.5."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A finished fit. problem: at its last start states; solution: in its unknowns; values: (n,), units. trials: of the
+    first round, from all starts. first: (k, n), where these began, units."""
+
+    problem: CapResiduals
+    solution: Solution
+    values: np.ndarray
+    trials: MultiStart | None
+    first: np.ndarray
+
+
+def training_windows(
+    runs: Sequence[RunData], train: Sequence[Selection], predictor: Predictor, values: np.ndarray, recipe: Recipe,
+    known: dict[str, State] | None = None,
+) -> list[Window]:  # fmt: skip
+    """Training windows with start states at `values`. known: true states at the first frames of runs, for planted data:
+    a window that begins there starts from it and has no offsets."""
+    known = known or {}
+    chosen = selected(runs, train, recipe.window)
+    guessed = [run for run, numbers in chosen if not (run.name in known and numbers[0] == 1)]
+    last = {run.name: max(numbers[0] for other, numbers in chosen if other is run) for run in guessed}
+    states = states_at(list({run.name: run for run in guessed}.values()), predictor, values, last, belief=recipe.belief)
+    return [
+        window(run, numbers, known[run.name], known=True)
+        if run.name in known and numbers[0] == 1
+        else window(run, numbers, states[run.name, numbers[0]])
+        for run, numbers in chosen
+    ]
+
+
+def fit(
+    runs: Sequence[RunData],
+    train: Sequence[Selection],
+    predictor: Predictor,
+    recipe: Recipe,
+    *,
+    count: int = 1,
+    seed: int = 0,
+    known: dict[str, State] | None = None,
+    begin: np.ndarray | None = None,
+    progress: Callable[[int, int, Progress], None] | None = None,
+    checkpoint: Callable[[int, np.ndarray, Checkpoint], None] | None = None,
+    resume: tuple[int, np.ndarray, Checkpoint | None] | None = None,
+) -> Fit:
+    """Fit the free parameters of `predictor` to the training intervals.
+
+    count: starts of the first round; later rounds make the start states again with what was found and go on from it.
+    begin: values (n,) to start from, default those of the free parameters. known: see `training_windows`. progress is
+    called with the round, the number of rounds and the solver's own; checkpoint with the round, the values its start
+    states are made with, and the solver's; resume is what the last checkpoint was called with.
+
+    Raises NumericalError where nothing can be simulated, InputError for runs that cannot be started.
+    """
+    frees = predictor.mapping.frees
+    values = np.array([free.start for free in frees]) if begin is None else np.asarray(begin, dtype=float)
+    rounds = max(1, recipe.refreshes)
+    loss = LOSSES[recipe.loss]
+    trials, first = None, values[None]
+    at, inner = 0, None
+    if resume is not None:
+        at, values, inner = resume
+    for number in range(at, rounds):
+        windows = training_windows(runs, train, predictor, values, recipe, known)
+        problem = CapResiduals(
+            predictor, windows, spread=recipe.spread, noise=recipe.noise, key_only=recipe.key_only
+        )
+        z0 = problem.z0.copy()
+        z0[: len(frees)] = [free.to_z(float(value)) for free, value in zip(frees, values, strict=True)]
+        horizons = recipe.horizons(max(len(one.intervals) for one in windows)) if number == 0 else (recipe.window,)
+        stages = [
+            (
+                "all" if length == horizons[-1] else f"{length} intervals",
+                problem if length == horizons[-1] else CapResiduals(
+                    predictor, [one.until(length) for one in windows], spread=recipe.spread, noise=recipe.noise,
+                    key_only=recipe.key_only,
+                ),
+            )
+            for length in horizons
+        ]  # fmt: skip
+        z0s = _starts(problem, z0, count if number == 0 else 1, seed)
+        found = multi_start(
+            stages, z0s, loss=loss, seed=seed, early=EARLY,
+            last=Limits(max_iterations=recipe.max_iterations, tolerance=3e-5, step_sd=0.05),
+            progress=None if progress is None else _with_round(progress, number, rounds),
+            checkpoint=None if checkpoint is None else _kept(checkpoint, number, values), resume=inner,
+        )  # fmt: skip
+        inner = None
+        if number == 0:
+            trials, first = found, np.array([values_of(frees, z[: len(frees)]) for z in z0s])
+        solution = found.best
+        values = values_of(frees, solution.z[: len(frees)])
+        if all(one.known for one in windows):
+            break  # nothing to make again
+    return Fit(problem, solution, values, trials, first)
+
+
+def _starts(problem: CapResiduals, z0: np.ndarray, count: int, seed: int) -> np.ndarray:
+    """z0 and others about it: parameters within one sd of their priors, offsets as they are."""
+    if count == 1:
+        return z0[None]
+    n = len(problem.names)
+    spread = np.zeros(len(z0))
+    spread[:n] = np.minimum(problem.prior_sd[:n], START_SPREAD)
+    return starts(problem.lower, problem.upper, z0, n=count, seed=seed, spread=spread)
+
+
+def _with_round(
+    progress: Callable[[int, int, Progress], None], number: int, rounds: int
+) -> Callable[[Progress], None]:
+    return lambda one: progress(number, rounds, one)
+
+
+def _kept(
+    checkpoint: Callable[[int, np.ndarray, Checkpoint], None], number: int, values: np.ndarray
+) -> Callable[[Checkpoint], None]:
+    return lambda one: checkpoint(number, values, one)

@@ -1,0 +1,73 @@
+"""Start states with offsets: what a training window may get wrong about where it starts, as numbers that a fit can move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from r2s2r_cli.engine import Structure
+
+
+@dataclass(frozen=True)
+class StartSpread:
+    """Standard deviations of the offsets of a start state from the truth.
+
+    position [m] and velocity [m/s] of each rod's centre of mass, per axis; tilt [rad] and tilt_rate [rad/s] across the
+    rod; roll [rad] and roll_rate [rad/s] about it; rest lengths of the winched cables [m]. 0: not free.
+    """
+
+    position: float = 1.5e-3
+    tilt: float = 0.01
+    roll: float = 0.1
+    velocity: float = 0.01
+    tilt_rate: float = 0.06
+    roll_rate: float = 0.02
+    rest: float = 2e-3
+
+    def sd(self, structure: Structure) -> np.ndarray:
+        """As a vector in the order of the offsets (`displaced`), (offset,)."""
+        rods = structure.n_rods
+        return np.concatenate(
+            [
+                np.full(3 * rods, self.position), np.tile([self.tilt, self.tilt, self.roll], rods),
+                np.full(3 * rods, self.velocity), np.tile([self.tilt_rate, self.tilt_rate, self.roll_rate], rods),
+                np.full(structure.n_actuated, self.rest),
+            ]
+        )  # fmt: skip
+
+
+def count(structure: Structure) -> int:
+    """How many offsets a start state has."""
+    return 12 * structure.n_rods + structure.n_actuated
+
+
+def displaced(structure: Structure, s: Tensor, offsets: Tensor) -> Tensor:
+    """Flat states s (B, NS) moved by offsets (B, offset): positions, rotations in rod axes, velocities, rates, rests."""
+    import roma
+    import torch
+
+    from r2s2r_cli.engine.flat import pack_state, unpack_state
+
+    state, rods = unpack_state(structure, s), structure.n_rods
+    parts = torch.split(offsets, [3 * rods] * 4 + [structure.n_actuated], dim=-1)
+    by = [part.unflatten(-1, (rods, 3)) for part in parts[:4]]
+    moved = replace(
+        state, p_WB=state.p_WB + by[0], q_WR=roma.quat_product(state.q_WR, roma.rotvec_to_unitquat(by[1])),
+        v_WB=state.v_WB + by[2], w_R=state.w_R + by[3], rest=state.rest + parts[4],
+    )  # fmt: skip
+    return torch.as_tensor(pack_state(structure, moved))
+
+
+def displacement_jacobian(structure: Structure, s: Tensor, offsets: Tensor) -> Tensor:
+    """d displaced / d offsets, (B, NS, offset)."""
+    from torch.func import jacfwd, vmap
+
+    def one(s: Tensor, n: Tensor) -> Tensor:
+        return displaced(structure, s[None], n[None])[0]
+
+    return vmap(jacfwd(one, argnums=1))(s, offsets)

@@ -1,0 +1,88 @@
+"""The default fit as a least-squares problem: observed minus simulated end caps of training windows, over the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from r2s2r_cli.stages.identify.free.base import slopes_of, values_of
+from r2s2r_cli.stages.identify.offsets import StartSpread, count
+from r2s2r_cli.stages.identify.predict import Prediction, Predictor
+from r2s2r_cli.stages.identify.solve.problem import Evaluation
+from r2s2r_cli.stages.identify.windows import Window
+
+FIXED_SD = 1e-9
+"""Prior sd of an offset that is not free: it stays, and needs no case of its own."""
+
+
+class CapResiduals:
+    """A `Problem`: unknowns are the coordinates of the free parameters, then the offsets of every window's start.
+
+    noise: sd of an observed coordinate is at least this [m]; a model that is not exact misses by more than the tracker.
+    key_only: compare key frames only (the paper's Key Frame Loss without its detours), else every frame. Windows whose
+    start is known have no offsets. cluster: window of each residual, for covariances.
+    """
+
+    def __init__(
+        self,
+        predictor: Predictor,
+        windows: Sequence[Window],
+        *,
+        spread: StartSpread | None = None,
+        noise: float = 1e-3,
+        key_only: bool = False,
+    ) -> None:
+        self.predictor = predictor
+        self.windows = tuple(windows)
+        self.frees = predictor.mapping.frees
+        self.names = predictor.mapping.names
+        n = len(self.frees)
+        self.offsets = 0 if all(window.known for window in windows) else count(predictor.structure)
+        sd = (spread or StartSpread()).sd(predictor.structure)
+        sd = np.where(sd > 0, sd, FIXED_SD)
+        each = [np.full_like(sd, FIXED_SD) if window.known else sd for window in windows] if self.offsets else []
+        bounds = np.array([free.bounds_z() for free in self.frees]).reshape(-1, 2)
+        rest = self.offsets * len(windows)
+        self.lower = np.concatenate([bounds[:, 0], np.full(rest, -np.inf)])
+        self.upper = np.concatenate([bounds[:, 1], np.full(rest, np.inf)])
+        start = np.array([free.to_z(free.start) for free in self.frees])
+        self.prior_mean = np.concatenate([start, np.zeros(rest)])
+        self.prior_sd = np.concatenate([np.array([free.prior_sd for free in self.frees]), *each])
+        self.z0 = self.prior_mean.copy()
+        self._kept = np.concatenate([w.key if key_only else np.ones(len(w.frames), bool) for w in windows])
+        self._observed = np.concatenate([w.run.observed[w.frames] for w in windows])[self._kept]
+        wide = [np.broadcast_to(np.maximum(w.run.noise, noise), (len(w.frames), *w.run.noise.shape)) for w in windows]
+        self._sd = np.concatenate(wide)[self._kept]
+        self._window = np.concatenate([np.full(len(w.frames), k) for k, w in enumerate(windows)])[self._kept]
+        self.cluster = np.repeat(self._window, self._observed[0].size)
+        self.block = np.repeat(np.arange(self._observed[..., 0].size), 3)
+        self._width = n
+
+    def split(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+        """Values (n,) in their units and offsets (W, offset), None where no start is free."""
+        n = self._width
+        offsets = z[n:].reshape(len(self.windows), self.offsets) if self.offsets else None
+        return values_of(self.frees, z[:n]), offsets
+
+    def predict(self, z: np.ndarray, *, jacobian: bool = False) -> Prediction:
+        """End caps at all frames of the windows."""
+        values, offsets = self.split(z)
+        return self.predictor.predict(self.windows, values, offsets, jacobian=jacobian)
+
+    def evaluate(self, z: np.ndarray, *, jacobian: bool = True) -> Evaluation:
+        """Residuals (simulated - observed) / sd at z. Raises NumericalError where nothing finite comes out."""
+        seen = self.predict(z, jacobian=jacobian)
+        residual = ((seen.p_WE[self._kept] - self._observed) / self._sd).reshape(-1)
+        if not jacobian or seen.by_value is None:
+            return Evaluation(residual, None, self.block)
+        n = self._width
+        d = np.zeros((*self._observed.shape, len(z)))
+        d[..., :n] = seen.by_value[self._kept] * slopes_of(self.frees, z[:n])
+        if seen.by_offset is not None:
+            by = seen.by_offset[self._kept]
+            for k in range(len(self.windows)):
+                rows = self._window == k
+                d[rows, ..., n + k * self.offsets : n + (k + 1) * self.offsets] = by[rows]
+        d /= self._sd[..., None]
+        return Evaluation(residual, d.reshape(len(residual), len(z)), self.block)

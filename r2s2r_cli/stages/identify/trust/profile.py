@@ -19,6 +19,8 @@ from r2s2r_cli.stages.identify.trust.wrapped import Wrapped
 
 ALIKE = 1.3
 """Ends of two intervals whose distances from the value differ by less than this factor are alike."""
+FURTHER = (1.25, 1.6, 2.0)
+"""Further points, in reaches, of a side on which the interval has not ended."""
 LOWER = 0.02
 """Fall of the cost that a profile may find by chance of ending iterations early."""
 
@@ -56,49 +58,38 @@ def profile(
 ) -> Profile:
     """Of parameter `index`, on `points` values out to `reach` standard deviations or to its bounds.
 
-    Each point starts from its neighbour, moved as the covariance says the others follow. Rises are compared with those
-    of a covariance whose inflation counts (Raue et al. 2009, Bioinformatics 25, 1923, with a threshold scaled by it):
-    on a linear problem both intervals are equal. Points that cannot be simulated end the grid.
+    A side ends where the cost has risen twice as far as the interval needs, and goes on to twice the reach where it has
+    not risen as far. Each point starts from its neighbour, moved as the normal matrix says the others follow. The rise
+    at the ends of the interval is that which makes it equal to the covariance's on a linear problem, inflation included
+    (plain profiles: Raue et al. 2009, Bioinformatics 25, 1923). Points that cannot be simulated end the grid.
     """
     free, z0 = frees[index], float(solution.z[index])
     variance, bread = float(spread.covariance[index, index]), float(spread.bread[index, index])
     known = np.isfinite(variance) and bread > 0
     sd = float(np.sqrt(variance)) if known else float(widths(problem, frees)[index])
-    scale = variance / bread if known else spread.inflation
-    full = inverse(solution.normal)
-    follow = full[:, index] / full[index, index] if full[index, index] > 0 else np.zeros(len(solution.z))
-    follow[index] = 1.0
-    ends = float(spread.quantile[index])
-    offsets = sd * max(reach, 1.2 * ends) * np.arange(1, points // 2 + 1) / (points // 2)
-    found = [(z0, solution.cost)]
-    best: tuple[float, np.ndarray] = (solution.cost - LOWER, solution.z)
-    for sign in (-1.0, 1.0):
-        z = solution.z
-        for offset in offsets:
-            at = float(np.clip(z0 + sign * offset, problem.lower[index], problem.upper[index]))
-            if at == z[index]:
-                break
-            point = _fit(problem, z + (at - z[index]) * follow, index, at, loss, max_iterations)
-            if point is None:
-                break
-            z = point.z
-            found.append((at, point.cost))
-            if point.cost < best[0]:
-                best = (point.cost, point.z)
-    found.sort()
-    grid, cost = np.array([at for at, _ in found]), np.array([one for _, one in found])
-    rise = cost - cost.min() if best[1] is not solution.z else cost - solution.cost
-    low, high = interval(grid, rise / scale, ends)
-    value = np.array([free.from_z(float(one)) for one in grid])
-    both = tuple(free.from_z(one) if np.isfinite(one) else np.nan for one in (low, high))
-    on_box = grid[0] <= problem.lower[index], grid[-1] >= problem.upper[index]
-    centre = float(grid[np.argmin(rise)])
-    words = _words(free, (centre - low, high - centre), sd * ends, value, on_box)
-    quadratic = float(spread.lower[index]), float(spread.upper[index])
-    better = None if best[1] is solution.z else best[1]
+    scale, quantile = variance / bread if known else spread.inflation, float(spread.quantile[index])
+    threshold = 0.5 * scale * quantile**2
+    near = np.arange(1, points // 2 + 1) / (points // 2)
+    grid = sd * max(reach, 1.2 * quantile) * np.concatenate([near, FURTHER])
+    sides = [
+        _walk(problem, solution, index, sign * grid, threshold, len(near), loss, max_iterations) for sign in (-1.0, 1.0)
+    ]
+    path = [*reversed(sides[0]), (solution.z, solution.cost), *sides[1]]
+    z, cost = np.array([one[index] for one, _ in path]), np.array([one for _, one in path])
+    lowest = int(np.argmin(cost))
+    better = path[lowest][0] if cost[lowest] < solution.cost - LOWER else None
+    rise = cost - (solution.cost if better is None else cost[lowest])
+    low, high = interval(z, rise / scale, quantile)
+    value = np.array([free.from_z(float(one)) for one in z])
+    centre = z0 if better is None else float(better[index])
+    on_box = bool(z[0] <= problem.lower[index]), bool(z[-1] >= problem.upper[index])
+    words = _words((centre - low, high - centre), sd * quantile, value, on_box)
+    if better is not None:
+        words = f"a better fit was found at {free.from_z(centre):.4g}: {words}"
+    lower, upper = (free.from_z(one) if np.isfinite(one) else np.nan for one in (low, high))
     return Profile(
-        free.name, value, rise, 0.5 * scale * ends**2, both[0], both[1], quadratic, better,
-        words if better is None else f"a better fit was found at {free.from_z(float(better[index])):.4g}: {words}",
+        free.name, value, rise, threshold, lower, upper, (float(spread.lower[index]), float(spread.upper[index])),
+        better, words,
     )  # fmt: skip
 
 
@@ -139,22 +130,39 @@ def interval(grid: np.ndarray, rise: np.ndarray, quantile: float) -> tuple[float
     return ends[0], ends[1]
 
 
-def _fit(
-    problem: Problem, start: np.ndarray, index: int, at: float, loss: Loss, max_iterations: int
-) -> Solution | None:
-    """All unknowns but one; None where none of it can be simulated."""
-    lower, upper = problem.lower.copy(), problem.upper.copy()
-    lower[index] = upper[index] = start[index] = at
-    try:
-        return levenberg_marquardt(
-            Wrapped(problem, lower=lower, upper=upper), start, loss=loss, max_iterations=max_iterations,
-            tolerance=1e-4, step_sd=0.03, gradient_sd=0.01, damping0=1e-3,
-        )  # fmt: skip
-    except NumericalError:
-        return None
+def _walk(
+    problem: Problem, solution: Solution, index: int, offsets: np.ndarray, threshold: float, usual: int, loss: Loss,
+    max_iterations: int,
+) -> list[tuple[np.ndarray, float]]:  # fmt: skip
+    """All unknowns and costs with one held at offsets from the solution, outwards; beyond the `usual` number of points
+    only while the cost is below the threshold."""
+    full = inverse(solution.normal)
+    follow = full[:, index] / full[index, index] if full[index, index] > 0 else np.zeros(len(solution.z))
+    follow[index] = 1.0
+    found: list[tuple[np.ndarray, float]] = []
+    z, cost = solution.z, solution.cost
+    for k, offset in enumerate(offsets):
+        at = float(np.clip(solution.z[index] + offset, problem.lower[index], problem.upper[index]))
+        enough = 2.0 * threshold if k < usual else threshold
+        if at == z[index] or cost > solution.cost + enough:
+            break
+        lower, upper = problem.lower.copy(), problem.upper.copy()
+        start = z + (at - z[index]) * follow
+        lower[index] = upper[index] = start[index] = at
+        held = Wrapped(problem, lower=lower, upper=upper)
+        try:
+            point = levenberg_marquardt(
+                held, start, loss=loss, max_iterations=max_iterations, tolerance=1e-4, step_sd=0.03, gradient_sd=0.01,
+                damping0=1e-3,
+            )  # fmt: skip
+        except NumericalError:
+            break
+        z, cost = point.z, point.cost
+        found.append((z, cost))
+    return found
 
 
-def _words(free: Free, far: tuple[float, float], quadratic: float, value: np.ndarray, on_box: tuple[bool, bool]) -> str:
+def _words(far: tuple[float, float], quadratic: float, value: np.ndarray, on_box: tuple[bool, bool]) -> str:
     open_ends = []
     for side, one, end, box in zip(("below", "above"), far, value[[0, -1]], on_box, strict=True):
         if not np.isfinite(one):

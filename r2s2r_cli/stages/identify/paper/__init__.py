@@ -12,7 +12,13 @@ from r2s2r_cli.stages.identify.paper.demonstration import (
     demonstrations as demonstrations,
     synthetic as synthetic,
 )
-from r2s2r_cli.stages.identify.paper.flight import Flight as Flight, World as World, fly as fly, replay as replay
+from r2s2r_cli.stages.identify.paper.flight import (
+    Flight as Flight,
+    World as World,
+    fly as fly,
+    fly_side_by_side as fly_side_by_side,
+    replay as replay,
+)
 from r2s2r_cli.stages.identify.paper.key_frames import (
     KeyFrames as KeyFrames,
     Spans as Spans,

@@ -51,6 +51,11 @@ class Flight:
 
 def fly(world: World, theta: Parameters, start: State, targets: np.ndarray) -> Flight:
     """Run targets (S, actuated) with the robot's controller. Raises EngineInputError, NonFiniteError."""
+    return fly_side_by_side(world, theta, start, targets)[0]
+
+
+def fly_side_by_side(world: World, theta: Parameters, start: State, targets: np.ndarray) -> list[Flight]:
+    """The same for each parameter set of a batch; those that are through first are cut where they ended."""
     import torch
 
     from r2s2r_cli.engine import closed_loop, pack_state
@@ -62,18 +67,21 @@ def fly(world: World, theta: Parameters, start: State, targets: np.ndarray) -> F
             torch.zeros(count, dtype=torch.float64), torch.full((count,), world.timeout, dtype=torch.float64),
             step=world.step,
         )  # fmt: skip
-    u = run.u[0]
-    # The frame after the last tick is the end of the last target: nothing is commanded there any more.
-    control = np.vstack([u.numpy(), np.zeros(u.shape[1])])
-    index = np.append(run.index[0].numpy(), count - 1).clip(max=count - 1)
-    t = np.arange(len(index)) * world.pid.period
-    target = targets[index]
-    return Flight(
-        t=t, states=pack_state(structure, run.trajectory.states, leading=2)[0], commands=u, hold=world.tick_steps,
-        substeps=run.trajectory.substeps, target=target, control=control,
-        segments=segments(target_intervals(t, target, control=control), t, control),
-        timed_out=tuple(int(k) + 1 for k in torch.nonzero(run.timed_out[0])[:, 0]), start=start,
-    )  # fmt: skip
+    states = pack_state(structure, run.trajectory.states, leading=2)
+    made = []
+    for b, ticks in enumerate(run.ticks.tolist()):
+        u = run.u[b, :ticks]
+        # The frame after the last tick is the end of the last target: nothing is commanded there any more.
+        control = np.vstack([u.numpy(), np.zeros(u.shape[1])])
+        index = np.append(run.index[b, :ticks].numpy(), count - 1)
+        t, target = np.arange(len(index)) * world.pid.period, targets[index]
+        given_up = tuple(int(k) + 1 for k in torch.nonzero(run.timed_out[b])[:, 0])
+        made.append(Flight(
+            t=t, states=states[b, : ticks + 1], commands=u, hold=world.tick_steps, substeps=run.trajectory.substeps,
+            target=target, control=control, segments=segments(target_intervals(t, target, control=control), t, control),
+            timed_out=given_up, start=start,
+        ))  # fmt: skip
+    return made
 
 
 def replay(

@@ -11,7 +11,6 @@ import numpy as np
 
 from r2s2r_cli.errors import NumericalError, UsageError
 from r2s2r_cli.stages.identify.free import Free, Mapping, select
-from r2s2r_cli.stages.identify.paper.demonstration import Demonstration
 from r2s2r_cli.stages.identify.paper.flight import World
 from r2s2r_cli.stages.init.attachment import rod_frames
 from schemas.robot import Robot
@@ -74,23 +73,24 @@ def preset(
     return Preset(robot, World(simulator, pid, robot.pid.step_timeout_s, step), numbers)
 
 
-def settled_start(made: Preset, demo: Demonstration) -> State:
-    """The simulated robot at rest as it was first observed (paper, System Identification: cable lengths and end caps at
-    t = 0, then gravity). It is an observation: it has no derivative, and stays through the fit. Raises NumericalError.
+def settled_start(made: Preset, p_WE: np.ndarray, *, run: str = "the run") -> State:
+    """The simulated robot at rest at the first observed caps of a run, p_WE (cap, 3) [m].
+
+    Paper, System Identification: cable lengths and end caps at t = 0, then gravity. It is an observation: it has no
+    derivative, and stays through the fit. Raises NumericalError.
     """
     import torch
 
     from r2s2r_cli.engine import settled
 
-    p_WE, pid = demo.p_WE[0], made.world.pid
     theta = made.numbers.theta(made.first)
     found = settled(
         made.world.simulator, theta, torch.as_tensor(p_WE)[None], torch.as_tensor(rod_frames(p_WE))[None],
-        pid.cable_caps, step=made.world.step,
+        made.world.pid.cable_caps, step=made.world.step,
     )  # fmt: skip
     if not float(found.speed.max()) <= RESTLESS:
         raise NumericalError(
-            "the robot does not come to rest where the run begins", where=demo.name, expected="a pose that can be held",
+            "the robot does not come to rest where the run begins", where=run, expected="a pose that can be held",
             received=f"caps still at {1e3 * float(found.speed.max()):.0f} mm/s", hint="r2s2r validate robot.toml",
         )  # fmt: skip
     return found.state

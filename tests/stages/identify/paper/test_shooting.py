@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,9 +15,11 @@ from r2s2r_cli.stages.identify.paper import (
     Demonstration,
     Flight,
     Loss,
+    Norm,
     Preset,
     compare,
     fly,
+    fly_side_by_side,
     paired,
     preset,
     seen,
@@ -56,7 +59,7 @@ def demo() -> Demonstration:
     return synthetic(made().world.simulator, truth, p_WE.numpy(), TARGETS)
 
 
-def parts(loss: Loss, speed: float, flight: Flight, **options: bool) -> tuple[torch.Tensor, torch.Tensor]:
+def parts(loss: Loss, speed: float, flight: Flight, **options: Any) -> tuple[torch.Tensor, torch.Tensor]:
     """The motor speed and the loss of every window."""
     x = torch.tensor([speed], dtype=torch.float64, requires_grad=True)
     return x, compare(loss, made().world, made().numbers.theta(x), flight, demo(), **options).value.parts
@@ -67,7 +70,7 @@ def sizes(loss: Loss, speed: float) -> torch.Tensor:
     return parts(loss, speed, flown(speed))[1].detach()
 
 
-def slopes(loss: Loss, speed: float, flight: Flight, **options: bool) -> list[float]:
+def slopes(loss: Loss, speed: float, flight: Flight, **options: Any) -> list[float]:
     """Derivative of each window's loss by the motor speed."""
     x, found = parts(loss, speed, flight, **options)
     return [float(torch.autograd.grad(part, x, retain_graph=True)[0]) for part in found]
@@ -143,3 +146,21 @@ def test_interpolation_is_linear_and_differentiable() -> None:
     assert found[:, 0].tolist() == pytest.approx([0.5, 2.0, 6.0])
     (weights,) = torch.autograd.grad(found[0, 0], rows)
     assert weights[:, 0].tolist() == pytest.approx([0.75, 0.25, 0.0])
+
+
+def test_side_by_side_each_flies_as_if_alone() -> None:
+    """Two motor speeds in one batch: the faster is through first and cut there, both are what they are alone."""
+    both = fly_side_by_side(made().world, made().numbers.theta(np.array([[0.5], [0.8]])), start(), TARGETS)
+    for flight, alone in zip(both, (flown(0.5), flown(0.8)), strict=True):
+        assert np.array_equal(flight.control, alone.control)
+        assert torch.allclose(flight.states, alone.states, rtol=0, atol=1e-9)
+    assert len(both[0].t) > len(both[1].t)
+
+
+def test_distances_pull_like_squares() -> None:
+    """The norm changes the size of a derivative, not its sign; at the truth the distance is 0 and its slope finite."""
+    slow, fast = (slopes(Loss.KEY_FRAME, v, flown(v), norm=Norm.DISTANCE) for v in (0.4, 0.65))
+    assert (np.sign(slow).tolist(), np.sign(fast).tolist()) == ([-1, -1], [1, 1])
+    x, found = parts(Loss.KEY_FRAME, TRUTH, flown(TRUTH), norm=Norm.DISTANCE)
+    assert float(found.detach().max()) < 1e-7
+    assert np.isfinite(float(torch.autograd.grad(found.sum(), x)[0]))

@@ -129,8 +129,10 @@ PROFILES = GroupSpec(
         column("parameter", "int64", ("profile",), "index", "row of group `parameters`"),
         column("value", "float64", ("profile", "point"), "1", "grid of the parameter, rising", nan_means="fewer points than the longest profile"),
         column("cost", "float64", ("profile", "point"), "1", "cost with all others fitted, minus that of the solution", nan_means="as value"),
-        column("interval", "float64", ("profile", "pair"), "1", "where the cost rises by 1.92, the 95 % interval of the profile",
+        column("interval", "float64", ("profile", "pair"), "1", "where the cost reaches the threshold: the 95 % interval of the profile",
                nan_means="it does not rise that far within the grid"),
+        column("threshold", "float64", ("profile",), "1", "rise of the cost at the ends of the interval; 1.92 for white residuals of known noise"),
+        column("words", "str", ("profile",), "1", "how the interval differs from that of the covariance"),
     ),
 )  # fmt: skip
 

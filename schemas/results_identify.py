@@ -90,6 +90,8 @@ class ProfileFigures(Frozen):
     lower: float | None
     upper: float | None
     """95 % interval; None: the cost does not rise far enough within the grid."""
+    words: str = ""
+    """How it differs from the interval of the covariance."""
 
 
 class SegmentFigures(Frozen):

@@ -47,8 +47,8 @@ def report_tables(report: IdentifyReport) -> Iterator[PageTable]:
         )  # fmt: skip
     if report.profiles:
         yield PageTable(
-            "profile likelihood of the weakest", ["parameter", "95 % interval of the profile"],
-            [[p.parameter, f"{figure_of(p.lower)} .. {figure_of(p.upper)}"] for p in report.profiles],
+            "profile likelihood of the weakest", ["parameter", "95 % interval of the profile", "beside the covariance"],
+            [[p.parameter, f"{figure_of(p.lower)} .. {figure_of(p.upper)}", p.words] for p in report.profiles],
         )  # fmt: skip
     yield _segments(report)
     if report.starts:

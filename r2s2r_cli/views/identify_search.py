@@ -14,9 +14,9 @@ from r2s2r_cli.views.identify_data import shown_in_log, words
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-RISE_95 = 1.92
-"""Half the 95 % point of chi-square with one degree of freedom: how far a cost may rise within the interval."""
 _COLUMNS = 4
+_TWO_SIDED = 1.96
+"""Standard deviations to the ends of a 95 % interval."""
 
 
 def draw_search(data: ArtifactData) -> bytes:
@@ -95,23 +95,23 @@ def _paths(axes: Axes, trace: Group, names: list[str]) -> None:
 
 
 def _profile(axes: Axes, profiles: Group, row: int, table: Group) -> None:
-    value, cost = profiles["value"][row], profiles["cost"][row]
+    value, cost, rise = profiles["value"][row], profiles["cost"][row], float(profiles["threshold"][row])
     parameter = int(profiles["parameter"][row])
     keep = np.isfinite(value)
     axes.plot(value[keep], cost[keep], "o-", color="#0b5fa5", ms=4)
-    axes.axhline(RISE_95, color="black", lw=0.8, ls="--")
+    axes.axhline(rise, color="black", lw=0.8, ls="--")
     axes.axvline(table["value"][parameter], color="gray", lw=0.8)
     sd = float(table["sd"][parameter])
     if math.isfinite(sd) and sd > 0 and keep.any():
         grid = np.linspace(value[keep].min(), value[keep].max(), 60)
-        curve = 0.5 * ((grid - table["value"][parameter]) / sd) ** 2
+        curve = rise * ((grid - table["value"][parameter]) / (_TWO_SIDED * sd)) ** 2
         axes.plot(grid, curve, color="#b8860b", lw=1, ls=":", label="what the reported sd would give")
         axes.legend(fontsize=6, frameon=False)
     for end in profiles["interval"][row]:
         if math.isfinite(end):
             axes.axvline(end, color="#0b5fa5", lw=0.8, ls="--")
-    top = float(np.nanmax(cost[keep])) if keep.any() else RISE_95
-    axes.set_ylim(-0.05 * max(top, RISE_95), 1.1 * max(min(top, 4 * RISE_95), RISE_95))
+    top = float(np.nanmax(cost[keep])) if keep.any() else rise
+    axes.set_ylim(-0.05 * max(top, rise), 1.1 * max(min(top, 4 * rise), rise))
     unit = words(table, "unit")[parameter]
     axes.set_xlabel(f"{words(table, 'name')[parameter]}{'' if unit == '1' else f' [{unit}]'}", fontsize=8)
     axes.set_ylabel("rise of the loss", fontsize=8)

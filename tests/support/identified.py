@@ -88,7 +88,8 @@ def _profiles() -> Group:
     grid = np.array([[1.0, 2.0, 4.0, 8.0, 16.0], [0.5, 0.62, 0.74, _NAN, _NAN]])
     cost = np.array([[1.0, 0.4, 0.0, 0.4, 1.0], [2.9, 0.0, 2.9, _NAN, _NAN]])
     interval = np.array([[_NAN, _NAN], [0.52, 0.72]])
-    return Group({"parameter": np.array([2, 1]), "value": grid, "cost": cost, "interval": interval})
+    return Group({"parameter": np.array([2, 1]), "value": grid, "cost": cost, "interval": interval,
+                  "threshold": np.full(2, 1.92), "words": text("no end", "as wide")})  # fmt: skip
 
 
 def _measures() -> Group:

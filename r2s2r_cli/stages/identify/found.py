@@ -72,12 +72,17 @@ class StartFound:
 
 @dataclass(frozen=True)
 class ProfileFound:
-    """Profile likelihood of parameter `row`: grid (k,) in its unit, rise of the cost (k,), 95 % interval or NaN."""
+    """Profile likelihood of parameter `row`: grid (k,) in its unit, rise of the cost (k,), 95 % interval or NaN.
+
+    threshold: rise at the ends of the interval. words: how it differs from the interval of the covariance.
+    """
 
     row: int
     value: np.ndarray
     cost: np.ndarray
     interval: tuple[float, float]
+    threshold: float = 1.92
+    words: str = ""
 
 
 @dataclass(frozen=True)
@@ -177,4 +182,5 @@ class Found:
         if self.covariance is None:
             return None
         sd = np.sqrt(np.diagonal(self.covariance))
+        sd = np.where((sd > 0) & np.isfinite(sd), sd, np.nan)
         return np.asarray(self.covariance / np.outer(sd, sd))

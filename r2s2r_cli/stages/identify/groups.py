@@ -66,6 +66,7 @@ def _parameters(parameters: Sequence[ParameterFound]) -> Group:
     frees = [one.free for one in parameters]
     bounds = np.array([[free.lower, free.upper] for free in frees]).reshape(-1, 2)
     intervals = _floats([one.interval for one in parameters]).reshape(-1, 3)
+    intervals = np.where(np.isfinite(intervals), intervals, _NAN)
     flat = np.array([not math.isfinite(free.prior_sd) for free in frees], dtype=bool)
     return Group(
         {
@@ -91,7 +92,8 @@ def _covariance(found: Found) -> Group | None:
     correlation = found.correlation
     if found.covariance is None or correlation is None:
         return None
-    return Group({"covariance": found.covariance, "correlation": np.clip(correlation, -1.0, 1.0)})
+    known = np.where(np.isfinite(found.covariance), found.covariance, _NAN)
+    return Group({"covariance": known, "correlation": np.clip(correlation, -1.0, 1.0)})
 
 
 def _identifiability(found: Found) -> Group | None:
@@ -154,6 +156,8 @@ def _profiles(found: Found) -> Group | None:
             "value": np.array([padded(one.value) for one in found.profiles]),
             "cost": np.array([padded(one.cost) for one in found.profiles]),
             "interval": _floats([one.interval for one in found.profiles]).reshape(-1, 2),
+            "threshold": _floats([one.threshold for one in found.profiles]),
+            "words": texts([one.words for one in found.profiles]),
         }
     )
 

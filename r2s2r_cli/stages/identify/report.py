@@ -47,7 +47,10 @@ def report_of(found: Found) -> IdentifyReport:
         correlations=tuple(_correlations(found)),
         profiles=tuple(
             ProfileFigures(
-                parameter=found.names[one.row], lower=_finite(one.interval[0]), upper=_finite(one.interval[1])
+                parameter=found.names[one.row],
+                lower=_finite(one.interval[0]),
+                upper=_finite(one.interval[1]),
+                words=one.words,
             )
             for one in found.profiles
         ),

@@ -90,9 +90,10 @@ def covariance(
     its prior. Of the data: with `MANY` clusters and twice as many as parameters, their outer products; with fewer, the
     model's, times one inflation, the greater of chi^2 / dof and the pooled one of the clusters.
 
-    block: as in Evaluation, needed with a robust loss. cluster: (m,) int, windows: residuals in different ones are
-    independent. least: inflation is not below (noise may be over-estimated). Intervals are quantiles of Student's t in
-    z, mapped to units and cut at the bounds: not symmetric for log and logit.
+    block: as in Evaluation, needed with a robust loss. cluster: (m,) int, windows, or segments where windows are few:
+    residuals in different ones are independent, but for a start that they share. least: inflation is not below (noise
+    may be over-estimated). Intervals are quantiles of Student's t in z, mapped to units and cut at the bounds: not
+    symmetric for log and logit.
     """
     p = len(problem.names)
     parts = parts_of(problem, solution, loss, block)

@@ -54,7 +54,8 @@ class Identifiability:
     per width, nuisances marginalised. eigenvalue: (p,), rising; eigenvector: (p, p), rows; weak: (p,) bool; words.
     sd_z: (p,), from the data, with the other parameters within their widths; sd: the same in units; sd_flat_z: (p,),
     with nothing known of the others. trust, reason: (p,). no_effect: parameters that change nothing. stalled: those
-    without a derivative here, which act further away.
+    without a derivative here, which act further away; rough: those whose derivative is that of a kink: where there are
+    any, the cost is rough, and so is every covariance.
     """
 
     names: tuple[str, ...]
@@ -74,6 +75,7 @@ class Identifiability:
     reason: tuple[str, ...]
     no_effect: tuple[str, ...]
     stalled: tuple[str, ...]
+    rough: tuple[str, ...]
 
     @property
     def condition(self) -> float:
@@ -131,6 +133,7 @@ def identifiability(
             secant_norm[i] = float(np.linalg.norm(column)) * width[i]
             if column_norm[i] < NOTHING <= secant_norm[i] or column_norm[i] > KINK * secant_norm[i]:
                 jacobian[:, i] = column
+    rough = column_norm > KINK * np.maximum(secant_norm, NOTHING)
     dead = (column_norm < NOTHING) & ~(secant_norm >= NOTHING)
     stalled = (column_norm < NOTHING) & (secant_norm >= NOTHING)
     if refuse:
@@ -144,11 +147,12 @@ def identifiability(
     words = tuple(_words(frees, z0[:p], width, rows[k], eigenvalue[k]) for k in range(p))
     weak = eigenvalue < THRESHOLD
     trust = tuple(_trust(sd) for sd in sd_z)
-    reason = tuple(_reason(i, frees, z0, width, sd_z, dead, stalled) for i in range(p))
+    reason = tuple(_reason(i, frees, z0, width, sd_z, dead, stalled | rough) for i in range(p))
     return Identifiability(
         problem.names, z0[:p], width, column_norm, secant_norm, scaled, eigenvalue, rows, weak, words,
         sd_z * width, sd_z * width * slopes_of(tuple(frees), z0[:p]), sd_flat(eigenvalue, rows) * width, trust, reason,
         _names(problem.names, dead), _names(problem.names, stalled),
+        _names(problem.names, rough),
     )  # fmt: skip
 
 
@@ -197,7 +201,7 @@ def _reason(
     width: np.ndarray,
     sd: np.ndarray,
     dead: np.ndarray,
-    stalled: np.ndarray,
+    finite: np.ndarray,
 ) -> str:  # fmt: skip
     if dead[i]:
         return "no compared frame depends on it"
@@ -207,4 +211,4 @@ def _reason(
     found = (
         f"the data give it to {amount(frees[i], float(z[i]), float(sd[i] * width[i]))}, prior and bounds to {possible}"
     )
-    return found + (" (by a finite change: the derivative here is 0)" if stalled[i] else "")
+    return found + (" (by a finite change: the derivative here is that of a kink)" if finite[i] else "")

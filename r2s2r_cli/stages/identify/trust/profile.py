@@ -54,7 +54,7 @@ def profile(
     loss: Loss = LOSSES["none"],
     points: int = 9,
     reach: float = 3.0,
-    max_iterations: int = 6,
+    max_iterations: int = 4,
 ) -> Profile:
     """Of parameter `index`, on `points` values out to `reach` standard deviations or to its bounds.
 

@@ -83,7 +83,7 @@ def redraw(
     max_iterations: int = 12,
     progress: Callable[[float], None] | None = None,
 ) -> Redrawn:
-    """Fits of observations made from the solution, each started at the solution.
+    """Fits of observations made from the solution, each started at the solution: on a rough cost they stay near it.
 
     cluster: (m,) int, windows; residuals and start offsets of each are multiplied by a random factor of mean square 1
     (wild cluster bootstrap), raised by what the fit took out of them. None: start offsets from their priors, noise

@@ -23,10 +23,11 @@ LEAST = 5
 
 @dataclass(frozen=True)
 class Whiteness:
-    """Of series, sorted by number. series: (s,); frames: (s,). lag1: correlation of neighbours, means taken out, with
-    its bias of -1 / frames put back; lag1_sd: of white noise. p: that white noise is as correlated over `LAGS` lags.
+    """Of series, sorted by number. series: (s,); frames: (s,). lag1: correlation of neighbours, means taken out, minus
+    that of shuffled frames; lag1_sd: of these. p: that white noise is as correlated over `LAGS` lags.
     offset: mean, (s, axis); p_offset: that noise without offset has as large a mean. white, centred: not refused at 5 %
-    over all series (Holm 1979). Series that are too short have nan, and count as white and centred.
+    over all series (Holm 1979). Series that are too short have nan, and count as white and centred. p_all: that lag1 of
+    white noise is as positive in all series together (Stouffer 1949): short ones show little each; nan without any.
     """
 
     series: np.ndarray
@@ -38,6 +39,7 @@ class Whiteness:
     p_offset: np.ndarray
     white: np.ndarray
     centred: np.ndarray
+    p_all: float
 
 
 def whiteness(
@@ -49,7 +51,7 @@ def whiteness(
     whose distance is that many median gaps, within half of one. Its chance is found by shuffling the frames of the
     series, since they are few and irregular, with a gamma distribution of the same mean and variance beyond the last.
     """
-    from scipy.special import betainc
+    from scipy.special import betainc, ndtr
 
     residual = residual[:, None] if residual.ndim == 1 else residual
     names = np.unique(series)
@@ -73,16 +75,19 @@ def whiteness(
         if not np.all(power > 0) or not len(near[0]):
             continue
         e = e / np.sqrt(power)
-        lag1[k] = np.mean(np.sum(e[near[0][:, 0]] * e[near[0][:, 1]], axis=0)) * n / len(near[0]) + 1.0 / n
-        lag1_sd[k] = 1.0 / np.sqrt(len(near[0]) * axes)
-        p[k] = _chance(e, near, rng)
+        shuffled = e[rng.permuted(np.tile(np.arange(n), (DRAWS[0], 1)), axis=1)]
+        first = np.mean(_products(np.concatenate([e[None], shuffled]), near[0]), axis=1) * n / len(near[0])
+        lag1[k], lag1_sd[k] = first[0] - first[1:].mean(), first[1:].std()
+        p[k] = _chance(e, shuffled, near, rng)
         # Hotelling's one-sample test: the axes' noise may differ and be correlated.
         if n > axes + 1:
             scatter = np.linalg.pinv((residual[rows] - offset[k]).T @ (residual[rows] - offset[k]) / (n - 1))
             f = float(n * offset[k] @ scatter @ offset[k]) * (n - axes) / (axes * (n - 1))
             p_offset[k] = float(betainc((n - axes) / 2, axes / 2, (n - axes) / (n - axes + axes * f)))
+    known = lag1_sd > 0
+    p_all = float(ndtr(-np.sum(lag1[known] / lag1_sd[known]) / np.sqrt(known.sum()))) if known.any() else np.nan
     return Whiteness(
-        names, frames, lag1, lag1_sd, p, offset, p_offset, ~holm(p, level), ~holm(p_offset, level)
+        names, frames, lag1, lag1_sd, p, offset, p_offset, ~holm(p, level), ~holm(p_offset, level), p_all
     )  # fmt: skip
 
 
@@ -110,19 +115,16 @@ def _pairs(t: np.ndarray, lags: int) -> list[np.ndarray]:
     return found
 
 
-def _chance(e: np.ndarray, near: list[np.ndarray], rng: np.random.Generator) -> float:
-    """Of a statistic as large from shuffled frames. e: (n, axis), centred, squares sum to 1."""
+def _chance(e: np.ndarray, shuffled: np.ndarray, near: list[np.ndarray], rng: np.random.Generator) -> float:
+    """Of a statistic as large from shuffled frames. e: (n, axis), squares sum to 1; shuffled: (draw, n, axis)."""
     from scipy.special import gammaincc
 
-    n = len(e)
-    drawn = np.empty(0)
-    found = _correlated(e[None], near)[0]
-    for draws in DRAWS:
-        order = rng.permuted(np.tile(np.arange(n), (draws, 1)), axis=1)
-        drawn = np.concatenate([drawn, _correlated(e[order], near)])
+    found, drawn = _correlated(e[None], near)[0], _correlated(shuffled, near)
+    above = int(np.sum(drawn >= found))
+    if above < COUNTED:
+        more = rng.permuted(np.tile(np.arange(len(e)), (DRAWS[1], 1)), axis=1)
+        drawn = np.concatenate([drawn, _correlated(e[more], near)])
         above = int(np.sum(drawn >= found))
-        if above >= COUNTED:
-            break
     if above or np.ptp(drawn) == 0:
         return (above + 1) / (len(drawn) + 1)
     mean, variance = float(drawn.mean()), float(drawn.var())
@@ -134,6 +136,11 @@ def _correlated(e: np.ndarray, near: list[np.ndarray]) -> np.ndarray:
     q: np.ndarray = np.zeros(len(e))
     for pairs in near:
         if len(pairs):
-            r = np.sum(e[:, pairs[:, 0]] * e[:, pairs[:, 1]], axis=1)
-            q += np.sum(r**2, axis=1) / len(pairs)
+            q += np.sum(_products(e, pairs) ** 2, axis=1) / len(pairs)
     return q
+
+
+def _products(e: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Sums of products over pairs of frames, (draw, axis)."""
+    found: np.ndarray = np.sum(e[:, pairs[:, 0]] * e[:, pairs[:, 1]], axis=1)
+    return found

@@ -101,6 +101,7 @@ def test_derivative_of_a_kink_is_not_believed():
     )
     found = identifiability(problem, np.zeros(1), linear_frees(("a",)))
     assert found.trust == (Trust.NOT_IDENTIFIABLE,)
+    assert found.rough == ("a",)
     assert identifiability(problem, np.zeros(1), linear_frees(("a",)), secant=None).trust == (Trust.IDENTIFIED,)
 
 

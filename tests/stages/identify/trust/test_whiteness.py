@@ -24,12 +24,16 @@ def test_white_noise_passes_at_the_nominal_rate():
     assert np.mean([one.white.all() for one in found]) > 0.85
     assert np.mean([one.centred.all() for one in found]) > 0.85
     lag1 = np.concatenate([one.lag1 for one in found])
+    assert 0.0 < np.mean([one.p_all < 0.25 for one in found]) < 0.5
     assert abs(lag1.mean()) < 0.02
     assert lag1.std() == pytest.approx(found[0].lag1_sd[0], rel=0.2)
 
 
 def test_correlated_noise_is_refused():
-    """AR(1) with 0.5 is seen in nearly all series of 60 frames, and measured."""
+    """AR(1) with 0.5 is seen in nearly all series of 60 frames, and measured; 12 frames show it together."""
+    short = whiteness(*_series(0, 12, 12, 0.5))
+    assert short.white.sum() > 6
+    assert short.p_all < 1e-3
     found = whiteness(*_series(0, 12, 60, 0.5))
     assert found.white.sum() <= 1
     assert found.lag1.mean() == pytest.approx(0.5, abs=0.08)
@@ -60,6 +64,7 @@ def test_short_and_constant_series_say_nothing():
     found = whiteness(np.zeros(14), np.repeat([3, 7], [4, 10]), np.arange(14.0))
     assert list(found.series) == [3, 7]
     assert np.isnan(found.lag1).all()
+    assert np.isnan(found.p_all)
     assert found.white.all()
 
 

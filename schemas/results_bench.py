@@ -54,3 +54,73 @@ class EngineBenchResult(Frozen):
     """The same with the machine code cached on disk [s]."""
     peak_memory_bytes: dict[str, int]
     """Of a process that does all of the above with one simulator: `ours`, `mujoco`."""
+
+
+class Share(Frozen):
+    """`count` of `total`, and the 95 % interval (Wilson) of the probability behind it."""
+
+    count: int
+    total: int
+    low: float
+    high: float
+
+
+class IdentifiedCase(Frozen):
+    """What one tool found in one case; lists in the order of `parameters`."""
+
+    seed: int
+    truth: tuple[float, ...]
+    start: tuple[float, ...]
+    estimate: tuple[float, ...]
+    low: tuple[float | None, ...]
+    """Ends of the 95 % intervals; null: the tool gave none."""
+    high: tuple[float | None, ...]
+    cpu_s: float
+    """Processor time of the fit and its intervals, all threads [s]."""
+    rollouts: float
+    """Simulations of the whole gait, or as much of several shorter ones."""
+    rms_mm: float
+    """What the fit leaves of an observed coordinate; the noise is `noise_mm`."""
+    solved: bool
+    """Every parameter within the larger of 2 % and 3 reported standard deviations of its planted value."""
+    failed: str | None = None
+    """Why there is no estimate."""
+
+
+class IdentifiedBy(Frozen):
+    """One tool with one set of options, over all cases."""
+
+    what: str
+    cases: tuple[IdentifiedCase, ...]
+    solved: Share
+    covered: Share
+    """Planted values inside their intervals, of all values; one without an interval is not covered."""
+    without_interval: int
+    """Values whose interval is infinite or not a number."""
+    cpu_median_s: float
+    error_median: float
+    """Of the relative errors of all values."""
+    cpu_ratio: float
+    """Its processor time in all cases over ours."""
+
+
+class IdentifyBenchResult(Frozen):
+    """What `bench identify` prints."""
+
+    schema_: Literal["r2s2r.bench.identify/1"] = Field(default="r2s2r.bench.identify/1", alias="schema")
+    machine: str
+    versions: dict[str, str]
+    robot: str
+    run_s: float
+    step_s: dict[str, float]
+    """Of the simulations: `ours`, `mujoco`."""
+    noise_mm: float
+    frames_per_s: float
+    hard: bool
+    """Attachment phases and initial velocities are unknown as well."""
+    parameters: tuple[str, ...]
+    units: tuple[str, ...]
+    tools: dict[str, IdentifiedBy]
+    """`ours`, `mujoco.sysid` with its defaults, `mujoco.sysid jac` with x_scale='jac', `mujoco.sysid growing`."""
+    compile_s: float
+    """Processor time of our first simulations with and without derivatives, compilation included, before any fit [s]."""

@@ -105,7 +105,7 @@ def _measured(plan: Plan, turns: int, quick: bool, console: Console) -> EngineBe
         )  # fmt: skip
     options = mujoco.options
     return EngineBenchResult(
-        machine=_machine(), versions={name: version(name) for name in ("mujoco", "torch", "llvmlite", "numpy")},
+        machine=machine(), versions={name: version(name) for name in ("mujoco", "torch", "llvmlite", "numpy")},
         robot=plan.robot, quick=quick, repeats=turns, step_s=plan.step_s, substeps=ours.substeps,
         mujoco_options=f"{options.integrator}, {options.cone} cone, rod contact, mujoco.rollout with one thread",
         forward_1=forward[0], forward_64=forward[1], forward_1024=forward[2], gradient_10=gradient,
@@ -164,7 +164,8 @@ def _probed(side: str, plan: Plan) -> dict[str, Any]:
     return found
 
 
-def _machine() -> str:
+def machine() -> str:
+    """Processor, cores and Python, in words."""
     name = platform.processor() or platform.machine()
     try:
         with open("/proc/cpuinfo") as file:  # noqa: PTH123  not a file of ours

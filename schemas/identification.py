@@ -14,7 +14,7 @@ COORDINATES = {0: "linear: z = x", 1: "log: z = ln x", 2: "logit: z = ln((x - lo
 TRUST = {
     0: "identified: the runs say it",
     1: "weak: the runs say little more than the prior",
-    2: "not identifiable: the runs do not say it, it stays at its start",
+    2: "not identifiable: the runs do not say it, its value means nothing",
     3: "on a bound: the runs ask for more than the bound allows",
     4: "fixed: it was not free",
 }
@@ -53,7 +53,7 @@ PARAMETERS = GroupSpec(
         column("name", "str", ("parameter",), "1", "name, as options and --json call it"),
         column("unit", "str", ("parameter",), "1", "unit of its numbers, SI; `1` where there is none"),
         column("what", "str", ("parameter",), "1", "what it is, in words"),
-        column("value", "float64", ("parameter",), "1", "identified value; where it is not identifiable, its start"),
+        column("value", "float64", ("parameter",), "1", "value with which the errors were found; where it is not identifiable nothing speaks for it, and it is the start where the runs do not depend on it at all"),
         column("sd", "float64", ("parameter",), "1", "standard deviation", nan_means=_NO_SD),
         column("lower", "float64", ("parameter",), "1", "lower end of the 95 % interval", nan_means=_NO_SD),
         column("upper", "float64", ("parameter",), "1", "upper end of the 95 % interval", nan_means=_NO_SD),

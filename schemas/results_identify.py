@@ -17,7 +17,7 @@ class ParameterFigures(Frozen):
     """One parameter. None: the runs do not say it."""
 
     value: float
-    """Where it is not identifiable: its start."""
+    """With which the errors were found. Where it is not identifiable nothing speaks for it."""
     sd: float | None
     lower: float | None
     upper: float | None

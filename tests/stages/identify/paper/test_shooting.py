@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -37,7 +38,9 @@ TARGETS = np.array([[0.2, 1.0, 0.4, 0.5, 1.0, 0.6], [1.0, 0.5, 1.0, 1.0, 0.3, 1.
 @lru_cache
 def made() -> Preset:
     """The paper's synthetic task: only the motor speed is free; whole derivatives, so that quotients can check them."""
-    return preset(subject().robot, select(["motor_speed"], subject().robot), detach=Detach.NONE)
+    own = preset(subject().robot, select(["motor_speed"], subject().robot), detach=Detach.NONE)
+    assert own.numbers.structure == subject().structure
+    return replace(own, world=replace(own.world, simulator=subject().simulator))  # compiled once a session
 
 
 def start() -> State:

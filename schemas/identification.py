@@ -86,7 +86,7 @@ IDENTIFIABILITY = GroupSpec(
     "or range",
     datasets=(
         column("column_norm", "float64", ("parameter",), "1", "size of the change of all scaled residuals for one width of the parameter; "
-               "0: the runs do not depend on it"),
+               "0: the runs do not depend on it, or it was fixed"),
         column("eigenvalue", "float64", ("direction",), "1", "information about each direction; below the threshold the prior or range says more, rising"),
         column("eigenvector", "float64", ("direction", "parameter"), "1", "the directions, in scaled coordinates, rows of length 1"),
         column("weak", "bool", ("direction",), "bool", "the eigenvalue lies below the threshold"),

@@ -130,7 +130,7 @@ class Update:
 
 @dataclass(frozen=True)
 class Found:
-    """The whole. n parameters, free ones first, in the order of covariance and of all (n,) arrays.
+    """The whole. n parameters, free ones first, then those fixed by hand; (n,) arrays may be of the free ones alone.
 
     covariance: of the coordinates z, (n, n), NaN rows where not identifiable; None where the method gives none.
     information: before the fit. train,

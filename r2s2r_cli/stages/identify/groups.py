@@ -102,11 +102,12 @@ def _identifiability(found: Found) -> Group | None:
         return None
     positive = info.eigenvalue[info.eigenvalue > 0]
     condition = float(positive.max() / positive.min()) if len(positive) else 0.0
+    fixed = len(found.parameters) - len(info.names)
     return Group(
         {
-            "column_norm": info.column_norm,
+            "column_norm": np.pad(info.column_norm, (0, fixed)),
             "eigenvalue": info.eigenvalue,
-            "eigenvector": info.eigenvector,
+            "eigenvector": np.pad(info.eigenvector, ((0, 0), (0, fixed))),
             "weak": info.weak,
             "words": texts(info.words),
         },
@@ -124,7 +125,7 @@ def _trace(found: Found) -> Group | None:
         "iteration": np.array([step.iteration for step in steps], np.int64),
         "cost": _floats([step.cost for step in steps]),
     }
-    values = [step.value for step in steps if step.value is not None]
+    values = [_with_fixed(found, step.value) for step in steps if step.value is not None]
     return Group({**table, "value": np.array(values)} if len(values) == len(steps) else table)
 
 
@@ -134,8 +135,8 @@ def _starts(found: Found) -> Group | None:
     return Group(
         {
             "kind": np.array([one.redrawn for one in found.starts], np.uint8),
-            "first": np.array([one.first for one in found.starts]),
-            "last": np.array([one.last for one in found.starts]),
+            "first": np.array([_with_fixed(found, one.first) for one in found.starts]),
+            "last": np.array([_with_fixed(found, one.last) for one in found.starts]),
             "cost": _floats([one.cost for one in found.starts]),
             "reason": texts([one.reason for one in found.starts]),
         }
@@ -254,8 +255,10 @@ def _history(found: Found) -> Group | None:
     return Group(
         {
             "run": texts([one.run for one in found.updates]),
-            "value": np.array([one.value for one in found.updates]),
-            "sd": np.array([one.sd for one in found.updates]),
+            "value": np.array([_with_fixed(found, one.value) for one in found.updates]),
+            "sd": np.array(
+                [np.pad(one.sd, (0, len(found.names) - len(one.sd)), constant_values=_NAN) for one in found.updates]
+            ),
         }
     )
 
@@ -291,6 +294,11 @@ def _free_run(chains: Sequence[FreeRunFound]) -> Group:
     }
     loops = [one.closed_loop for one in chains if one.closed_loop is not None]
     return Group({**table, "closed_loop": np.concatenate(loops)} if len(loops) == len(chains) else table)
+
+
+def _with_fixed(found: Found, values: np.ndarray) -> np.ndarray:
+    """Values of the free parameters (k,), and behind them those of the fixed ones, (n,)."""
+    return np.array([*values.tolist(), *(one.value for one in found.parameters[len(values) :])])
 
 
 def _floats(values: Sequence[object]) -> np.ndarray:

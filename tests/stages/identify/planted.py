@@ -64,7 +64,7 @@ def found(**changes: Any) -> Found:
         eigenvector=np.array([[0.0, 1.0], [1.0, 0.0]]), weak=np.array([True, False]),
         words=("restitution alone", "motor_speed alone"), sd_z=np.array([0.02, np.inf]), sd=np.array([0.02, np.inf]),
         sd_flat_z=np.array([0.02, np.inf]), trust=(Trust.IDENTIFIED, Trust.NOT_IDENTIFIABLE), reason=("", "no effect"),
-        no_effect=("restitution",), stalled=(),
+        no_effect=("restitution",), stalled=(), rough=(),
     )  # fmt: skip
     values: dict[str, Any] = {
         "request": Request((Selection("line", (1, 2)),), (Selection("line", (3, 4)),), effects=("motor_lag",)),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from r2s2r_cli.artifact import Group
 from r2s2r_cli.checks import CHECKS
 from r2s2r_cli.checks.base import run_checks
 from r2s2r_cli.checks.subjects import Content
+from r2s2r_cli.stages.identify.found import ParameterFound
 from r2s2r_cli.stages.identify.groups import identification, texts
 from r2s2r_cli.stages.identify.report import report_of
 from r2s2r_cli.store.read import read_artifact
@@ -108,6 +111,24 @@ def test_free_runs_of_one_run_are_put_together() -> None:
     assert free["chain"].tolist() == [0] * 5 + [1] * 5
     assert np.all(np.diff(free["t"]) >= 0)
     assert isinstance(free, Group) and "closed_loop" in free
+
+
+def test_what_was_fixed_by_hand_stands_behind_what_was_free(tmp_path: Path) -> None:
+    """A third parameter, fixed: every table has its column, with its value or nothing, and the layout holds."""
+    fixed = ParameterFound(replace(BOUNCE, name="friction"), 0.6, *[math.nan] * 3, (math.nan,) * 2, None, "by hand")
+    plain = found()
+    wide = np.full((3, 3), np.nan)
+    wide[:2, :2] = plain.covariance
+    data = identification(replace(plain, parameters=(*plain.parameters, fixed), covariance=wide))
+    write_artifact(tmp_path / "30-identify.h5", data, provenance())
+    assert run_checks(CHECKS, Content(data), "a.h5") == []
+    assert data.groups["starts"]["last"][:, 2].tolist() == [0.6, 0.6]
+    assert data.groups["parameters"]["trust"].tolist() == [0, 2, 4]
+    assert data.groups["identifiability"]["eigenvector"][:, 2].tolist() == [0, 0]
+    assert (
+        report_of(replace(plain, parameters=(*plain.parameters, fixed), covariance=wide)).parameters["friction"].trust
+        == "fixed"
+    )
 
 
 def test_words_are_stored_as_text() -> None:

@@ -21,9 +21,6 @@ OFF = (0.15, 0.5)
 BOUNDS = (0.2, 4.0)
 """Of every fit, as shares of the values of robot.toml."""
 
-HORIZONS = (1, 2, 4, 7, 10)
-"""Seconds that a fit begins with, and takes in then; those beyond the run are left out, its length is the last."""
-
 
 @dataclass(frozen=True)
 class Number:

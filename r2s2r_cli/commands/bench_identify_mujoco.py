@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from r2s2r_cli.commands import bench_gait
-from r2s2r_cli.commands.bench_identify_case import FRAME_S, HORIZONS, NUMBERS, Case, Fit
+from r2s2r_cli.commands.bench_identify_case import FRAME_S, NUMBERS, Case, Fit
 from r2s2r_cli.commands.bench_sides import SETTLE_S
 from schemas.robot import Robot
 
+HORIZONS = (1, 2, 4, 7, 10)
+"""Seconds of a growing fit; those beyond the run are left out, its length is the last."""
 Edit = Callable[[Any, float, Robot], None]
 """Writes a value into an MjSpec; the robot as in robot.toml is at hand."""
 WINCH, PASSIVE = "winch", "passive"

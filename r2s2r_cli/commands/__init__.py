@@ -14,6 +14,7 @@ from r2s2r_cli.commands.calibrate import calibrate
 from r2s2r_cli.commands.doctor import doctor
 from r2s2r_cli.commands.estimate import estimate
 from r2s2r_cli.commands.export import export
+from r2s2r_cli.commands.identify import identify
 from r2s2r_cli.commands.import_ import import_
 from r2s2r_cli.commands.init import init
 from r2s2r_cli.commands.inspect import inspect
@@ -28,6 +29,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "calibrate": calibrate,
     "import": import_,
     "estimate": estimate,
+    "identify": identify,
     "simulate": simulate,
     "status": status,
     "inspect": inspect,

@@ -47,10 +47,10 @@ def plant(asked: Asked, settings: IdentifySettings, console: Console) -> None:
 
     runs = asked.runs()
     request = asked.request(runs, settings.train_share)
-    (stage,) = whole_items(_loaded())
+    (stage,) = whole_items(_loaded_self_test())
     clock = Clock()
     with _shown(console, clock) as progress:
-        report: SelfTestReport = stage.self_test(
+        report: SelfTestReport = stage.self_tested(
             asked.project.robot(), runs, request, settings, cache_dir=asked.project.cache, progress=progress
         )
     inputs = tuple(ref.path for ref in asked.refs())
@@ -106,5 +106,12 @@ def _loaded() -> Iterator[Any]:
     """The stage, with its libraries: compiled modules do not take an exception out of the blue while they load."""
     import r2s2r_cli.engine  # noqa: F401 - torch, roma, llvmlite
     import r2s2r_cli.stages.identify as stage
+
+    yield stage
+
+
+def _loaded_self_test() -> Iterator[Any]:
+    import r2s2r_cli.engine  # noqa: F401
+    import r2s2r_cli.stages.identify.self_tested as stage
 
     yield stage

@@ -16,7 +16,18 @@ I := iterations/$(shell printf '%03d' "$$(expr '$(ITER)' + 0)" 2>/dev/null || pr
 # The artifacts of one iteration, in order. A new stage is one name here and one rule below.
 RECORD   := $(I)/10-record.h5
 ESTIMATE := $(I)/20-estimate.h5
-ARTIFACTS := $(RECORD) $(ESTIMATE)
+IDENTIFY := $(I)/30-identify.h5
+ARTIFACTS := $(RECORD) $(ESTIMATE) $(IDENTIFY)
+
+# The iteration before: one without runs of its own learns from those.
+LAST := iterations/$(shell printf '%03d' "$$(expr '$(ITER)' - 1)" 2>/dev/null || printf 'none')
+FROM := $(ESTIMATE)
+ifeq ($(strip $(SOURCE))$(wildcard $(RECORD)),)
+ifneq ($(wildcard $(LAST)/20-estimate.h5),)
+FROM := $(LAST)/20-estimate.h5
+ARTIFACTS := $(IDENTIFY)
+endif
+endif
 
 # What every stage depends on, besides its input. config.toml: settings of this iteration only, where there is one.
 SETTINGS := project.toml robot.toml $(wildcard $(I)/config.toml)
@@ -43,6 +54,9 @@ endif
 
 $(ESTIMATE): $(RECORD) $(SETTINGS)
 	"$(R2S2R)" estimate --iteration $(ITER)
+
+$(IDENTIFY): $(FROM) $(SETTINGS)
+	"$(R2S2R)" identify --iteration $(ITER)
 
 status:
 	@"$(R2S2R)" status

@@ -13,12 +13,13 @@ from tests.guards.listing import ROOT
 
 TEMPLATE = ROOT / "r2s2r_cli" / "templates" / "project.mk"
 RECORD, ESTIMATE = "iterations/001/10-record.h5", "iterations/001/20-estimate.h5"
+IDENTIFY = "iterations/001/30-identify.h5"
 
 # Stands in for r2s2r: writes the artifact of the stage that make asks for, logs the call, fails where told to.
 STAND_IN = """#!/bin/sh
 echo "$@" >> calls.txt
-case "$1" in import) f=10-record.h5 ;; estimate) f=20-estimate.h5 ;; *) exit 0 ;; esac
-mkdir -p iterations/001 && echo "$1" > iterations/001/$f
+case "$1" in import) f=10-record.h5 ;; estimate) f=20-estimate.h5 ;; identify) f=30-identify.h5 ;; *) exit 0 ;; esac
+mkdir -p iterations/$3 && echo "$1" > iterations/$3/$f
 [ "$1" != "$FAIL_IN" ]
 """
 
@@ -54,20 +55,30 @@ def calls(project: Path) -> list[str]:
 
 
 def test_stages_run_in_order_and_then_rest(project: Path) -> None:
-    """`make iterate` imports, then estimates; a second call has nothing to do."""
+    """`make iterate` imports, estimates, then identifies; a second call has nothing to do."""
     assert make(project, "iterate", "SOURCE=a.csv").returncode == 0
-    assert calls(project) == ["import --iteration 001 a.csv", "estimate --iteration 001"]
+    assert calls(project) == ["import --iteration 001 a.csv", "estimate --iteration 001", "identify --iteration 001"]
     assert make(project, "-q", "iterate", "SOURCE=a.csv").returncode == 0
 
 
 def test_a_changed_robot_runs_what_depends_on_it(project: Path) -> None:
     """After an edit of robot.toml the estimate is asked for again; without SOURCE nothing is imported again."""
     make(project, "iterate", "SOURCE=a.csv")
-    for path, seconds in ((RECORD, 1000), (ESTIMATE, 2000), ("robot.toml", 3000)):
+    for path, seconds in ((RECORD, 1000), (ESTIMATE, 2000), (IDENTIFY, 2000), ("robot.toml", 3000)):
         os.utime(project / path, (seconds, seconds))
     os.utime(project / "project.toml", (0, 0))
     assert make(project, "iterate").returncode == 0
-    assert calls(project)[2:] == ["estimate --iteration 001"]
+    assert calls(project)[3:] == ["estimate --iteration 001", "identify --iteration 001"]
+
+
+def test_an_iteration_without_runs_learns_from_the_one_before(project: Path) -> None:
+    """Without a log of its own iteration 2 only identifies, and again when the estimate before it is a new one."""
+    make(project, "iterate", "SOURCE=a.csv")
+    assert make(project, "iterate", "ITER=002").returncode == 0
+    assert calls(project)[3:] == ["identify --iteration 002"]
+    assert make(project, "-q", "iterate", "ITER=002").returncode == 0
+    os.utime(project / ESTIMATE, (4e9, 4e9))
+    assert make(project, "-q", "iterate", "ITER=002").returncode == 1
 
 
 def test_nothing_to_import_is_said_in_words(project: Path) -> None:

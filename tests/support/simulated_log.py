@@ -29,6 +29,7 @@ def write_log(data: ArtifactData, run: str, path: Path, *, noise: float = 0.001,
     names = ["t_s", *(f"cap{c}_{axis}_m" for c in range(p_WE.shape[1]) for axis in "xyz")]
     names += [f"{name}{k}" for name in ("target", "control") for k in range(target.shape[1])]
     table = np.column_stack([frames["t"][rows], p_WE.reshape(len(t), -1), target, control])
+    path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(names)

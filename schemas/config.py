@@ -56,16 +56,14 @@ class IdentifySettings(Frozen):
     """Free parameters, as after --free; empty: the default set of the method."""
     train_share: Annotated[float, Field(strict=True, gt=0, le=1)] = 0.65
     """Share of the target intervals of each run, from its beginning, that is trained on where --train is not given."""
+    window: Annotated[int, Field(strict=True, ge=1, le=100)] = 12
+    """Most target intervals of a training window, simulated from one start state; tip-overs end a window as well."""
     max_iterations: Annotated[int, Field(strict=True, ge=1, le=10_000)] = 40
     """Iterations of one start on one horizon; of method paper, steps of Adam."""
     starts: Annotated[int, Field(strict=True, ge=1, le=1000)] = 3
     """Fits from different starts: the first from robot.toml, the others drawn from the priors."""
-    redraws: Annotated[int, Field(strict=True, ge=0, le=1000)] = 8
-    """Fits of observations whose noise is drawn anew, for the range of each parameter."""
     profiles: Annotated[int, Field(strict=True, ge=0, le=100)] = 3
     """Weakest parameters whose profile likelihood is drawn."""
-    bootstrap: Annotated[int, Field(strict=True, ge=100, le=100_000)] = 2000
-    """Draws of segments for the intervals of the measures."""
     self_test_cases: Annotated[int, Field(strict=True, ge=1, le=1000)] = 20
     """Planted robots of --self-test."""
 

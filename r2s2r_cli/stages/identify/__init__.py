@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
+from r2s2r_cli.stages.identify.identify import identify
 
-
-
+__all__ = ["identify"]

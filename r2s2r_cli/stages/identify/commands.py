@@ -10,8 +10,8 @@ from r2s2r_cli.stages.identify.data import RunData
 class CommandLog:
     """The commands of one run as a function of time: 0 before the first row, then piecewise constant.
 
-    Where the rows are commands as they were sent, each holds from its stamp. Where they are what the camera frames found
-    in force (`RunData.sampled`), a command was switched at an unknown moment between two rows; half-way is the guess of
+    Rows that are commands as they were sent hold from their stamps. Where they are what the camera frames found in force
+    (`RunData.sampled`), a command was switched at an unknown moment between two rows; half-way is the guess of
     least variance, and holding until the row that shows it would be half a frame late at every switch.
     """
 
@@ -28,7 +28,7 @@ class CommandLog:
         return np.asarray(self._control[np.searchsorted(self._knots, t, side="right")])
 
     def rows(self, start: float, count: int, *, step: float, delay: float) -> tuple[np.ndarray, np.ndarray]:
-        """`count` commands of `step` seconds from `start` [s], each (row, actuated), and their derivatives by the delay.
+        """`count` commands of `step` seconds from `start` [s], (row, actuated), and their derivatives by the delay.
 
         A row is the mean of the delayed command over its step: so the derivative exists where a switch falls into it.
         """

@@ -1,4 +1,4 @@
-"""What a fit knows of the recorded runs: observations, smoothed states, commands, segments; and which segments it may use."""
+"""What a fit knows of the recorded runs: observations, smoothed states, commands, segments; and what it may use."""
 
 from __future__ import annotations
 

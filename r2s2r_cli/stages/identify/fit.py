@@ -15,7 +15,7 @@ from r2s2r_cli.stages.identify.recipe import Recipe
 from r2s2r_cli.stages.identify.residuals import CapResiduals
 from r2s2r_cli.stages.identify.solve.horizon import EARLY, Limits
 from r2s2r_cli.stages.identify.solve.loss import LOSSES
-from r2s2r_cli.stages.identify.solve.record import Checkpoint, Progress, Solution
+from r2s2r_cli.stages.identify.solve.record import Checkpoint, Progress as SolverProgress, Solution
 from r2s2r_cli.stages.identify.solve.starts import MultiStart, multi_start, starts
 from r2s2r_cli.stages.identify.start import states_at
 from r2s2r_cli.stages.identify.windows import Window, selected, window
@@ -49,7 +49,8 @@ def training_windows(
     chosen = selected(runs, train, recipe.window)
     guessed = [run for run, numbers in chosen if not (run.name in known and numbers[0] == 1)]
     last = {run.name: max(numbers[0] for other, numbers in chosen if other is run) for run in guessed}
-    states = states_at(list({run.name: run for run in guessed}.values()), predictor, values, last, belief=recipe.belief)
+    unknown = list({run.name: run for run in guessed}.values())
+    states = states_at(unknown, predictor, values, last, belief=recipe.belief) if unknown else {}
     return [
         window(run, numbers, known[run.name], known=True)
         if run.name in known and numbers[0] == 1
@@ -68,7 +69,7 @@ def fit(
     seed: int = 0,
     known: dict[str, State] | None = None,
     begin: np.ndarray | None = None,
-    progress: Callable[[int, int, Progress], None] | None = None,
+    progress: Callable[[int, int, SolverProgress], None] | None = None,
     checkpoint: Callable[[int, np.ndarray, Checkpoint], None] | None = None,
     resume: tuple[int, np.ndarray, Checkpoint | None] | None = None,
 ) -> Fit:
@@ -91,22 +92,11 @@ def fit(
         at, values, inner = resume
     for number in range(at, rounds):
         windows = training_windows(runs, train, predictor, values, recipe, known)
-        problem = CapResiduals(
-            predictor, windows, spread=recipe.spread, noise=recipe.noise, key_only=recipe.key_only
-        )
+        problem = CapResiduals(predictor, windows, spread=recipe.spread, noise=recipe.noise, key_only=recipe.key_only)
         z0 = problem.z0.copy()
         z0[: len(frees)] = [free.to_z(float(value)) for free, value in zip(frees, values, strict=True)]
         horizons = recipe.horizons(max(len(one.intervals) for one in windows)) if number == 0 else (recipe.window,)
-        stages = [
-            (
-                "all" if length == horizons[-1] else f"{length} intervals",
-                problem if length == horizons[-1] else CapResiduals(
-                    predictor, [one.until(length) for one in windows], spread=recipe.spread, noise=recipe.noise,
-                    key_only=recipe.key_only,
-                ),
-            )
-            for length in horizons
-        ]  # fmt: skip
+        stages = _stages(problem, horizons, recipe)
         z0s = _starts(problem, z0, count if number == 0 else 1, seed)
         found = multi_start(
             stages, z0s, loss=loss, seed=seed, early=EARLY,
@@ -124,6 +114,32 @@ def fit(
     return Fit(problem, solution, values, trials, first)
 
 
+def more_starts(
+    fitted: Fit, recipe: Recipe, count: int, seed: int, progress: Callable[[SolverProgress], None]
+) -> tuple[MultiStart, np.ndarray]:
+    """Fits of the same windows from `count` other starts, growing; and these starts (count, unknowns).
+
+    Raises NumericalError where none can be evaluated.
+    """
+    problem = fitted.problem
+    z0s = _starts(problem, problem.z0, count + 1, seed)[1:]
+    stages = _stages(problem, recipe.horizons(max(len(one.intervals) for one in problem.windows)), recipe)
+    last = Limits(max_iterations=recipe.max_iterations // 2, tolerance=1e-4, step_sd=0.1)
+    return multi_start(stages, z0s, loss=LOSSES[recipe.loss], seed=seed, last=last, progress=progress), z0s
+
+
+def _stages(problem: CapResiduals, horizons: tuple[int, ...], recipe: Recipe) -> list[tuple[str, CapResiduals]]:
+    """The problem cut to each horizon; the last is the problem itself."""
+    found = []
+    for length in horizons[:-1]:
+        cut = CapResiduals(
+            problem.predictor, [one.until(length) for one in problem.windows], spread=recipe.spread,
+            noise=recipe.noise, key_only=recipe.key_only,
+        )  # fmt: skip
+        found.append((f"{length} intervals", cut))
+    return [*found, ("all", problem)]
+
+
 def _starts(problem: CapResiduals, z0: np.ndarray, count: int, seed: int) -> np.ndarray:
     """z0 and others about it: parameters within one sd of their priors, offsets as they are."""
     if count == 1:
@@ -135,8 +151,8 @@ def _starts(problem: CapResiduals, z0: np.ndarray, count: int, seed: int) -> np.
 
 
 def _with_round(
-    progress: Callable[[int, int, Progress], None], number: int, rounds: int
-) -> Callable[[Progress], None]:
+    progress: Callable[[int, int, SolverProgress], None], number: int, rounds: int
+) -> Callable[[SolverProgress], None]:
     return lambda one: progress(number, rounds, one)
 
 

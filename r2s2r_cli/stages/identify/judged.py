@@ -1,4 +1,4 @@
-"""Intervals predicted with given parameters, each from its own causal start and in one free run; nothing is fitted here."""
+"""Intervals predicted with given parameters, each from its own causal start and in a free run; nothing is fitted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Start states with offsets: what a training window may get wrong about where it starts, as numbers that a fit can move."""
+"""Start states with offsets: what a training window gets wrong about where it starts, as numbers that a fit moves."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ class StartSpread:
     rod; roll [rad] and roll_rate [rad/s] about it; rest lengths of the winched cables [m]. 0: not free.
     """
 
-    position: float = 1.5e-3
-    tilt: float = 0.01
+    position: float = 4e-3
+    tilt: float = 0.02
     roll: float = 0.1
-    velocity: float = 0.01
-    tilt_rate: float = 0.06
+    velocity: float = 0.02
+    tilt_rate: float = 0.1
     roll_rate: float = 0.02
-    rest: float = 2e-3
+    rest: float = 6e-3
 
     def sd(self, structure: Structure) -> np.ndarray:
         """As a vector in the order of the offsets (`displaced`), (offset,)."""
@@ -47,7 +47,7 @@ def count(structure: Structure) -> int:
 
 
 def displaced(structure: Structure, s: Tensor, offsets: Tensor) -> Tensor:
-    """Flat states s (B, NS) moved by offsets (B, offset): positions, rotations in rod axes, velocities, rates, rests."""
+    """Flat states s (B, NS) moved by offsets (B, offset): place, rotation in rod axes, velocity, rate, rest length."""
     import roma
     import torch
 
@@ -64,7 +64,7 @@ def displaced(structure: Structure, s: Tensor, offsets: Tensor) -> Tensor:
 
 
 def displacement_jacobian(structure: Structure, s: Tensor, offsets: Tensor) -> Tensor:
-    """d displaced / d offsets, (B, NS, offset)."""
+    """D displaced / d offsets, (B, NS, offset)."""
     from torch.func import jacfwd, vmap
 
     def one(s: Tensor, n: Tensor) -> Tensor:

@@ -29,7 +29,7 @@ the path by 0.03 mm."""
 class Prediction:
     """p_WE: end caps at the compared frames of all windows, one after the other, as the camera sees them [m],
     (F, cap, 3); window: which window each frame is of, (F,). by_value (F, cap, 3, n) [m per unit], by_offset
-    (F, cap, 3, offset): derivatives by the parameters and by the offsets of the frame's own window; None if not asked."""
+    (F, cap, 3, offset): derivatives by parameters and by the offsets of the frame's own window; None if not asked."""
 
     p_WE: np.ndarray
     window: np.ndarray
@@ -40,10 +40,12 @@ class Prediction:
 class Predictor:
     """Simulates windows by command replay. Holds the compiled step: keep it for a whole fit.
 
-    step: of the engine [s]. cache_dir: of the machine code. rollouts counts simulated windows, seconds what they lasted.
+    step: of the engine [s]. cache_dir: of the machine code. rollouts counts simulated windows.
     """
 
-    def __init__(self, mapping: Mapping, *, step: float = 1e-3, cache_dir: Path | None = None, threads: int = 2) -> None:
+    def __init__(
+        self, mapping: Mapping, *, step: float = 1e-3, cache_dir: Path | None = None, threads: int = 2
+    ) -> None:
         from r2s2r_cli.engine.rollout import Simulator
 
         self.mapping = mapping
@@ -53,11 +55,23 @@ class Predictor:
         self.simulator = Simulator(self.structure, cache_dir=cache_dir, threads=threads)
         self.rollouts = 0
 
+    @property
+    def native(self) -> bool:
+        """Whether machine code does the steps."""
+        import torch
+
+        return bool(self.simulator.kernels.native(torch.zeros(1, dtype=torch.float64)))
+
     def predict(
-        self, windows: Sequence[Window], values: np.ndarray, offsets: np.ndarray | None = None, *, jacobian: bool = False
+        self,
+        windows: Sequence[Window],
+        values: np.ndarray,
+        offsets: np.ndarray | None = None,
+        *,
+        jacobian: bool = False,
     ) -> Prediction:
-        """End caps of windows at parameter values (n,), with start states moved by offsets (W, offset); None: not moved,
-        and no derivatives by them. Raises NumericalError where the simulation leaves the finite numbers, InputError for
+        """End caps of windows at parameter values (n,), start states moved by offsets (W, offset); None: not moved, and
+        no derivatives by them. Raises NumericalError where the simulation leaves the finite numbers, InputError for
         values that are no robot.
         """
         import torch
@@ -166,7 +180,7 @@ def refused(error: Exception, windows: Sequence[Window]) -> Exception:
     runs = ", ".join(sorted({window.run.name for window in windows}))
     if isinstance(error, NonFiniteError):
         return NumericalError(
-            "the simulation left the finite numbers", where=f"runs {runs}, {error.time:g} s after a start, {error.body}",
+            "the simulation left the finite numbers", where=f"{runs}, {error.time:g} s after a start, {error.body}",
             expected="finite numbers", received=error.term, hint="r2s2r identify --show-config",
         )  # fmt: skip
     if isinstance(error, EngineInputError):

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 from r2s2r_cli.stages.identify.offsets import StartSpread
 from r2s2r_cli.stages.identify.start import Filter
+from schemas.config import IdentifySettings
+from schemas.robot import Robot
 
 PAPER_FREE = ("motor_speed", "friction")
 """The two parameters of the paper."""
@@ -18,7 +20,7 @@ class Recipe:
     the last horizon, each time. loss: name in solve.LOSSES. belief, spread: of start states. step [s]: of the engine.
     """
 
-    window: int = 7
+    window: int = 12
     noise: float = 1e-3
     key_only: bool = False
     refreshes: int = 2
@@ -34,3 +36,19 @@ class Recipe:
         while 2 * found[-1] < longest:
             found.append(2 * found[-1])
         return tuple(found) if found[-1] >= longest else (*found, longest)
+
+
+def recipe_of(settings: IdentifySettings) -> Recipe:
+    """The recipe with the settings of a project."""
+    return Recipe(window=settings.window, max_iterations=settings.max_iterations, step=settings.step_s)
+
+
+def default_free(robot: Robot, moved: tuple[int, ...]) -> tuple[str, ...]:
+    """Specs of the parameters that are free where nobody says so: at most 12 on the 3-bar robot in a crawl.
+
+    moved: cables whose motors the commands turn, in either direction. Winding and unwinding rates of the winches that
+    work most, friction, the passive tendons, and the delay between a logged command and the motion that is seen.
+    """
+    speeds = [f"motor_speed_{way}.{cable}" for way in ("in", "out") for cable in moved]
+    passive = [f"rest_length.{k},~0.03" for k, cable in enumerate(robot.cables) if cable.kind == "passive"]
+    return (*speeds, "friction", "stiffness_passive", *passive, "command_delay=0.1,0..0.5,~0.1")

@@ -21,7 +21,7 @@ class CapResiduals:
 
     noise: sd of an observed coordinate is at least this [m]; a model that is not exact misses by more than the tracker.
     key_only: compare key frames only (the paper's Key Frame Loss without its detours), else every frame. Windows whose
-    start is known have no offsets. cluster: window of each residual, for covariances.
+    start is known have no offsets. cluster: window of each residual; interval: which of the window's; for covariances.
     """
 
     def __init__(
@@ -50,12 +50,13 @@ class CapResiduals:
         self.prior_mean = np.concatenate([start, np.zeros(rest)])
         self.prior_sd = np.concatenate([np.array([free.prior_sd for free in self.frees]), *each])
         self.z0 = self.prior_mean.copy()
-        self._kept = np.concatenate([w.key if key_only else np.ones(len(w.frames), bool) for w in windows])
-        self._observed = np.concatenate([w.run.observed[w.frames] for w in windows])[self._kept]
+        self.kept = np.concatenate([w.key if key_only else np.ones(len(w.frames), bool) for w in windows])
+        self._observed = np.concatenate([w.run.observed[w.frames] for w in windows])[self.kept]
         wide = [np.broadcast_to(np.maximum(w.run.noise, noise), (len(w.frames), *w.run.noise.shape)) for w in windows]
-        self._sd = np.concatenate(wide)[self._kept]
-        self._window = np.concatenate([np.full(len(w.frames), k) for k, w in enumerate(windows)])[self._kept]
+        self._sd = np.concatenate(wide)[self.kept]
+        self._window = np.concatenate([np.full(len(w.frames), k) for k, w in enumerate(windows)])[self.kept]
         self.cluster = np.repeat(self._window, self._observed[0].size)
+        self.interval = np.repeat(np.concatenate([w.place for w in windows])[self.kept], self._observed[0].size)
         self.block = np.repeat(np.arange(self._observed[..., 0].size), 3)
         self._width = n
 
@@ -73,14 +74,14 @@ class CapResiduals:
     def evaluate(self, z: np.ndarray, *, jacobian: bool = True) -> Evaluation:
         """Residuals (simulated - observed) / sd at z. Raises NumericalError where nothing finite comes out."""
         seen = self.predict(z, jacobian=jacobian)
-        residual = ((seen.p_WE[self._kept] - self._observed) / self._sd).reshape(-1)
+        residual = ((seen.p_WE[self.kept] - self._observed) / self._sd).reshape(-1)
         if not jacobian or seen.by_value is None:
             return Evaluation(residual, None, self.block)
         n = self._width
         d = np.zeros((*self._observed.shape, len(z)))
-        d[..., :n] = seen.by_value[self._kept] * slopes_of(self.frees, z[:n])
+        d[..., :n] = seen.by_value[self.kept] * slopes_of(self.frees, z[:n])
         if seen.by_offset is not None:
-            by = seen.by_offset[self._kept]
+            by = seen.by_offset[self.kept]
             for k in range(len(self.windows)):
                 rows = self._window == k
                 d[rows, ..., n + k * self.offsets : n + (k + 1) * self.offsets] = by[rows]

@@ -53,12 +53,36 @@ class Window:
         )  # fmt: skip
 
 
-def spans(intervals: Sequence[int], length: int) -> list[tuple[int, ...]]:
-    """Consecutive numbers cut into tuples of `length`; what is left over at the end of a stretch is shorter."""
+TIP_M, TIP_M_PER_S = 0.03, 0.2
+"""A cap that moves so far between two frames, and so fast (three times what a winch reels in), is carried by a fall."""
+
+
+def tips(run: RunData) -> tuple[int, ...]:
+    """Frames that show the robot after a tip-over: half of its caps were carried there since the frame before.
+
+    A tracker that jumps moves one or two caps. Where a robot tips is decided by less than a millimetre, so a simulation
+    that was started before tells nothing of what comes after.
+    """
+    way = np.linalg.norm(np.diff(run.observed, axis=0), axis=-1)
+    fast = (way > TIP_M) & (way > TIP_M_PER_S * np.diff(run.t)[:, None])
+    return tuple((np.flatnonzero(2 * fast.sum(axis=1) >= way.shape[1]) + 1).tolist())
+
+
+def begins_after_tip(run: RunData) -> frozenset[int]:
+    """Intervals (1-based) that must begin a window: the robot tipped on the way to their first frame, or before it
+    inside the interval that precedes them."""
+    first = run.intervals.first
+    return frozenset(
+        int(np.searchsorted(first, frame)) + 1 for frame in tips(run) if frame > first[0] and frame <= first[-1]
+    )
+
+
+def spans(intervals: Sequence[int], length: int, begins: frozenset[int] = frozenset()) -> list[tuple[int, ...]]:
+    """Consecutive numbers cut into tuples of at most `length`, and before every number in `begins`."""
     found: list[tuple[int, ...]] = []
     stretch: list[int] = []
     for number in intervals:
-        if stretch and (number != stretch[-1] + 1 or len(stretch) == length):
+        if stretch and (number != stretch[-1] + 1 or len(stretch) == length or number in begins):
             found.append(tuple(stretch))
             stretch = []
         stretch.append(number)
@@ -80,11 +104,18 @@ def window(run: RunData, numbers: tuple[int, ...], state: State, *, known: bool 
     chosen = np.concatenate(frames)
     return Window(
         run=run, intervals=numbers, first=int(run.intervals.first[numbers[0] - 1]), frames=chosen,
-        key=np.array([frame in keys for frame in chosen.tolist()]), place=np.concatenate(place), state=state, known=known,
+        key=np.array([frame in keys for frame in chosen.tolist()]), place=np.concatenate(place), state=state,
+        known=known,
     )  # fmt: skip
 
 
-def selected(runs: Sequence[RunData], selections: Sequence[Selection], length: int) -> list[tuple[RunData, tuple[int, ...]]]:
-    """Runs and intervals of all windows of `length` intervals."""
+def selected(
+    runs: Sequence[RunData], selections: Sequence[Selection], length: int
+) -> list[tuple[RunData, tuple[int, ...]]]:
+    """Runs and intervals of all windows of at most `length` intervals; none goes on over a tip-over between two."""
     named = {run.name: run for run in runs}
-    return [(named[one.run], span) for one in selections for span in spans(one.intervals, length)]
+    found: list[tuple[RunData, tuple[int, ...]]] = []
+    for one in selections:
+        run = named[one.run]
+        found += [(run, span) for span in spans(one.intervals, length, begins_after_tip(run))]
+    return found

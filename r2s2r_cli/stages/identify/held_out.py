@@ -1,0 +1,172 @@
+"""Train and test intervals predicted by us, by rivals, fitted or not, and by the baselines; beside the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from r2s2r_cli.errors import NumericalError
+from r2s2r_cli.stages.identify.closed_free_run import closed_free_run
+from r2s2r_cli.stages.identify.data import RunData, Selection
+from r2s2r_cli.stages.identify.fit import fit
+from r2s2r_cli.stages.identify.found import OURS, FreeRunFound, SegmentFound
+from r2s2r_cli.stages.identify.free import Mapping as FreeMapping, select
+from r2s2r_cli.stages.identify.judged import Replayed, replayed, steps_from
+from r2s2r_cli.stages.identify.predict import Predictor
+from r2s2r_cli.stages.identify.recipe import PAPER_FREE, Recipe
+from r2s2r_cli.stages.identify.request import Request
+from r2s2r_cli.stages.identify.trust.whiteness import whiteness
+from r2s2r_cli.stages.measures.floor import Floor, floor_of
+from r2s2r_cli.stages.measures.keyframes import free_run
+from r2s2r_cli.stages.measures.steps import Step, chains
+from r2s2r_cli.stages.measures.table import Predicted, Row, baselines_of, judge
+from schemas.config import IdentifySettings
+from schemas.robot import Robot
+
+NOMINAL = "nominal"
+TWO_PARAMETERS = "refit of two parameters"
+ROUNDS = 4
+"""Parts of the work that progress counts."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Rows of predictors over train and test segments, and what they rest on. p_RS: attachment points (cable, 2, 3)."""
+
+    train_segments: tuple[SegmentFound, ...]
+    train: Mapping[str, Row]
+    test_segments: tuple[SegmentFound, ...]
+    test: Mapping[str, Row] | None
+    floor: Floor | None
+    free_runs: tuple[FreeRunFound, ...]
+    closed_loop_m: float | None
+    p_RS: np.ndarray
+    rollouts: int
+    warnings: tuple[str, ...]
+
+
+def held_out(
+    robot: Robot,
+    runs: Sequence[RunData],
+    request: Request,
+    predictor: Predictor,
+    values: np.ndarray,
+    recipe: Recipe,
+    settings: IdentifySettings,
+    *,
+    cache_dir: Path | None,
+    progress: Callable[[int, int], None],
+) -> Judged:
+    """Judge the values. Nothing is fitted to test intervals; the rivals are fitted to the same training intervals."""
+    ours_train = replayed(runs, request.train, predictor, values, recipe, free_run=False)
+    ours_test = replayed(runs, request.test, predictor, values, recipe)
+    progress(1, ROUNDS)
+    rivals, rollouts, warnings = _rivals(robot, runs, request, recipe, predictor, cache_dir, progress)
+    test = None
+    if ours_test.steps:
+        table = {OURS: ours_test.predicted}
+        table.update({name: one[1] for name, one in rivals.items()})
+        table.update(baselines_of(ours_test.steps, steps_from(runs, request.train, smoothed=True)))
+        test = judge(ours_test.steps, table)
+    train = judge(ours_train.steps, {OURS: ours_train.predicted, **{name: one[0] for name, one in rivals.items()}})
+    loop = None
+    closed: tuple[np.ndarray, ...] = ()
+    if ours_test.steps:
+        closed, said = closed_free_run(runs, ours_test.steps, predictor, values, recipe)
+        warnings += said
+        if closed:
+            observed = [np.concatenate([step.p_WE for step in chain]) for chain in chains(ours_test.steps)]
+            loop = free_run(np.concatenate(observed), np.concatenate(closed))
+    progress(ROUNDS, ROUNDS)
+    return Judged(
+        train_segments=_segments(ours_train), train=train, test_segments=_segments(ours_test), test=test,
+        floor=_floor(runs, request), free_runs=_free_runs(ours_test, closed), closed_loop_m=loop,
+        p_RS=sites(predictor, values), rollouts=rollouts,
+        warnings=tuple(warnings),
+    )  # fmt: skip
+
+
+def _rivals(
+    robot: Robot, runs: Sequence[RunData], request: Request, recipe: Recipe, predictor: Predictor,
+    cache_dir: Path | None, progress: Callable[[int, int], None],
+) -> tuple[dict[str, tuple[Predicted, Predicted]], int, list[str]]:  # fmt: skip
+    """Robot.toml's own numbers, and the paper's two parameters fitted with the same machinery: (train, test) each; how
+    many windows that simulated, and what went wrong."""
+    found: dict[str, tuple[Predicted, Predicted]] = {}
+    warnings: list[str] = []
+    count = 0
+    for number, (name, names) in enumerate(((NOMINAL, ()), (TWO_PARAMETERS, PAPER_FREE))):
+        try:
+            frees = select(names, robot) if names else ()
+            mapping = FreeMapping(robot, frees, structure=replace(predictor.structure, effects=()))
+            own = Predictor(mapping, step=recipe.step, cache_dir=cache_dir)
+            at = np.array([free.start for free in frees])
+            if names:
+                at = fit(runs, request.train, own, recipe, seed=request.seed).values
+            both = [replayed(runs, side, own, at, recipe, free_run=side is request.test) for side in _sides(request)]
+            found[name] = both[0].predicted, both[1].predicted
+            count += own.rollouts
+        except NumericalError as error:
+            warnings.append(f"the rival '{name}' could not be simulated: {error.what}")
+        progress(2 + number, ROUNDS)
+    return found, count, warnings
+
+
+def _sides(request: Request) -> tuple[tuple[Selection, ...], tuple[Selection, ...]]:
+    return request.train, request.test
+
+
+def _segments(played: Replayed) -> tuple[SegmentFound, ...]:
+    """Each step with the whiteness of its residuals."""
+    if not played.steps:
+        return ()
+    caps = played.simulated[0].shape[1]
+    residual, series, t = [], [], []
+    for k, (step, path) in enumerate(zip(played.steps, played.simulated, strict=True)):
+        for cap in range(caps):
+            residual.append((path[1:, cap] - step.p_WE[1:, cap]) / np.maximum(step.noise[cap], 1e-4))
+            series.append(np.full(len(path) - 1, k * caps + cap))
+            t.append(step.t[1:])
+    tested = whiteness(np.concatenate(residual), np.concatenate(series), np.concatenate(t))
+    place = {int(number): k for k, number in enumerate(tested.series)}
+    found = []
+    for k, (step, path) in enumerate(zip(played.steps, played.simulated, strict=True)):
+        rows = [place.get(k * caps + cap) for cap in range(caps)]
+        lag1 = np.array([np.nan if row is None else tested.lag1[row] for row in rows])
+        white = np.array([True if row is None else bool(tested.white[row]) for row in rows])
+        found.append(SegmentFound(step, path, lag1, white))
+    return tuple(found)
+
+
+def _floor(runs: Sequence[RunData], request: Request) -> Floor | None:
+    """From repeats among the training intervals; with too few of them, from all that the request names."""
+    own = floor_of(steps_from(runs, request.train))
+    if own is not None and own.interval is not None:
+        return own
+    return floor_of(steps_from(runs, (*request.train, *request.test))) or own
+
+
+def _free_runs(played: Replayed, closed: tuple[np.ndarray, ...]) -> tuple[FreeRunFound, ...]:
+    found = []
+    parts: Sequence[tuple[Step, ...]] = chains(played.steps)
+    for k, (chain, path) in enumerate(zip(parts, played.free, strict=True)):
+        found.append(
+            FreeRunFound(
+                run=chain[0].run, t=np.concatenate([step.t for step in chain]),
+                observed=np.concatenate([step.p_WE for step in chain]), simulated=path,
+                closed_loop=closed[k] if closed else None,
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def sites(predictor: Predictor, values: np.ndarray) -> np.ndarray:
+    """Attachment points p_RS of every cable [m], (cable, 2, 3), with the identified numbers."""
+    from r2s2r_cli.stages.identify.free import with_values
+
+    named = {**predictor.mapping.fixed, **dict(zip(predictor.mapping.names, map(float, values), strict=True))}
+    robot, _ = with_values(predictor.mapping.robot, named)
+    return np.array([cable.sites_m for cable in robot.cables])

@@ -1,0 +1,95 @@
+"""After a fit: how sure each parameter is, from covariance, profile likelihood, other starts and re-drawn noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.stages.identify.fit import Fit
+from r2s2r_cli.stages.identify.found import ParameterFound, ProfileFound
+from r2s2r_cli.stages.identify.free.base import values_of
+from r2s2r_cli.stages.identify.residuals import CapResiduals
+from r2s2r_cli.stages.identify.solve.loss import LOSSES
+from r2s2r_cli.stages.identify.solve.problem import Evaluation
+from r2s2r_cli.stages.identify.solve.record import names_on_bound
+from r2s2r_cli.stages.identify.trust.covariance import Covariance, covariance
+from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, Trust, identifiability
+from r2s2r_cli.stages.identify.trust.profile import profile
+from r2s2r_cli.stages.identify.trust.redraw import redraw_linear, spans
+
+FEW = 8
+"""Windows below which the intervals inside them are the clusters: misfit is then shared by less than a window."""
+LINEAR_DRAWS = 1000
+
+
+@dataclass(frozen=True)
+class Sureness:
+    """parameters in the order of the fit; covariance of z; after: what the data say at the solution."""
+
+    parameters: tuple[ParameterFound, ...]
+    spread: Covariance
+    after: Identifiability
+
+
+def clusters(problem: CapResiduals) -> np.ndarray:
+    """Cluster of each residual: its window, or where there are few of them its interval."""
+    if len(problem.windows) >= FEW:
+        return problem.cluster
+    most = max(len(one.intervals) for one in problem.windows)
+    return np.asarray(problem.cluster * most + problem.interval)
+
+
+def sureness(fitted: Fit, others: np.ndarray, *, loss: str, seed: int) -> Sureness:
+    """Of a finished fit. others: parameters (k, p), z, of other fits that explain the data about as well."""
+    problem, solution, frees = fitted.problem, fitted.solution, fitted.problem.frees
+    robust, group = LOSSES[loss], clusters(problem)
+    spread = covariance(problem, solution, frees, loss=robust, block=problem.block, cluster=group)
+    after = identifiability(
+        problem, solution.z, frees,
+        evaluation=Evaluation(solution.residual, solution.jacobian, problem.block), weight=solution.weight,
+        inflation=spread.inflation, refuse=False,
+    )  # fmt: skip
+    drawn = redraw_linear(problem, solution, group, loss=robust, block=problem.block, draws=LINEAR_DRAWS, seed=seed)
+    reach = spans(frees, drawn.z, others if len(others) else None)
+    values = values_of(frees, solution.z[: len(frees)])
+    bound = names_on_bound(
+        values, np.array([f.lower for f in frees]), np.array([f.upper for f in frees]), problem.names
+    )
+    found = []
+    for k, free in enumerate(frees):
+        trust, reason = after.trust[k], after.reason[k]
+        if trust is not Trust.NOT_IDENTIFIABLE and free.name in bound and values[k] != free.start:
+            trust, reason = Trust.ON_BOUND, "the runs ask for more than its bound allows"
+        found.append(
+            ParameterFound(
+                free=free, value=float(values[k]), sd=float(spread.sd[k]), lower=float(spread.lower[k]),
+                upper=float(spread.upper[k]), range=(float(reach[k, 0]), float(reach[k, 1])), trust=trust,
+                reason=reason,
+            )
+        )  # fmt: skip
+    return Sureness(tuple(found), spread, after)
+
+
+def weakest(sure: Sureness, count: int) -> tuple[int, ...]:
+    """Rows of the parameters of which the data say least, among those of which they say something."""
+    rows = [k for k in sure.after.weakest if sure.parameters[k].identifiable]
+    return tuple(rows[:count])
+
+
+def profiled(
+    fitted: Fit, sure: Sureness, rows: tuple[int, ...], *, loss: str, progress: Callable[[int], None]
+) -> tuple[tuple[ProfileFound, ...], np.ndarray | None]:
+    """Profile likelihood of some parameters; and all unknowns where one came upon a lower cost, else None."""
+    found: list[ProfileFound] = []
+    better = None
+    for number, row in enumerate(rows):
+        one = profile(
+            fitted.problem, fitted.solution, fitted.problem.frees, row, sure.spread, loss=LOSSES[loss], points=5,
+            max_iterations=3,
+        )  # fmt: skip
+        found.append(ProfileFound(row=row, value=one.value, cost=one.rise, interval=(one.lower, one.upper)))
+        better = one.better if better is None else better
+        progress(number + 1)
+    return tuple(found), better

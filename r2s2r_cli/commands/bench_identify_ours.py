@@ -80,11 +80,11 @@ class OurSide:
         from r2s2r_cli.stages.identify.trust.covariance import covariance
 
         clock, spent = time.process_time(), [0.0]
-        length = len(self.window.intervals)
-        horizons = range(1, length + 1)
+        recipe, length = Recipe(), len(self.window.intervals)
+        horizons = recipe.horizons(length)
         problems = [(f"{n} intervals", GaitProblem(self, self.window.until(n), spent)) for n in horizons]
         last = problems[-1][1]
-        loss = LOSSES[Recipe().loss]
+        loss = LOSSES[recipe.loss]
         found = solve_growing(problems, last.prior_mean, loss=loss)
         cluster = np.repeat(self.window.place, last.per_frame)
         trust = covariance(last, found, self.frees, loss=loss, block=np.arange(len(cluster)) // 3, cluster=cluster)

@@ -1,4 +1,4 @@
-"""The default fit: windows from filtered start states, growing horizon, Levenberg-Marquardt, starts made again."""
+"""The default fit in rounds (recipe.py): long windows with free starts, then short ones from filtered start states."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.free.base import values_of
 from r2s2r_cli.stages.identify.predict import Predictor
@@ -18,7 +19,7 @@ from r2s2r_cli.stages.identify.solve.loss import LOSSES
 from r2s2r_cli.stages.identify.solve.record import Checkpoint, Progress as SolverProgress, Solution
 from r2s2r_cli.stages.identify.solve.starts import MultiStart, multi_start, starts
 from r2s2r_cli.stages.identify.start import states_at
-from r2s2r_cli.stages.identify.windows import Window, selected, window
+from r2s2r_cli.stages.identify.windows import Window, begins_after_tip, selected, window
 
 if TYPE_CHECKING:
     from r2s2r_cli.engine import State
@@ -51,12 +52,45 @@ def training_windows(
     last = {run.name: max(numbers[0] for other, numbers in chosen if other is run) for run in guessed}
     unknown = list({run.name: run for run in guessed}.values())
     states = states_at(unknown, predictor, values, last, belief=recipe.belief) if unknown else {}
-    return [
+    found = [
         window(run, numbers, known[run.name], known=True)
         if run.name in known and numbers[0] == 1
         else window(run, numbers, states[run.name, numbers[0]])
         for run, numbers in chosen
     ]
+    kept = [one for one in found if len(one.frames)]
+    if not kept:
+        raise InputError(
+            "the robot tips over in every training interval: nothing can be fitted", where="--train",
+            expected="an interval without a tip-over", received="none", hint="r2s2r identify --train RUN",
+        )  # fmt: skip
+    return kept
+
+
+def filtered_windows(
+    runs: Sequence[RunData], train: Sequence[Selection], predictor: Predictor, values: np.ndarray, recipe: Recipe,
+    known: dict[str, State] | None = None,
+) -> list[Window]:  # fmt: skip
+    """Windows of the lengths in `recipe.short` from every training interval on, none across a tip-over.
+
+    They start where the filter says, or in the known state; either way the start is not free.
+    """
+    named = {run.name: run for run in runs}
+    last: dict[str, int] = {}
+    for one in train:
+        last[one.run] = max(*one.intervals, last.get(one.run, 1))
+    states = states_at([named[name] for name in last], predictor, values, last, belief=recipe.belief)
+    states.update({(name, 1): state for name, state in (known or {}).items()})
+    found = []
+    for one in train:
+        run = named[one.run]
+        breaks = begins_after_tip(run)
+        for length in recipe.short:
+            for number in one.intervals:
+                numbers = tuple(range(number, number + length))
+                if set(numbers) <= set(one.intervals) and not breaks & set(numbers[1:]):
+                    found.append(window(run, numbers, states[run.name, number], known=True))
+    return [one for one in found if len(one.frames)]
 
 
 def fit(
@@ -75,32 +109,33 @@ def fit(
 ) -> Fit:
     """Fit the free parameters of `predictor` to the training intervals.
 
-    count: starts of the first round; later rounds make the start states again with what was found and go on from it.
-    begin: values (n,) to start from, default those of the free parameters. known: see `training_windows`. progress is
-    called with the round, the number of rounds and the solver's own; checkpoint with the round, the values its start
-    states are made with, and the solver's; resume is what the last checkpoint was called with.
+    count: starts of the first round. begin: values (n,) to start from, default those of the free parameters. known: see
+    `training_windows`; where every window starts known there is one round. progress is called with the round, the number
+    of rounds and the solver's own; checkpoint with the round, the values its start states are made with, and the
+    solver's; resume is what the last checkpoint was called with.
 
     Raises NumericalError where nothing can be simulated, InputError for runs that cannot be started.
     """
     frees = predictor.mapping.frees
     values = np.array([free.start for free in frees]) if begin is None else np.asarray(begin, dtype=float)
-    rounds = max(1, recipe.refreshes)
-    loss = LOSSES[recipe.loss]
+    rounds = 1 + recipe.filtered
     trials, first = None, values[None]
     at, inner = 0, None
     if resume is not None:
         at, values, inner = resume
     for number in range(at, rounds):
-        windows = training_windows(runs, train, predictor, values, recipe, known)
+        make = training_windows if number == 0 else filtered_windows
+        windows = make(runs, train, predictor, values, recipe, known)
         problem = CapResiduals(predictor, windows, spread=recipe.spread, noise=recipe.noise, key_only=recipe.key_only)
         z0 = problem.z0.copy()
         z0[: len(frees)] = [free.to_z(float(value)) for free, value in zip(frees, values, strict=True)]
-        horizons = recipe.horizons(max(len(one.intervals) for one in windows)) if number == 0 else (recipe.window,)
-        stages = _stages(problem, horizons, recipe)
+        longest = max(len(one.intervals) for one in windows)
+        horizons = recipe.horizons(longest) if number == 0 else (longest,)
         z0s = _starts(problem, z0, count if number == 0 else 1, seed)
+        iterations = recipe.max_iterations if number == 0 else recipe.filtered_iterations
         found = multi_start(
-            stages, z0s, loss=loss, seed=seed, early=EARLY,
-            last=Limits(max_iterations=recipe.max_iterations, tolerance=3e-5, step_sd=0.05),
+            _stages(problem, horizons, recipe), z0s, loss=LOSSES[recipe.loss], seed=seed, early=EARLY,
+            last=Limits(max_iterations=iterations, tolerance=1e-4, step_sd=0.05),
             progress=None if progress is None else _with_round(progress, number, rounds),
             checkpoint=None if checkpoint is None else _kept(checkpoint, number, values), resume=inner,
         )  # fmt: skip
@@ -109,7 +144,7 @@ def fit(
             trials, first = found, np.array([values_of(frees, z[: len(frees)]) for z in z0s])
         solution = found.best
         values = values_of(frees, solution.z[: len(frees)])
-        if all(one.known for one in windows):
+        if number == 0 and all(one.known for one in windows):
             break  # nothing to make again
     return Fit(problem, solution, values, trials, first)
 

@@ -72,9 +72,11 @@ def replayed(
     states = states_at(guessed, predictor, values, last, belief=recipe.belief)
     for name, state in (known or {}).items():
         states[name, 1] = state
-    windows = [window(named[step.run], (step.interval,), states[step.run, step.interval]) for step in steps]
+    windows = [window(named[step.run], (step.interval,), states[step.run, step.interval], whole=True) for step in steps]
     runs_free = [
-        window(named[chain[0].run], tuple(s.interval for s in chain), states[chain[0].run, chain[0].interval])
+        window(
+            named[chain[0].run], tuple(s.interval for s in chain), states[chain[0].run, chain[0].interval], whole=True
+        )
         for chain in (chains(steps) if free_run else ())
     ]
     paths = simulated_paths(predictor, values, [*windows, *runs_free])

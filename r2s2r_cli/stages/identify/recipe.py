@@ -15,16 +15,25 @@ PAPER_FREE = ("motor_speed", "friction")
 
 @dataclass(frozen=True)
 class Recipe:
-    """How a fit is made. window: target intervals of a training window. noise [m]: see CapResiduals. key_only: compare
-    key frames only. refreshes: how often start states are made again with the parameters found. max_iterations: of
-    the last horizon, each time. loss: name in solve.LOSSES. belief, spread: of start states. step [s]: of the engine.
+    """How a fit is made, in rounds.
+
+    The first round: windows of at most `window` intervals, whose start states are free within `spread`, growing. It
+    comes near from afar, since a long free run says more about speeds than anything else. Then `filtered` rounds: windows
+    of each length in `short`, from every interval on, that start where the filter says with the parameters of the round
+    before, as test intervals will; these start states are not free, and the parameters learn to predict from them.
+
+    noise [m]: see CapResiduals. key_only: compare key frames only. max_iterations, filtered_iterations: of the last
+    horizon of the first, and of each later round. loss: name in solve.LOSSES. belief: of the filter. step [s]: of the
+    engine.
     """
 
     window: int = 12
-    noise: float = 1e-3
+    filtered: int = 2
+    short: tuple[int, ...] = (1, 3)
+    noise: float = 4e-3
     key_only: bool = False
-    refreshes: int = 2
-    max_iterations: int = 40
+    max_iterations: int = 25
+    filtered_iterations: int = 6
     loss: str = "student_t"
     belief: Filter = field(default_factory=Filter)
     spread: StartSpread = field(default_factory=StartSpread)

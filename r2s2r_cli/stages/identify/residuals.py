@@ -21,7 +21,8 @@ class CapResiduals:
 
     noise: sd of an observed coordinate is at least this [m]; a model that is not exact misses by more than the tracker.
     key_only: compare key frames only (the paper's Key Frame Loss without its detours), else every frame. Windows whose
-    start is known have no offsets. cluster: window of each residual; interval: which of the window's; for covariances.
+    start is known have no offsets. cluster: target interval of each residual, in which misfit and tracker errors persist;
+    windows that overlap share it.
     """
 
     def __init__(
@@ -55,8 +56,10 @@ class CapResiduals:
         wide = [np.broadcast_to(np.maximum(w.run.noise, noise), (len(w.frames), *w.run.noise.shape)) for w in windows]
         self._sd = np.concatenate(wide)[self.kept]
         self._window = np.concatenate([np.full(len(w.frames), k) for k, w in enumerate(windows)])[self.kept]
-        self.cluster = np.repeat(self._window, self._observed[0].size)
-        self.interval = np.repeat(np.concatenate([w.place for w in windows])[self.kept], self._observed[0].size)
+        runs = list(dict.fromkeys(w.run.name for w in windows))
+        most = 1 + max(max(w.intervals) for w in windows)
+        own = [runs.index(w.run.name) * most + np.array(w.intervals)[w.place] for w in windows]
+        self.cluster = np.repeat(np.concatenate(own)[self.kept], self._observed[0].size)
         self.block = np.repeat(np.arange(self._observed[..., 0].size), 3)
         self._width = n
 

@@ -10,7 +10,6 @@ import numpy as np
 from r2s2r_cli.stages.identify.fit import Fit
 from r2s2r_cli.stages.identify.found import ParameterFound, ProfileFound
 from r2s2r_cli.stages.identify.free.base import values_of
-from r2s2r_cli.stages.identify.residuals import CapResiduals
 from r2s2r_cli.stages.identify.solve.loss import LOSSES
 from r2s2r_cli.stages.identify.solve.problem import Evaluation
 from r2s2r_cli.stages.identify.solve.record import names_on_bound
@@ -19,8 +18,6 @@ from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, Tru
 from r2s2r_cli.stages.identify.trust.profile import profile
 from r2s2r_cli.stages.identify.trust.redraw import redraw_linear, spans
 
-FEW = 8
-"""Windows below which the intervals inside them are the clusters: misfit is then shared by less than a window."""
 LINEAR_DRAWS = 1000
 
 
@@ -33,18 +30,10 @@ class Sureness:
     after: Identifiability
 
 
-def clusters(problem: CapResiduals) -> np.ndarray:
-    """Cluster of each residual: its window, or where there are few of them its interval."""
-    if len(problem.windows) >= FEW:
-        return problem.cluster
-    most = max(len(one.intervals) for one in problem.windows)
-    return np.asarray(problem.cluster * most + problem.interval)
-
-
 def sureness(fitted: Fit, others: np.ndarray, *, loss: str, seed: int) -> Sureness:
     """Of a finished fit. others: parameters (k, p), z, of other fits that explain the data about as well."""
     problem, solution, frees = fitted.problem, fitted.solution, fitted.problem.frees
-    robust, group = LOSSES[loss], clusters(problem)
+    robust, group = LOSSES[loss], problem.cluster
     spread = covariance(problem, solution, frees, loss=robust, block=problem.block, cluster=group)
     after = identifiability(
         problem, solution.z, frees,

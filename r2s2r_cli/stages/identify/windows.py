@@ -58,23 +58,22 @@ TIP_M, TIP_M_PER_S = 0.03, 0.2
 
 
 def tips(run: RunData) -> tuple[int, ...]:
-    """Frames that show the robot after a tip-over: half of its caps were carried there since the frame before.
+    """First frames after the beginning of a tip-over: half of the caps were carried there since the frame before.
 
     A tracker that jumps moves one or two caps. Where a robot tips is decided by less than a millimetre, so a simulation
-    that was started before tells nothing of what comes after.
+    that was started before tells nothing of what comes after. A fall over several frames counts once.
     """
     way = np.linalg.norm(np.diff(run.observed, axis=0), axis=-1)
     fast = (way > TIP_M) & (way > TIP_M_PER_S * np.diff(run.t)[:, None])
-    return tuple((np.flatnonzero(2 * fast.sum(axis=1) >= way.shape[1]) + 1).tolist())
+    falling = 2 * fast.sum(axis=1) >= way.shape[1]
+    began = falling & ~np.concatenate([[False], falling[:-1]])
+    return tuple((np.flatnonzero(began) + 1).tolist())
 
 
 def begins_after_tip(run: RunData) -> frozenset[int]:
-    """Intervals (1-based) that must begin a window: the robot tipped on the way to their first frame, or before it
-    inside the interval that precedes them."""
+    """Intervals (1-based) that must begin a window: the first whose first frame is not before a tip-over."""
     first = run.intervals.first
-    return frozenset(
-        int(np.searchsorted(first, frame)) + 1 for frame in tips(run) if frame > first[0] and frame <= first[-1]
-    )
+    return frozenset(int(np.searchsorted(first, frame)) + 1 for frame in tips(run) if frame <= first[-1])
 
 
 def spans(intervals: Sequence[int], length: int, begins: frozenset[int] = frozenset()) -> list[tuple[int, ...]]:
@@ -89,23 +88,26 @@ def spans(intervals: Sequence[int], length: int, begins: frozenset[int] = frozen
     return [*found, tuple(stretch)] if stretch else found
 
 
-def window(run: RunData, numbers: tuple[int, ...], state: State, *, known: bool = False) -> Window:
+def window(run: RunData, numbers: tuple[int, ...], state: State, *, known: bool = False, whole: bool = False) -> Window:
     """The window of consecutive intervals `numbers` that starts with `state` at the first frame of the first.
 
-    Segments inside an interval (a control that reverses) have key frames of their own.
+    Frames after a tip-over inside it are left out, be it all of them, unless `whole`. Segments inside an interval (a control that reverses) have key frames of their own.
     """
     keys = set(run.segments.last.tolist())
+    begin = int(run.intervals.first[numbers[0] - 1])
+    fallen = [frame for frame in tips(run) if frame > begin]
+    end = fallen[0] if fallen and not whole else len(run.t)
     frames, place = [], []
     for index, number in enumerate(numbers):
         first, last = int(run.intervals.first[number - 1]), int(run.intervals.last[number - 1])
-        inside = np.arange(first + (index == 0), last + 1)
+        inside = np.arange(first + (index == 0), min(last + 1, end))
         frames.append(inside)
         place.append(np.full(len(inside), index))
     chosen = np.concatenate(frames)
     return Window(
-        run=run, intervals=numbers, first=int(run.intervals.first[numbers[0] - 1]), frames=chosen,
-        key=np.array([frame in keys for frame in chosen.tolist()]), place=np.concatenate(place), state=state,
-        known=known,
+        run=run, intervals=numbers, first=begin, frames=chosen,
+        key=np.array([frame in keys for frame in chosen.tolist()], dtype=bool), place=np.concatenate(place),
+        state=state, known=known,
     )  # fmt: skip
 
 

@@ -110,8 +110,8 @@ def fit(
     """Fit the free parameters of `predictor` to the training intervals.
 
     count: starts of the first round. begin: values (n,) to start from, default those of the free parameters. known: see
-    `training_windows`; where every window starts known there is one round. progress is called with the round, the number
-    of rounds and the solver's own; checkpoint with the round, the values its start states are made with, and the
+    `training_windows`; where every window starts known there is one round. progress is called with the round, their
+    number and the solver's own; checkpoint with the round, the values its start states are made with, and the
     solver's; resume is what the last checkpoint was called with.
 
     Raises NumericalError where nothing can be simulated, InputError for runs that cannot be started.

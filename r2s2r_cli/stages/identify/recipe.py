@@ -18,8 +18,8 @@ class Recipe:
     """How a fit is made, in rounds.
 
     The first round: windows of at most `window` intervals, whose start states are free within `spread`, growing. It
-    comes near from afar, since a long free run says more about speeds than anything else. Then `filtered` rounds: windows
-    of each length in `short`, from every interval on, that start where the filter says with the parameters of the round
+    comes near from afar: a long free run says more about speeds than anything else. Then `filtered` rounds: windows of
+    each length in `short`, from every interval on, that start where the filter says with the parameters of the round
     before, as test intervals will; these start states are not free, and the parameters learn to predict from them.
 
     noise [m]: see CapResiduals. key_only: compare key frames only. max_iterations, filtered_iterations: of the last
@@ -29,7 +29,7 @@ class Recipe:
 
     window: int = 12
     filtered: int = 2
-    short: tuple[int, ...] = (1, 3)
+    short: tuple[int, ...] = (2, 3, 4)
     noise: float = 4e-3
     key_only: bool = False
     max_iterations: int = 25
@@ -52,12 +52,27 @@ def recipe_of(settings: IdentifySettings) -> Recipe:
     return Recipe(window=settings.window, max_iterations=settings.max_iterations, step=settings.step_s)
 
 
+SOFTER = 0.5
+"""Line, winch and motor mount give way in series with the cable that robot.toml describes: the fit begins at half."""
+
+
+SHORTEST = 0.01
+"""[m] Rest length of a passive tendon with much pretension: stiffness and rest length trade places along its force."""
+
+
 def default_free(robot: Robot, moved: tuple[int, ...]) -> tuple[str, ...]:
-    """Specs of the parameters that are free where nobody says so: at most 12 on the 3-bar robot in a crawl.
+    """Specs of the parameters that are free where nobody says so: 12 on the 3-bar robot in its crawl.
 
     moved: cables whose motors the commands turn, in either direction. Winding and unwinding rates of the winches that
-    work most, friction, the passive tendons, and the delay between a logged command and the motion that is seen.
+    work most, friction, the stiffness behind the winched cables, the rest lengths of the passive tendons, and the delay
+    between a logged command and the motion that is seen. Priors are wide where nobody has measured.
     """
     speeds = [f"motor_speed_{way}.{cable}" for way in ("in", "out") for cable in moved]
-    passive = [f"rest_length.{k},~0.03" for k, cable in enumerate(robot.cables) if cable.kind == "passive"]
-    return (*speeds, "friction", "stiffness_passive", *passive, "command_delay=0.1,0..0.5,~0.1")
+    passive = [
+        f"rest_length.{k},{SHORTEST:g}..{2 * cable.rest_length_m:g},~0.03"
+        for k, cable in enumerate(robot.cables)
+        if cable.rest_length_m is not None
+    ]
+    stiff = [cable.stiffness_n_per_m for cable in robot.cables if cable.kind == "actuated"]
+    soft = f"stiffness_actuated={SOFTER * sum(stiff) / len(stiff):g},~0.7"
+    return (*speeds, "friction", soft, *passive, "command_delay=0.1,0..0.5,~0.1")

@@ -21,8 +21,8 @@ class CapResiduals:
 
     noise: sd of an observed coordinate is at least this [m]; a model that is not exact misses by more than the tracker.
     key_only: compare key frames only (the paper's Key Frame Loss without its detours), else every frame. Windows whose
-    start is known have no offsets. cluster: target interval of each residual, in which misfit and tracker errors persist;
-    windows that overlap share it.
+    start is known have no offsets. cluster: target interval of each residual, in which misfit and tracker errors
+    persist; windows that overlap share it.
     """
 
     def __init__(

@@ -1,14 +1,15 @@
-"""Start states of windows, from frames at or before the start only: a filter with the simulator as its motion model.
+"""Start states of intervals, from frames up to the start only: an ensemble Kalman filter that simulates the run.
 
-Roll, rest lengths and slack are not observable in a frame; a simulation carries them. A frame alone is no start either:
-where a tracker jumps, it is off by centimetres. So the robot is simulated from interval to interval, and at each start the
-simulated pose is corrected by the last frames, cap by cap, with a likelihood whose tails are heavy.
+Roll, rest lengths and velocities are not seen in a frame, and a frame alone is no start: where a tracker jumps, it is
+off by centimetres. So members are simulated from frame to frame with numbers a little different from each other's, and
+every frame pulls them towards it. What is not seen follows through its covariance with what is.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,8 @@ import numpy as np
 from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.identify.commands import CommandLog
 from r2s2r_cli.stages.identify.data import RunData
-from r2s2r_cli.stages.identify.offsets import displaced
+from r2s2r_cli.stages.identify.ensemble import analysis, centred, student_weights
+from r2s2r_cli.stages.identify.members import mean, placed, places
 from r2s2r_cli.stages.identify.predict import Predictor, refused
 from r2s2r_cli.stages.init.attachment import rod_frames
 
@@ -25,71 +27,79 @@ if TYPE_CHECKING:
 
     from r2s2r_cli.engine import Parameters, State
 
-DOF = 4.0
-"""Of the Student t likelihood of an observed cap: one that is off by 5 sd pulls like one that is off by 2."""
-GROUND_SD = 5e-4
-"""[m] a cap of the corrected pose reaches into the ground by no more than this."""
-ITERATIONS = 15
+
+@dataclass(frozen=True)
+class Spread:
+    """Sd of what is added to a member's state: position [m] of a rod, per axis; tilt and roll [rad], across a rod and
+    about it; rest length of a winched cable [m]."""
+
+    position: float = 0.0
+    tilt: float = 0.0
+    roll: float = 0.0
+    rest: float = 0.0
 
 
 @dataclass(frozen=True)
 class Filter:
     """What the filter believes of its parts.
 
-    frames: how many of the last frames correct a start. noise: least sd of an observed coordinate [m]. position [m],
-    tilt, roll [rad]: sd of each rod's simulated pose after one interval. held, moved: sd of the length of a cable whose
-    motor stood still, or turned, in the interval before [m].
+    members: how many; seed: of all that is drawn. noise: least sd of an observed coordinate [m]; persistence: how long
+    errors of a tracker last [s]; frames closer than that say less than they would alone. dof: of the Student t of an
+    observed cap. speed, friction: relative sd of a motor's rates and of a cap's friction from member to member, drawn
+    again at every interval. first: of the first state, about the robot at rest in the observed pose; drift: after 1 s
+    of simulation, growing as a random walk does; interval: added at every start.
     """
 
-    frames: int = 4
-    noise: float = 2e-3
-    position: float = 8e-3
-    tilt: float = 0.03
-    roll: float = 0.02
-    held: float = 2e-3
-    moved: float = 5e-3
+    members: int = 64
+    seed: int = 0
+    noise: float = 3e-3
+    persistence: float = 0.5
+    dof: float = 4.0
+    speed: float = 0.05
+    friction: float = 0.15
+    first: Spread = Spread(position=6e-3, tilt=0.03, roll=0.15, rest=6e-3)
+    drift: Spread = Spread(position=2.8e-3, tilt=0.011)
+    interval: Spread = Spread(roll=0.01)
 
 
 def start_states(
     run: RunData, predictor: Predictor, values: np.ndarray, last: int, *, belief: Filter | None = None
 ) -> list[State]:
-    """States at the first frames of intervals 1 to `last`, each a batch of 1.
+    """States at the first frames of intervals 1 to `last`, each a batch of 1; none depends on a later frame.
 
-    The first is the robot at rest in the observed pose (paper, section System Identification: cable lengths and end caps
-    at t = 0, then gravity), from the run's first frame. Raises NumericalError, InputError where that cannot be.
+    The first is the robot at rest in the observed pose (paper, section System Identification: cable lengths and end
+    caps at t = 0, then gravity), from the run's first frame. The others are means of an ensemble.
+    Raises NumericalError, InputError where the robot cannot be simulated.
     """
     import torch
 
     from r2s2r_cli.engine import EngineError
 
-    belief = belief or Filter()
-    mapping, simulator = predictor.mapping, predictor.simulator
-    theta = mapping.theta(torch.as_tensor(values, dtype=torch.float64))
-    seen = mapping.observation(values)
-    observed = run.observed - np.array([0.0, 0.0, seen.ground_height])
-    log, delay = CommandLog(run), seen.command_delay + seen.camera_delay
-    first = run.intervals.first
-    states: list[State] = []
+    theta = predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64))
+    up = np.array([0.0, 0.0, predictor.mapping.observation(values).ground_height])
     try:
         with torch.no_grad():
-            states.append(_rest(predictor, theta, observed[first[0]]))
-            for k in range(1, last):
-                start, end = float(run.t[first[k - 1]]), float(run.t[first[k]])
-                count = max(1, round((end - start) / predictor.step))
-                u, _ = log.rows(start, count, step=predictor.step, delay=delay)
-                path = simulator.rollout(theta, states[-1], torch.as_tensor(u)[None], step=predictor.step)
-                frames = np.arange(max(first[k - 1] + 1, first[k] + 1 - belief.frames), first[k] + 1)
-                rows = np.minimum(np.round((run.t[frames] - start) / predictor.step).astype(int), count)
-                moved = np.abs(u).max(axis=0) > 0
-                states.append(
-                    _corrected(
-                        predictor, theta, path.at(count), path.end_caps()[0, rows], observed[frames],
-                        np.maximum(run.noise, belief.noise), np.where(moved, belief.moved, belief.held), belief,
-                    )
-                )  # fmt: skip
+            rest = _rest(predictor, theta, run.observed[run.intervals.first[0]] - up)
+            if last == 1:
+                return [rest]
+            return [rest, *_Ensemble(run, predictor, values, rest, belief or Filter()).starts(last)]
     except EngineError as error:
         raise refused(error, ()) from error
-    return states
+
+
+def states_at(
+    runs: Sequence[RunData], predictor: Predictor, values: np.ndarray, last: dict[str, int], *,
+    belief: Filter | None = None,
+) -> dict[tuple[str, int], State]:  # fmt: skip
+    """Start states by run and interval (1-based), of intervals 1 to last[run]. Raises as `start_states`."""
+    found: dict[tuple[str, int], State] = {}
+    for run in runs:
+        for k, state in enumerate(start_states(run, predictor, values, last[run.name], belief=belief)):
+            found[run.name, k + 1] = state
+    if not found:
+        raise NumericalError("there is nothing to start from", where="identify", expected="a run", received="none",
+                             hint="r2s2r status")  # fmt: skip
+    return found
 
 
 def _rest(predictor: Predictor, theta: Parameters, p_WE: np.ndarray) -> State:
@@ -106,73 +116,106 @@ def _rest(predictor: Predictor, theta: Parameters, p_WE: np.ndarray) -> State:
     return window_state(predictor.simulator, theta, caps, found.state, v_WE=torch.zeros_like(caps))
 
 
-def _corrected(
-    predictor: Predictor,
-    theta: Parameters,
-    state: State,
-    path: Tensor,
-    observed: np.ndarray,
-    noise: np.ndarray,
-    lengths_sd: np.ndarray,
-    belief: Filter,
-) -> State:
-    """A simulated state moved towards the observed caps (frame, cap, 3) of its last frames; path: simulated ones.
+class _Ensemble:
+    """Members (E, NS) on their way through one run, from a state of batch 1 at the first frame of interval 1."""
 
-    Maximum a posteriori over the pose of each rod (Gauss-Newton, reweighted). The motion between the frames and the
-    start is the simulated one. Rest lengths follow the corrected pose where tensions balance it.
-    """
-    import torch
-    from torch.func import jacfwd
+    def __init__(self, run: RunData, predictor: Predictor, values: np.ndarray, state: State, belief: Filter) -> None:
+        import torch
 
-    from r2s2r_cli.engine import end_caps
-    from r2s2r_cli.engine.flat import pack_state, unpack_state
-    from r2s2r_cli.engine.reading import cap_lengths
-    from r2s2r_cli.engine.settle import consistent, lowered
+        from r2s2r_cli.engine.flat import pack_state
+        from r2s2r_cli.engine.hooks import effective
 
-    structure, rods = predictor.structure, predictor.structure.n_rods
-    winched = list(structure.actuated)
-    flat, here = pack_state(structure, state), end_caps(theta, state)
-    seen = torch.as_tensor(observed) - (path - here)
-    sd, radius = torch.as_tensor(noise), theta.cap_radius.flatten()
-    lengths = cap_lengths(predictor.cable_caps, here)[0, winched]
-    length_sd = torch.as_tensor(lengths_sd)
-    sides = np.concatenate([np.full(3 * rods, belief.position), np.tile([belief.tilt, belief.tilt, belief.roll], rods)])
-    prior = torch.as_tensor(sides)
+        mapping = predictor.mapping
+        seen = mapping.observation(values)
+        self.run, self.belief, self.structure = run, belief, predictor.structure
+        self.simulator, self.step = predictor.simulator, predictor.step
+        self.theta = mapping.theta(torch.as_tensor(values, dtype=torch.float64))
+        self.in_view = effective(self.structure, self.theta)
+        self.ground = np.array([0.0, 0.0, seen.ground_height])
+        self.delay = seen.command_delay + seen.camera_delay
+        self.substeps = self.simulator.substeps(self.theta, state, self.step)
+        self.rng = np.random.default_rng(belief.seed)
+        self.places = places(self.structure)
+        self.flat = pack_state(self.structure, state).expand(belief.members, -1)
+        self._add(belief.first)
+        self._redraw()
 
-    def moved(n: Tensor) -> Tensor:
-        return displaced(structure, flat, torch.cat([n, n.new_zeros(6 * rods + structure.n_actuated)])[None])
+    def starts(self, last: int) -> list[State]:
+        """States at the starts of intervals 2 to `last`."""
+        from r2s2r_cli.engine.flat import unpack_state
 
-    def residuals(n: Tensor) -> tuple[Tensor, Tensor]:
-        caps = end_caps(theta, unpack_state(structure, moved(n)))
-        now = cap_lengths(predictor.cable_caps, caps)[0, winched]
-        below = torch.relu(radius - caps[0, :, 2]) / GROUND_SD
-        return (caps - seen) / sd, torch.cat([n / prior, (now - lengths) / length_sd, below])
+        run, first = self.run, [int(frame) for frame in self.run.intervals.first[:last]]
+        t = run.t[first[0] : first[-1] + 1] - run.t[first[0]]
+        at = np.round(t / self.step).astype(int)
+        u, _ = CommandLog(run).rows(float(run.t[first[0]]), int(at[-1]), step=self.step, delay=self.delay)
+        states = []
+        for k in range(1, len(at)):
+            self._simulate(u[at[k - 1] : at[k]])
+            self._add(self.belief.drift, math.sqrt(t[k] - t[k - 1]))
+            self._see(first[0] + k, float(t[k] - t[k - 1]))
+            if first[0] + k in first:
+                states.append(unpack_state(self.structure, mean(self.structure, self.flat)[0][None]))
+                self._add(self.belief.interval)
+                self._redraw()
+        return states
 
-    n = prior.new_zeros(len(prior))
-    for _ in range(ITERATIONS):
-        r, others = residuals(n)
-        d_r, d_others = jacfwd(residuals)(n)
-        weight = ((DOF + 3) / (DOF + (r**2).sum(-1)))[..., None].expand_as(r).reshape(-1)
-        d_r = d_r.reshape(-1, len(n))
-        normal = d_r.T @ (d_r * weight[:, None]) + d_others.T @ d_others
-        step = torch.linalg.solve(normal, d_r.T @ (weight * r.reshape(-1)) + d_others.T @ others)
-        n = n - step
-        if float(step.abs().max()) < 1e-7:
-            break
-    corrected = lowered(theta, unpack_state(structure, moved(n)), only_up=True)
-    return consistent(structure, theta, corrected, slack=state.rest)
+    def _simulate(self, u: np.ndarray) -> None:
+        """All members under the commands u (row, actuated)."""
+        import torch
 
+        from r2s2r_cli.engine.nonfinite import require_finite
 
-def states_at(
-    runs: Sequence[RunData], predictor: Predictor, values: np.ndarray, last: dict[str, int], *,
-    belief: Filter | None = None,
-) -> dict[tuple[str, int], State]:  # fmt: skip
-    """Start states by run and interval (1-based), of intervals 1 to last[run]. Raises as `start_states`."""
-    found: dict[tuple[str, int], State] = {}
-    for run in runs:
-        for k, state in enumerate(start_states(run, predictor, values, last[run.name], belief=belief)):
-            found[run.name, k + 1] = replace(state)
-    if not found:
-        raise NumericalError("there is nothing to start from", where="identify", expected="a run", received="none",
-                             hint="r2s2r status")  # fmt: skip
-    return found
+        if len(u) == 0:
+            return
+        rows = torch.as_tensor(u)[None].expand(len(self.flat), -1, -1)
+        h, hold, every = self.step / self.substeps, self.substeps, self.substeps * len(u)
+        frames = self.simulator.advance(self.flat, rows, self.packed, h=h, hold=hold, every=every)
+        require_finite(
+            self.structure, self.simulator.kernels.fn, frames, rows, self.packed, h=h, hold=hold, every=every
+        )
+        self.flat = frames[:, -1]
+
+    def _see(self, frame: int, since: float) -> None:
+        """Analysis of one frame, `since` seconds after the one before."""
+        from r2s2r_cli.engine import end_caps
+        from r2s2r_cli.engine.flat import unpack_state
+
+        reference, deviation = mean(self.structure, self.flat)
+        p_WE = end_caps(self.in_view, unpack_state(self.structure, self.flat)).numpy() + self.ground
+        middle = p_WE.mean(axis=0)
+        innovation, seen = self.run.observed[frame] - middle, p_WE - middle
+        white = np.maximum(self.run.noise, self.belief.noise) ** 2
+        # n frames of errors with this memory say as much as n / (1 + 2 persistence / since) independent ones
+        variance = white * (1 + 2 * self.belief.persistence / since)
+        weight = student_weights(innovation, seen, variance, self.belief.dof)
+        members = len(deviation)
+        shift, deviation = analysis(
+            deviation, seen.reshape(members, -1), innovation.reshape(-1), (variance / weight[:, None]).reshape(-1)
+        )
+        self.flat = placed(self.structure, reference, shift + deviation)
+
+    def _add(self, spread: Spread, times: float = 1.0) -> None:
+        """Scatter the members by `spread`."""
+        rods, members = self.structure.n_rods, len(self.flat)
+        sd = np.zeros(max(one.stop for one in self.places.values()))
+        sd[self.places["p_WB"]] = spread.position
+        sd[self.places["q_WR"]] = np.tile([spread.tilt, spread.tilt, spread.roll], rods)
+        sd[self.places["rest"]] = spread.rest
+        self.flat = placed(self.structure, self.flat, times * sd * centred(self.rng, members, len(sd)))
+
+    def _redraw(self) -> None:
+        """New motor rates and friction for every member."""
+        import torch
+
+        from r2s2r_cli.engine.flat import pack_parameters
+
+        def scattered(tensor: Tensor, sd: float) -> Tensor:
+            draws = centred(self.rng, self.belief.members, tensor[0].numel())
+            return tensor * torch.as_tensor(np.exp(sd * draws)).view(-1, *tensor.shape[1:])
+
+        theta, belief = self.theta, self.belief
+        drawn = {
+            "speed_in": scattered(theta.speed_in, belief.speed), "speed_out": scattered(theta.speed_out, belief.speed),
+            "friction": scattered(theta.friction, belief.friction),
+        }  # fmt: skip
+        self.packed = pack_parameters(self.structure, theta.with_values(drawn))

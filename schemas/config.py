@@ -58,7 +58,7 @@ class IdentifySettings(Frozen):
     """Share of the target intervals of each run, from its beginning, that is trained on where --train is not given."""
     window: Annotated[int, Field(strict=True, ge=1, le=100)] = 12
     """Most target intervals of a training window, simulated from one start state; tip-overs end a window as well."""
-    max_iterations: Annotated[int, Field(strict=True, ge=1, le=10_000)] = 25
+    max_iterations: Annotated[int, Field(strict=True, ge=1, le=10_000)] = 14
     """Iterations of one start on one horizon; of method paper, steps of Adam."""
     starts: Annotated[int, Field(strict=True, ge=1, le=1000)] = 3
     """Fits from different starts: the first from robot.toml, the others drawn from the priors."""

@@ -14,7 +14,7 @@ from r2s2r_cli.stages.identify.free.base import values_of
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
 from r2s2r_cli.stages.identify.residuals import CapResiduals
-from r2s2r_cli.stages.identify.solve.horizon import EARLY, Limits
+from r2s2r_cli.stages.identify.solve.horizon import Limits
 from r2s2r_cli.stages.identify.solve.loss import LOSSES
 from r2s2r_cli.stages.identify.solve.record import Checkpoint, Progress as SolverProgress, Solution
 from r2s2r_cli.stages.identify.solve.starts import MultiStart, multi_start, starts
@@ -24,6 +24,8 @@ from r2s2r_cli.stages.identify.windows import Window, begins_after_tip, selected
 if TYPE_CHECKING:
     from r2s2r_cli.engine import State
 
+EARLY_HORIZONS = Limits(max_iterations=4, tolerance=1e-2, step_sd=0.3, gradient_sd=0.1)
+"""Of all horizons but the last: they only have to come near."""
 START_SPREAD = 0.4
 """Starts are drawn this far from the first in coordinates without a prior: for a logarithm, a factor of 1.5."""
 
@@ -134,7 +136,7 @@ def fit(
         z0s = _starts(problem, z0, count if number == 0 else 1, seed)
         iterations = recipe.max_iterations if number == 0 else recipe.filtered_iterations
         found = multi_start(
-            _stages(problem, horizons, recipe), z0s, loss=LOSSES[recipe.loss], seed=seed, early=EARLY,
+            _stages(problem, horizons, recipe), z0s, loss=LOSSES[recipe.loss], seed=seed, early=EARLY_HORIZONS,
             last=Limits(max_iterations=iterations, tolerance=1e-4, step_sd=0.05),
             progress=None if progress is None else _with_round(progress, number, rounds),
             checkpoint=None if checkpoint is None else _kept(checkpoint, number, values), resume=inner,

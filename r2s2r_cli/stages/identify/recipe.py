@@ -32,7 +32,7 @@ class Recipe:
     short: tuple[int, ...] = (2, 3, 4)
     noise: float = 4e-3
     key_only: bool = False
-    max_iterations: int = 25
+    max_iterations: int = 14
     filtered_iterations: int = 6
     loss: str = "student_t"
     belief: Filter = field(default_factory=Filter)
@@ -56,10 +56,6 @@ SOFTER = 0.5
 """Line, winch and motor mount give way in series with the cable that robot.toml describes: the fit begins at half."""
 
 
-SHORTEST = 0.01
-"""[m] Rest length of a passive tendon with much pretension: stiffness and rest length trade places along its force."""
-
-
 def default_free(robot: Robot, moved: tuple[int, ...]) -> tuple[str, ...]:
     """Specs of the parameters that are free where nobody says so: 12 on the 3-bar robot in its crawl.
 
@@ -67,12 +63,8 @@ def default_free(robot: Robot, moved: tuple[int, ...]) -> tuple[str, ...]:
     work most, friction, the stiffness behind the winched cables, the rest lengths of the passive tendons, and the delay
     between a logged command and the motion that is seen. Priors are wide where nobody has measured.
     """
-    speeds = [f"motor_speed_{way}.{cable}" for way in ("in", "out") for cable in moved]
-    passive = [
-        f"rest_length.{k},{SHORTEST:g}..{2 * cable.rest_length_m:g},~0.03"
-        for k, cable in enumerate(robot.cables)
-        if cable.rest_length_m is not None
-    ]
+    speeds = [f"motor_speed_{way}.{cable},~0.2" for way in ("in", "out") for cable in moved]
+    passive = [f"rest_length.{k},~0.02" for k, cable in enumerate(robot.cables) if cable.kind == "passive"]
     stiff = [cable.stiffness_n_per_m for cable in robot.cables if cable.kind == "actuated"]
-    soft = f"stiffness_actuated={SOFTER * sum(stiff) / len(stiff):g},~0.7"
-    return (*speeds, "friction", soft, *passive, "command_delay=0.1,0..0.5,~0.1")
+    soft = f"stiffness_actuated={SOFTER * sum(stiff) / len(stiff):g},~0.5"
+    return (*speeds, "friction,~0.3", soft, *passive, "command_delay=0.1,0..0.5,~0.1")

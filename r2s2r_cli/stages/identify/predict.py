@@ -74,6 +74,17 @@ class Predictor:
         no derivatives by them. Raises NumericalError where the simulation leaves the finite numbers, InputError for
         values that are no robot.
         """
+        groups = alike(windows)
+        parts = []
+        for group in groups:
+            own = None if offsets is None else offsets[group]
+            parts.append(self._together([windows[k] for k in group], values, own, jacobian))
+        return joined(groups, parts, len(windows))
+
+    def _together(
+        self, windows: Sequence[Window], values: np.ndarray, offsets: np.ndarray | None, jacobian: bool
+    ) -> Prediction:
+        """Windows of about the same length as one batch."""
         import torch
 
         from r2s2r_cli.engine import EngineError
@@ -171,6 +182,37 @@ class Predictor:
             if name == "ground_height":
                 by_value[:, :, 2, k] += 1.0
         return Prediction(p_WE, index.numpy(), by_value, d[..., n:].numpy() if with_offsets else None)
+
+
+LONGER = 1.3
+"""Windows are simulated together while the longest lasts at most so many times the shortest: all run as long."""
+
+
+def alike(windows: Sequence[Window]) -> list[list[int]]:
+    """Numbers of the windows in groups of about the same length."""
+    groups: list[list[int]] = []
+    for k in sorted(range(len(windows)), key=lambda k: windows[k].duration):
+        if groups and windows[k].duration <= LONGER * windows[groups[-1][0]].duration:
+            groups[-1].append(k)
+        else:
+            groups.append([k])
+    return groups
+
+
+def joined(groups: Sequence[Sequence[int]], parts: Sequence[Prediction], count: int) -> Prediction:
+    """The predictions of groups of windows as one, in the order of the windows."""
+    place = {k: (part, i) for part, group in enumerate(groups) for i, k in enumerate(group)}
+    rows = [(parts[part], parts[part].window == i) for part, i in (place[k] for k in range(count))]
+
+    def one(name: str) -> np.ndarray | None:
+        if getattr(parts[0], name) is None:
+            return None
+        return np.concatenate([getattr(part, name)[mask] for part, mask in rows])
+
+    p_WE = one("p_WE")
+    assert p_WE is not None  # noqa: S101 - every prediction has it
+    window = np.concatenate([np.full(int(mask.sum()), k) for k, (_, mask) in enumerate(rows)])
+    return Prediction(p_WE, window, one("by_value"), one("by_offset"))
 
 
 def refused(error: Exception, windows: Sequence[Window]) -> Exception:

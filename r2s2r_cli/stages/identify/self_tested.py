@@ -7,10 +7,10 @@ from pathlib import Path
 
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.fit import fit
-from r2s2r_cli.stages.identify.identify import free_parameters, predictor_of
 from r2s2r_cli.stages.identify.recipe import recipe_of
 from r2s2r_cli.stages.identify.request import Progress, Request, silent
 from r2s2r_cli.stages.identify.self_test import Fitted, self_test
+from r2s2r_cli.stages.identify.task import free_parameters, predictor_of, require_replay
 from r2s2r_cli.stages.identify.trusted import sureness
 from schemas.config import IdentifySettings
 from schemas.results_identify import SelfTestReport
@@ -30,6 +30,7 @@ def self_tested(
 
     One start each: ranges and profiles are not part of it. Raises as `identify` and `self_test`.
     """
+    require_replay(request)
     recipe = recipe_of(settings)
     frees = free_parameters(robot, runs, request, settings)
     predictor = predictor_of(robot, frees, request, recipe, settings, cache_dir)

@@ -78,7 +78,12 @@ def profiled(
             fitted.problem, fitted.solution, fitted.problem.frees, row, sure.spread, loss=LOSSES[loss], points=5,
             max_iterations=3,
         )  # fmt: skip
-        found.append(ProfileFound(row=row, value=one.value, cost=one.rise, interval=(one.lower, one.upper)))
+        found.append(
+            ProfileFound(
+                row=row, value=one.value, cost=one.rise, interval=(one.lower, one.upper), threshold=one.threshold,
+                words=one.words,
+            )
+        )  # fmt: skip
         better = one.better if better is None else better
         progress(number + 1)
     return tuple(found), better

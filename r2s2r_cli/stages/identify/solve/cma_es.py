@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -40,6 +41,8 @@ def cma_es(
     seed: int,
     loss: Loss = LOSSES["none"],
     tolerance: float = 1e-6,
+    population: int | None = None,
+    batch: Callable[[np.ndarray], list[float]] | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Sampled:
     """Minimise the same cost as `levenberg_marquardt` over the parameters, without derivatives.
@@ -49,8 +52,9 @@ def cma_es(
     lower cost found here is a defect there; an equal one says nothing about minima further than the samples reach.
 
     z0: (n,). sd0: of the first samples, in z, one number or (parameters,). budget: evaluations at most. Points where
-    the simulation is not finite are worse than all others. tolerance: of the cost, ends the search. Uses no global
-    random numbers, writes no file and prints nothing. Raises NumericalError where no sample is finite.
+    the simulation is not finite are worse than all others. tolerance: of the cost, ends the search. population: samples
+    of a generation, default the package's. batch: costs of points (k, n), instead of one evaluation after the other.
+    Uses no global random numbers, writes no file and prints nothing. Raises NumericalError where no sample is finite.
     """
     import warnings
 
@@ -71,9 +75,15 @@ def cma_es(
         except NumericalError:
             return np.inf
 
-    options = {
+    def together(samples: list[np.ndarray]) -> list[float]:
+        if batch is None:
+            return [cost(u) for u in samples]
+        return batch(np.array([whole(u) for u in samples]))
+
+    options: dict[str, Any] = {
         "bounds": [_list((lower - z0[:count]) / unit), _list((upper - z0[:count]) / unit)],
         "maxfevals": budget,
+        **({} if population is None else {"popsize": population}),
         "tolfun": tolerance,
         "seed": np.nan,  # do not seed numpy's global generator
         "randn": lambda *shape: draw.standard_normal(shape),
@@ -88,7 +98,7 @@ def cma_es(
     best_u, best, costs, spent = np.zeros(count), np.inf, [], 0
     while not search.stop() and spent < budget:
         samples = search.ask()
-        values = [cost(u) for u in samples]
+        values = together(samples)
         search.tell(samples, values)
         spent += len(samples)
         least = int(np.argmin(values))

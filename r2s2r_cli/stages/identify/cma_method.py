@@ -1,0 +1,73 @@
+"""`--method cma`: CMA-ES beside the default fit, to see whether derivatives led it past a better minimum."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from r2s2r_cli.stages.identify.conclude import Fitted, concluded, known_before, start_found
+from r2s2r_cli.stages.identify.default_method import first_fit, loss_words
+from r2s2r_cli.stages.identify.fit import START_SPREAD, Fit
+from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep
+from r2s2r_cli.stages.identify.free.base import values_of
+from r2s2r_cli.stages.identify.request import Step
+from r2s2r_cli.stages.identify.solve.cma_es import Sampled, cma_es
+from r2s2r_cli.stages.identify.solve.levenberg import levenberg_marquardt
+from r2s2r_cli.stages.identify.solve.loss import LOSSES
+from r2s2r_cli.stages.identify.solve.record import Progress as SolverProgress
+from r2s2r_cli.stages.identify.task import Task, free_parameters
+
+EVALUATIONS = 25
+"""Of CMA-ES, for each of the `max_iterations` of the settings: 1000 by default."""
+
+
+def find_cma(task: Task) -> Found:
+    """The default fit; CMA-ES from robot.toml's values as wide as their priors, at the start states of that fit; the
+    better of the two, CMA-ES's finished by Levenberg-Marquardt. Raises as `identify`."""
+    predictor = task.predictor(free_parameters(task.robot, task.runs, task.request, task.settings))
+    before = known_before(task, predictor)
+    trace: list[TraceStep] = []
+    fitted = first_fit(task, predictor, trace)
+    sampled = _sampled(task, fitted, trace)
+    best, starts, words = better_of(task, fitted, sampled)
+    made = Fitted(
+        best, starts, best.solution.z[None, : len(best.values)], tuple(trace),
+        f"{loss_words(task)}; CMA-ES over the parameters beside it", before, task.settings.profiles, remarks=(words,),
+    )  # fmt: skip
+    return concluded(task, predictor, made)
+
+
+def _sampled(task: Task, fitted: Fit, trace: list[TraceStep]) -> Sampled:
+    problem, n = fitted.problem, len(fitted.values)
+    z0 = fitted.solution.z.copy()
+    z0[:n] = problem.z0[:n]
+    budget = EVALUATIONS * task.settings.max_iterations
+
+    def told(one: SolverProgress) -> None:
+        trace.append(TraceStep(1, "CMA-ES", one.iteration, one.cost))
+        task.progress(Step("CMA-ES", min(one.counts.plain, budget), budget, one.cost))
+
+    return cma_es(
+        problem, z0, sd0=np.minimum(problem.prior_sd[:n], START_SPREAD), budget=budget, seed=task.request.seed,
+        loss=LOSSES[task.recipe.loss], progress=told,
+    )  # fmt: skip
+
+
+def better_of(task: Task, fitted: Fit, sampled: Sampled) -> tuple[Fit, tuple[StartFound, ...], str]:
+    """The fit of least cost; both as rows of starts; and in words how they compare."""
+    frees, n = fitted.problem.frees, len(fitted.values)
+    first = [free.start for free in frees]
+    reason = f"CMA-ES, {sampled.counts.plain} evaluations, ended by {sampled.reason}"
+    there = StartFound(
+        np.array(first), values_of(frees, sampled.z[:n]), sampled.cost, len(sampled.costs), reason
+    )  # fmt: skip
+    starts = (start_found(first, fitted), there)
+    head = f"CMA-ES reached cost {sampled.cost:.6g}, the default fit {fitted.solution.cost:.6g}"
+    if sampled.cost >= fitted.solution.cost:
+        return fitted, starts, f"{head}: no better minimum was found, the numbers are those of the default fit"
+    finished = levenberg_marquardt(
+        fitted.problem, sampled.z, loss=LOSSES[task.recipe.loss], max_iterations=task.recipe.max_iterations
+    )
+    best = replace(fitted, solution=finished, values=values_of(frees, finished.z[:n]))
+    return best, starts, f"{head}: the numbers are those of CMA-ES, finished by Levenberg-Marquardt"

@@ -1,0 +1,100 @@
+"""From a finished fit to all that was found: how sure each number is, and how well unseen intervals are predicted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from r2s2r_cli import __version__
+from r2s2r_cli.stages.identify.fit import Fit, training_windows
+from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep, Update
+from r2s2r_cli.stages.identify.held_out import Judged, held_out
+from r2s2r_cli.stages.identify.predict import Predictor
+from r2s2r_cli.stages.identify.request import Step
+from r2s2r_cli.stages.identify.residuals import CapResiduals
+from r2s2r_cli.stages.identify.starts_found import start_shifts
+from r2s2r_cli.stages.identify.task import Task
+from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, identifiability
+from r2s2r_cli.stages.identify.trusted import profiled, sureness, weakest
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A least-squares fit with its history. near: parameters (k, p), z, of fits that explain the data about as well.
+    loss: in words. profiles: how many of the weakest parameters get one. remarks: what else to say in the report."""
+
+    fit: Fit
+    starts: tuple[StartFound, ...]
+    near: np.ndarray
+    trace: tuple[TraceStep, ...]
+    loss: str
+    before: Identifiability | None
+    profiles: int
+    updates: tuple[Update, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+def known_before(task: Task, predictor: Predictor) -> Identifiability:
+    """What the training intervals can tell at all, at the values of robot.toml, each interval from its own start.
+
+    Raises InputError for parameters without effect, and starts on a bound.
+    """
+    frees, recipe = predictor.mapping.frees, task.recipe
+    values = np.array([free.start for free in frees])
+    windows = training_windows(task.runs, task.request.train, predictor, values, replace(recipe, window=1))
+    problem = CapResiduals(predictor, windows, spread=recipe.spread, noise=recipe.noise)
+    return identifiability(problem, problem.z0, frees)
+
+
+def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:
+    """Judge a fit. Raises what `held_out` raises."""
+    request, recipe, fit = task.request, task.recipe, made.fit
+    sure = sureness(fit, made.near, loss=recipe.loss, seed=request.seed)
+    rows = weakest(sure, made.profiles)
+    profiles, better = profiled(
+        fit, sure, rows, loss=recipe.loss,
+        progress=lambda done: task.progress(Step("profiles", done, len(rows))),
+    )  # fmt: skip
+    warnings = list(made.remarks)
+    if better is not None:
+        warnings.append("a profile came upon a lower cost: the fit is no minimum there, give it more --starts")
+    if not fit.solution.reason.converged:
+        warnings.append(f"the fit did not converge: {fit.solution.message}")
+    judged = judged_by(task, predictor, fit.values)
+    fixed = task.fixed()
+    return Found(
+        request=request, robot=task.robot.name, engine=f"r2s2r {__version__}", step=recipe.step, loss=made.loss,
+        parameters=(*sure.parameters, *fixed),
+        train_segments=judged.train_segments, train=judged.train, test_segments=judged.test_segments, test=judged.test,
+        cost=fit.solution.cost, residuals=len(fit.solution.residual), converged=fit.solution.reason.converged,
+        reason=fit.solution.message, rollouts=predictor.rollouts + judged.rollouts, floor=judged.floor,
+        free_runs=judged.free_runs, closed_loop_m=judged.closed_loop_m,
+        covariance=widened(sure.spread.covariance, len(fixed)), information=made.before, trace=made.trace,
+        starts=made.starts, profiles=profiles, windows=start_shifts(fit), updates=made.updates, p_RS=judged.p_RS,
+        uncertainty=sure.spread.how, computed_by_torch=not predictor.native, warnings=(*warnings, *judged.warnings),
+    )  # fmt: skip
+
+
+def judged_by(task: Task, predictor: Predictor, values: np.ndarray) -> Judged:
+    """Train and test intervals by command replay from their own causal starts: one judge for all methods."""
+    return held_out(
+        task.robot, task.runs, task.request, predictor, values, task.recipe, task.settings, cache_dir=task.cache_dir,
+        progress=lambda done, total: task.progress(Step("held-out", done, total)),
+    )  # fmt: skip
+
+
+def widened(covariance: np.ndarray, fixed: int) -> np.ndarray:
+    """(n, n) with rows and columns of NaN for the fixed parameters behind the free ones."""
+    n = len(covariance) + fixed
+    found = np.full((n, n), np.nan)
+    found[: len(covariance), : len(covariance)] = covariance
+    return found
+
+
+def start_found(first: Sequence[float] | np.ndarray, fit: Fit) -> StartFound:
+    """The fit as the row of its start."""
+    return StartFound(
+        np.asarray(first, dtype=float), fit.values, fit.solution.cost, fit.solution.iterations, fit.solution.message
+    )  # fmt: skip

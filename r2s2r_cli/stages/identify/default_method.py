@@ -1,0 +1,92 @@
+"""`--method default`: Levenberg-Marquardt on recorded commands, from several starts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from r2s2r_cli.stages.identify.conclude import Fitted, concluded, known_before, start_found
+from r2s2r_cli.stages.identify.fit import Fit, fit, more_starts
+from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep
+from r2s2r_cli.stages.identify.free.base import values_of
+from r2s2r_cli.stages.identify.predict import Predictor
+from r2s2r_cli.stages.identify.request import Step
+from r2s2r_cli.stages.identify.solve.record import Checkpoint as SolverCheckpoint, Progress as SolverProgress
+from r2s2r_cli.stages.identify.task import Task, free_parameters
+
+LOSS = "end caps at all frames of windows of {window} intervals, Student t, start states fitted along"
+CLOSE_SHARE = 1e-3
+"""Costs within this many times the number of residuals are about as good: residuals of real runs are correlated."""
+
+
+def find_default(task: Task) -> Found:
+    """Fit and judge. Raises as `identify`."""
+    frees = free_parameters(task.robot, task.runs, task.request, task.settings)
+    predictor = task.predictor(frees)
+    before = known_before(task, predictor)
+    trace: list[TraceStep] = []
+    fitted = first_fit(task, predictor, trace)
+    fitted, starts, near = _other_starts(task, fitted)
+    made = Fitted(fitted, starts, near, tuple(trace), loss_words(task), before, task.settings.profiles)
+    return concluded(task, predictor, made)
+
+
+def loss_words(task: Task) -> str:
+    """What the default fit makes small."""
+    return LOSS.format(window=task.recipe.window)
+
+
+def first_fit(task: Task, predictor: Predictor, trace: list[TraceStep]) -> Fit:
+    """The fit from the starts of the parameters, with its trace, its progress and its checkpoints."""
+    keep = task.checkpoint
+
+    def told(number: int, rounds: int, one: SolverProgress) -> None:
+        trace.append(TraceStep(0, f"round {number + 1}, {one.stage_name}", one.iteration, one.cost))
+        done = (number + one.fraction) / rounds
+        task.progress(Step("fit", int(1000 * done), 1000, one.cost))
+
+    def kept(number: int, values: np.ndarray, one: SolverCheckpoint) -> None:
+        assert keep is not None  # noqa: S101 - only called where there is one
+        keep.save({"round": number, "values": values.tolist(), "solver": one.to_dict()})
+
+    saved = keep.load() if keep is not None else None
+    resume = None
+    if saved is not None:
+        resume = saved["round"], np.array(saved["values"]), SolverCheckpoint.from_dict(saved["solver"])
+    return fit(
+        task.runs, task.request.train, predictor, task.recipe, seed=task.request.seed, progress=told,
+        checkpoint=None if keep is None else kept, resume=resume,
+    )  # fmt: skip
+
+
+def _other_starts(task: Task, fitted: Fit) -> tuple[Fit, tuple[StartFound, ...], np.ndarray]:
+    """Fits from other starts; the best of all; and the parameters (k, p) of those that are about as good."""
+    frees = fitted.problem.frees
+    n, settings = len(frees), task.settings
+    own = start_found([free.start for free in frees], fitted)
+    if settings.starts == 1 or not n:
+        return fitted, (own,), fitted.solution.z[None, :n]
+
+    def told(one: SolverProgress) -> None:
+        task.progress(Step("starts", int(1000 * one.fraction), 1000, one.cost))
+
+    trials, z0s = more_starts(fitted, task.recipe, settings.starts - 1, task.request.seed, told)
+    found = [own]
+    for solution, index in zip(trials.solutions, trials.order, strict=True):
+        found.append(
+            StartFound(
+                values_of(frees, z0s[index][:n]),
+                values_of(frees, solution.z[:n]),
+                solution.cost,
+                solution.iterations,
+                solution.message,
+            )
+        )
+    best = fitted
+    if trials.best.cost < fitted.solution.cost:
+        best = replace(fitted, solution=trials.best, values=values_of(frees, trials.best.z[:n]))
+    everyone = [fitted.solution, *trials.solutions]
+    close = best.solution.cost + CLOSE_SHARE * len(best.solution.residual)
+    near = np.array([one.z[:n] for one in everyone if one.cost <= close])
+    return best, tuple(found), near

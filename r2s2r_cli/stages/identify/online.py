@@ -1,0 +1,196 @@
+"""`--online`: go on from an earlier identification, run after run; between two runs parameters may drift.
+
+What was known of a parameter becomes its prior: a normal one about its value, as wide as its standard deviation and the
+drift together, sqrt(sd^2 + drift^2), but never wider than the prior it had before anything was known (a Kalman filter
+whose measurement is a whole fit). What the runs did not determine keeps its prior.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.identify.conclude import Fitted, concluded, known_before, start_found
+from r2s2r_cli.stages.identify.data import Selection
+from r2s2r_cli.stages.identify.default_method import loss_words
+from r2s2r_cli.stages.identify.fit import fit
+from r2s2r_cli.stages.identify.found import Found, TraceStep, Update
+from r2s2r_cli.stages.identify.free import Free, select
+from r2s2r_cli.stages.identify.free.base import Coordinate
+from r2s2r_cli.stages.identify.request import Step
+from r2s2r_cli.stages.identify.solve.record import Progress as SolverProgress
+from r2s2r_cli.stages.identify.task import Task, free_parameters
+from r2s2r_cli.stages.identify.trusted import Sureness, sureness
+
+DRIFT = 0.05
+"""Standard deviation of what a run changes: of a logarithmic coordinate, 5 %; else this share of its width."""
+INSIDE = 1e-3
+"""Share of its range by which a value on a bound is moved inside, so that a fit can begin there."""
+FIXED = 4
+"""Code of schemas/identification.py for a number that was not free."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of parameters by name: value in its unit and standard deviation of the coordinate."""
+
+    value: dict[str, float]
+    sd_z: dict[str, float]
+
+
+def find_online(task: Task) -> Found:
+    """The estimate after every run of the training intervals; judged is the last.
+
+    Raises InputError without an earlier identification, and what the default fit raises.
+    """
+    if task.request.before is None:
+        raise InputError(
+            "there is no earlier identification to go on from", where="--online",
+            expected="30-identify.h5 in an earlier iteration", received="none",
+            hint="r2s2r identify   # without --online: from robot.toml",
+        )  # fmt: skip
+    wide = first_free(task)
+    order = by_run(task.request.train)
+    known_before(task, task.predictor(wide))  # refuses what no run shows
+    known, updates = _resumed(task, known_of(task.request.before))
+    trace: list[TraceStep] = []
+    for k in range(len(updates), len(order)):
+        frees = tuple(drifted(free, known) for free in wide)
+        predictor = task.predictor(frees)
+        made = fit(
+            task.runs, (order[k],), predictor, task.recipe, seed=task.request.seed,
+            progress=_progress(task, trace, order, k),
+        )  # fmt: skip
+        sure = sureness(made, made.solution.z[None, : len(frees)], loss=task.recipe.loss, seed=task.request.seed)
+        known = learned(known, frees, sure)
+        updates.append(update_of(order[k].run, frees, sure))
+        if task.checkpoint is not None and k + 1 < len(order):
+            task.checkpoint.save({"updates": [_row(one) for one in updates], "known": asdict(known)})
+    last = Fitted(
+        made, (start_found([free.start for free in frees], made),), made.solution.z[None, : len(frees)], tuple(trace),
+        f"{loss_words(task)}; run after run, the cost is of the last", None, task.settings.profiles, tuple(updates),
+    )  # fmt: skip
+    return concluded(task, predictor, last)
+
+
+def first_free(task: Task) -> tuple[Free, ...]:
+    """Of --free or the settings, else what was free in the earlier identification, with the priors it had."""
+    before = task.request.before
+    if task.request.free or task.settings.free or before is None:
+        return free_parameters(task.robot, task.runs, task.request, task.settings)
+    specs = [spec for name, spec in specs_of(before).items() if name not in task.request.fixed]
+    return select(specs, task.robot, task.request.effects)
+
+
+def specs_of(before: ArtifactData) -> dict[str, str]:
+    """What was free there, as after --free, by name."""
+    group = before.groups["parameters"]
+    found = {}
+    for k, name in enumerate(_names(before)):
+        if int(group["trust"][k]) == FIXED:
+            continue
+        mean, sd = float(group["prior_mean"][k]), float(group["prior_sd"][k])
+        low, high = (float(end) for end in group["bounds"][k])
+        start = mean if math.isfinite(mean) else float(group["start"][k])
+        spec = f"{name}={start!r}"
+        if math.isfinite(low) and math.isfinite(high):
+            spec += f",{low!r}..{high!r}"
+        found[name] = spec + (f",~{sd!r}" if math.isfinite(sd) else "")
+    return found
+
+
+def known_of(before: ArtifactData) -> Known:
+    """The numbers that an earlier identification determined, and how well.
+
+    Those without an interval (not identifiable, fixed by hand, method paper) are left out.
+    """
+    group = before.groups["parameters"]
+    covariance = before.groups["covariance"]["covariance"] if "covariance" in before.groups else None
+    known = Known({}, {})
+    for k, name in enumerate(_names(before)):
+        sd = math.nan if covariance is None else math.sqrt(max(float(covariance[k, k]), 0.0))
+        if bool(group["identifiable"][k]) and math.isfinite(sd) and sd > 0:
+            known.value[name], known.sd_z[name] = float(group["value"][k]), sd
+    return known
+
+
+def drifted(free: Free, known: Known) -> Free:
+    """The parameter with what is known of it, one run later, as its start and prior; `free` has the first prior."""
+    if free.name not in known.value:
+        return free
+    margin = INSIDE * (free.upper - free.lower) if math.isfinite(free.upper - free.lower) else 0.0
+    value = min(max(known.value[free.name], free.lower + margin), free.upper - margin)
+    sd = math.hypot(known.sd_z[free.name], drift_of(free))
+    return replace(free, start=value, prior_sd=min(sd, free.prior_sd))
+
+
+def drift_of(free: Free) -> float:
+    """How far a run may change a parameter, sd of its coordinate."""
+    if free.coordinate is not Coordinate.LINEAR:
+        return DRIFT
+    box = (free.upper - free.lower) / math.sqrt(12.0)
+    wide = min(box, free.prior_sd)
+    return DRIFT * (wide if math.isfinite(wide) else abs(free.start) or 1.0)
+
+
+def learned(known: Known, frees: Sequence[Free], sure: Sureness) -> Known:
+    """What is known after a run that was fitted with `frees`: where it determined nothing, what was known drifts on."""
+    value, sd_z = dict(known.value), dict(known.sd_z)
+    for k, (free, one) in enumerate(zip(frees, sure.parameters, strict=True)):
+        sd = math.sqrt(max(float(sure.spread.covariance[k, k]), 0.0))
+        if one.identifiable and math.isfinite(sd) and sd > 0:
+            value[free.name], sd_z[free.name] = one.value, sd
+        elif free.name in value:
+            value[free.name], sd_z[free.name] = free.start, free.prior_sd
+    return Known(value, sd_z)
+
+
+def update_of(run: str, frees: Sequence[Free], sure: Sureness) -> Update:
+    """The estimate after a run, in units: of what it did not determine, what was known before, with sd NaN."""
+    both = list(zip(frees, sure.parameters, strict=True))
+    value = np.array([one.value if one.identifiable else free.start for free, one in both])
+    sd = np.array([one.sd if one.identifiable and math.isfinite(one.sd) else math.nan for _, one in both])
+    return Update(run, value, sd)
+
+
+def by_run(train: Sequence[Selection]) -> tuple[Selection, ...]:
+    """One selection a run, in the order in which runs are named."""
+    numbers: dict[str, list[int]] = {}
+    for one in train:
+        numbers.setdefault(one.run, []).extend(one.intervals)
+    return tuple(Selection(run, tuple(sorted(chosen))) for run, chosen in numbers.items())
+
+
+def _resumed(task: Task, known: Known) -> tuple[Known, list[Update]]:
+    """Where an interrupted fit stood: after its last whole run."""
+    saved = task.checkpoint.load() if task.checkpoint is not None else None
+    if saved is None:
+        return known, []
+    rows = [Update(one["run"], np.array(one["value"]), np.array(one["sd"], dtype=float)) for one in saved["updates"]]
+    return Known(**saved["known"]), rows
+
+
+def _row(one: Update) -> dict[str, Any]:
+    """As JSON values."""
+    return {"run": one.run, "value": one.value.tolist(), "sd": [x if math.isfinite(x) else None for x in one.sd]}
+
+
+def _progress(
+    task: Task, trace: list[TraceStep], order: Sequence[Selection], k: int
+) -> Callable[[int, int, SolverProgress], None]:
+    def told(number: int, rounds: int, one: SolverProgress) -> None:
+        trace.append(TraceStep(0, f"{order[k].run}, round {number + 1}, {one.stage_name}", one.iteration, one.cost))
+        share = (k + (number + one.fraction) / rounds) / len(order)
+        task.progress(Step("fit", int(1000 * share), 1000, one.cost))
+
+    return told
+
+
+def _names(before: ArtifactData) -> list[str]:
+    return [name.decode() for name in before.groups["parameters"]["name"].tolist()]

@@ -1,0 +1,120 @@
+"""What every method of `identify` starts from: robot, runs, request, settings; what is free, and the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from r2s2r_cli.errors import UsageError
+from r2s2r_cli.stages.identify.data import RunData
+from r2s2r_cli.stages.identify.found import ParameterFound
+from r2s2r_cli.stages.identify.free import Free, Mapping, select
+from r2s2r_cli.stages.identify.predict import Predictor
+from r2s2r_cli.stages.identify.recipe import Recipe, default_free, recipe_of
+from r2s2r_cli.stages.identify.request import Checkpoint, Progress, Request, silent
+from schemas.config import IdentifySettings
+from schemas.robot import Robot
+
+MOVED_SHARE = 0.25
+"""Of the busiest winch's running time: winches that run less than this are left at robot.toml's speed by default."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One request with all that it is about."""
+
+    robot: Robot
+    runs: Sequence[RunData]
+    request: Request
+    settings: IdentifySettings
+    cache_dir: Path | None = None
+    progress: Progress = silent
+    checkpoint: Checkpoint | None = None
+
+    @property
+    def recipe(self) -> Recipe:
+        """The recipe with the settings of the project."""
+        return recipe_of(self.settings)
+
+    def predictor(self, frees: Sequence[Free]) -> Predictor:
+        """The engine with these free numbers."""
+        return predictor_of(self.robot, frees, self.request, self.recipe, self.settings, self.cache_dir)
+
+    def fixed(self) -> tuple[ParameterFound, ...]:
+        """The numbers that were given."""
+        from r2s2r_cli.stages.identify.free.catalogue import catalogue
+
+        known, nan = catalogue(self.robot), float("nan")
+        return tuple(
+            ParameterFound(
+                replace(known[name], start=value), value, nan, nan, nan, (nan, nan), None, "fixed by hand"
+            )
+            for name, value in self.request.fixed.items()
+        )  # fmt: skip
+
+
+def require_combination(request: Request) -> None:
+    """Raises UsageError for a method, drive and --online that do not go together: nothing falls back on another fit."""
+    if request.method == "cma" and request.drive == "closed loop":
+        raise UsageError(
+            "CMA-ES replays recorded commands only", where="--method cma --drive closed-loop",
+            expected="--drive replay, or another method", received="--drive closed-loop",
+            hint="r2s2r identify --drive closed-loop   # finite differences instead",
+        )  # fmt: skip
+    if request.online and (request.method != "default" or request.drive != "command replay"):
+        raise UsageError(
+            "--online is there for the default fit on recorded commands only", where="--online",
+            expected="--method default --drive replay",
+            received=f"--method {request.method}, {request.drive}",
+            hint="r2s2r identify --online",
+        )  # fmt: skip
+
+
+def require_replay(request: Request) -> None:
+    """Raises UsageError for a self-test of anything but the default fit: it would test something else."""
+    if request.method != "default" or request.drive != "command replay" or request.online:
+        raise UsageError(
+            "the self-test plants for the default fit on recorded commands only", where="--self-test",
+            expected="--method default --drive replay, without --online",
+            received=f"--method {request.method}, {request.drive}" + ", --online" * request.online,
+            hint="r2s2r identify --self-test",
+        )  # fmt: skip
+
+
+def free_parameters(
+    robot: Robot, runs: Sequence[RunData], request: Request, settings: IdentifySettings
+) -> tuple[Free, ...]:
+    """Of --free, else of the settings, else the default set."""
+    specs = request.free or settings.free or default_free(robot, busy(robot, runs, request))
+    given = tuple(spec for spec in specs if spec.split("=")[0].split(",")[0] not in request.fixed)
+    return select(given if not request.free else specs, robot, request.effects)
+
+
+def busy(robot: Robot, runs: Sequence[RunData], request: Request) -> tuple[int, ...]:
+    """Cables whose winches ran for a fair share of the training intervals, all runs together."""
+    spent = np.zeros(len(robot.actuated))
+    for one in request.train:
+        run = next(run for run in runs if run.name == one.run)
+        for number in one.intervals:
+            inside = (run.t_command >= run.intervals.t_first[number - 1]) & (
+                run.t_command <= run.intervals.t_last[number - 1]
+            )
+            spent += np.abs(np.nan_to_num(run.control[inside])).sum(axis=0)
+    return tuple(
+        cable for cable, time in zip(robot.actuated, spent, strict=True) if time > MOVED_SHARE * max(spent.max(), 1e-12)
+    )
+
+
+def predictor_of(
+    robot: Robot, frees: Sequence[Free], request: Request, recipe: Recipe, settings: IdentifySettings,
+    cache_dir: Path | None,
+) -> Predictor:  # fmt: skip
+    """The engine with these free and fixed numbers and the effects asked for."""
+    from r2s2r_cli.stages.model import structure_of
+
+    structure = replace(structure_of(robot), rod_contact=settings.rod_contact)
+    mapping = Mapping(robot, frees, request.effects, fixed=request.fixed, structure=structure)
+    return Predictor(mapping, step=recipe.step, cache_dir=cache_dir)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from r2s2r_cli.stages.identify.conclude import Fitted, concluded, known_before, start_found
@@ -15,7 +13,10 @@ from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.solve.record import Checkpoint as SolverCheckpoint, Progress as SolverProgress
 from r2s2r_cli.stages.identify.task import Task, free_parameters
 
-LOSS = "end caps at all frames of windows of {window} intervals, Student t, start states fitted along"
+LOSS = (
+    "end caps at all frames, Student t: windows of up to {window} intervals with free start states, then of {short} "
+    "intervals from filtered ones"
+)
 CLOSE_SHARE = 1e-3
 """Costs within this many times the number of residuals are about as good: residuals of real runs are correlated."""
 
@@ -27,14 +28,14 @@ def find_default(task: Task) -> Found:
     before = known_before(task, predictor)
     trace: list[TraceStep] = []
     fitted = first_fit(task, predictor, trace)
-    fitted, starts, near = _other_starts(task, fitted)
+    starts, near = _other_starts(task, fitted)
     made = Fitted(fitted, starts, near, tuple(trace), loss_words(task), before, task.settings.profiles)
     return concluded(task, predictor, made)
 
 
 def loss_words(task: Task) -> str:
     """What the default fit makes small."""
-    return LOSS.format(window=task.recipe.window)
+    return LOSS.format(window=task.recipe.window, short=", ".join(map(str, task.recipe.short)))
 
 
 def first_fit(task: Task, predictor: Predictor, trace: list[TraceStep]) -> Fit:
@@ -60,13 +61,17 @@ def first_fit(task: Task, predictor: Predictor, trace: list[TraceStep]) -> Fit:
     )  # fmt: skip
 
 
-def _other_starts(task: Task, fitted: Fit) -> tuple[Fit, tuple[StartFound, ...], np.ndarray]:
-    """Fits from other starts; the best of all; and the parameters (k, p) of those that are about as good."""
+def _other_starts(task: Task, fitted: Fit) -> tuple[tuple[StartFound, ...], np.ndarray]:
+    """Fits of the last round's windows from other starts; and the parameters (k, p) of those that are about as good.
+
+    They tell the range, and do not replace the fit: the start states of the windows were filtered with its parameters,
+    so that a lower cost with others may only say that they make up for these.
+    """
     frees = fitted.problem.frees
     n, settings = len(frees), task.settings
     own = start_found([free.start for free in frees], fitted)
     if settings.starts == 1 or not n:
-        return fitted, (own,), fitted.solution.z[None, :n]
+        return (own,), fitted.solution.z[None, :n]
 
     def told(one: SolverProgress) -> None:
         task.progress(Step("starts", int(1000 * one.fraction), 1000, one.cost))
@@ -74,19 +79,8 @@ def _other_starts(task: Task, fitted: Fit) -> tuple[Fit, tuple[StartFound, ...],
     trials, z0s = more_starts(fitted, task.recipe, settings.starts - 1, task.request.seed, told)
     found = [own]
     for solution, index in zip(trials.solutions, trials.order, strict=True):
-        found.append(
-            StartFound(
-                values_of(frees, z0s[index][:n]),
-                values_of(frees, solution.z[:n]),
-                solution.cost,
-                solution.iterations,
-                solution.message,
-            )
-        )
-    best = fitted
-    if trials.best.cost < fitted.solution.cost:
-        best = replace(fitted, solution=trials.best, values=values_of(frees, trials.best.z[:n]))
-    everyone = [fitted.solution, *trials.solutions]
-    close = best.solution.cost + CLOSE_SHARE * len(best.solution.residual)
-    near = np.array([one.z[:n] for one in everyone if one.cost <= close])
-    return best, tuple(found), near
+        first, last = (values_of(frees, z[:n]) for z in (z0s[index], solution.z))
+        found.append(StartFound(first, last, solution.cost, solution.iterations, solution.message))
+    close = fitted.solution.cost + CLOSE_SHARE * len(fitted.solution.residual)
+    near = [fitted.solution, *(one for one in trials.solutions if one.cost <= close)]
+    return tuple(found), np.array([one.z[:n] for one in near])

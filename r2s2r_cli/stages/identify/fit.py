@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 EARLY_HORIZONS = Limits(max_iterations=4, tolerance=1e-2, step_sd=0.3, gradient_sd=0.1)
 """Of all horizons but the last: they only have to come near."""
+FILTERED_TOLERANCE = 1e-3
+"""Of the later rounds: their start states change from round to round by more than that."""
 START_SPREAD = 0.4
 """Starts are drawn this far from the first in coordinates without a prior: for a logarithm, a factor of 1.5."""
 
@@ -137,7 +139,7 @@ def fit(
         iterations = recipe.max_iterations if number == 0 else recipe.filtered_iterations
         found = multi_start(
             _stages(problem, horizons, recipe), z0s, loss=LOSSES[recipe.loss], seed=seed, early=EARLY_HORIZONS,
-            last=Limits(max_iterations=iterations, tolerance=1e-4, step_sd=0.05),
+            last=Limits(max_iterations=iterations, tolerance=1e-4 if number == 0 else FILTERED_TOLERANCE, step_sd=0.05),
             progress=None if progress is None else _with_round(progress, number, rounds),
             checkpoint=None if checkpoint is None else _kept(checkpoint, number, values), resume=inner,
         )  # fmt: skip

@@ -204,7 +204,7 @@ def test_an_interruption_in_the_second_round_changes_no_bit() -> None:
     told: list[int] = []
     whole = fit([run], TRAIN, predictor(), RECIPE, progress=lambda number, rounds, one: told.append(number))
     assert set(told) == {0, 1}
-    saved = interrupted(lambda **tell: fit([run], TRAIN, predictor(), RECIPE, **tell), told.index(1) + 2)
+    saved = interrupted(lambda **tell: fit([run], TRAIN, predictor(), RECIPE, **tell), told.index(1) + 1)
     assert saved[0] == 1
     resumed = fit([run], TRAIN, predictor(), RECIPE, resume=saved)
     np.testing.assert_array_equal(resumed.solution.z, whole.solution.z)

@@ -133,7 +133,10 @@ def _forward(project: Project) -> str:
     latest = project.iterations()[-1:]
     if not latest or not latest[0].artifact("recording").exists():
         return "r2s2r import run.csv"
-    return "" if latest[0].artifact("estimate").exists() else f"r2s2r estimate --iteration {latest[0].number}"
+    for kind, command in (("estimate", "estimate"), ("identification", "identify")):
+        if not latest[0].artifact(kind).exists():
+            return f"r2s2r {command} --iteration {latest[0].number}"
+    return ""
 
 
 def _size(count: int) -> str:

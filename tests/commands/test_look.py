@@ -121,7 +121,7 @@ def test_the_next_command_can_be_pasted(estimated: Path) -> None:
         command = document("status")["next"]
         assert command == expected
         assert invoke(*shlex.split(command)[1:], "--no-draw").exit_code == 0
-    assert document("status")["next"] == ""
+    assert document("status")["next"] == "r2s2r identify --iteration 1"
 
 
 def test_inspect_shows_units_and_provenance(estimated: Path) -> None:

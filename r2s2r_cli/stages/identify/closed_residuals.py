@@ -114,16 +114,20 @@ class ClosedResiduals(CapResiduals):
 
         from r2s2r_cli.engine import EngineError
         from r2s2r_cli.engine.closed_loop import closed_loop
+        from r2s2r_cli.engine.flat import pack_state, unpack_state
 
         mapping = self.predictor.mapping
         x = torch.as_tensor(self._values(points))
         targets = torch.as_tensor(window.run.intervals.target[np.array(window.intervals[: _count(window)]) - 1])
         none = torch.zeros(len(targets), dtype=torch.float64)
         self.predictor.rollouts += len(points)
+        # Where only the controller's numbers are free, nothing else says how many there are.
+        structure = self.predictor.structure
+        state = unpack_state(structure, pack_state(structure, window.state).expand(len(points), -1))
         try:
             with torch.no_grad():
                 return closed_loop(
-                    self.predictor.simulator, mapping.theta(x), window.state, mapping.pid(x), targets, none,
+                    self.predictor.simulator, mapping.theta(x), state, mapping.pid(x), targets, none,
                     none + mapping.robot.pid.step_timeout_s, step=self.predictor.step,
                 )  # fmt: skip
         except EngineError as error:

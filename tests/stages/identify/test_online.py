@@ -1,0 +1,92 @@
+"""Online: what was known becomes a prior, and drifts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.stages.identify.data import Selection
+from r2s2r_cli.stages.identify.found import ParameterFound
+from r2s2r_cli.stages.identify.free import select
+from r2s2r_cli.stages.identify.free.base import Coordinate
+from r2s2r_cli.stages.identify.groups import identification
+from r2s2r_cli.stages.identify.online import (
+    DRIFT,
+    Known,
+    by_run,
+    drift_of,
+    drifted,
+    known_of,
+    learned,
+    specs_of,
+    update_of,
+)
+from r2s2r_cli.stages.identify.trust.identifiability import Trust
+from tests.stages.identify.planted import BOUNCE, SPEED, found
+from tests.support.robots import subject
+
+NAN = (math.nan, math.nan)
+
+
+def test_the_prior_is_what_was_known_and_the_drift() -> None:
+    """sqrt(0.03^2 + 0.05^2) about the old value in a log coordinate, never wider than the first prior."""
+    after = drifted(SPEED, Known({"motor_speed": 0.8}, {"motor_speed": 0.03}))
+    assert after.start == 0.8 and after.prior_sd == pytest.approx(math.hypot(0.03, DRIFT))
+    assert drifted(SPEED, Known({"motor_speed": 0.8}, {"motor_speed": 9.0})).prior_sd == SPEED.prior_sd
+    assert drifted(BOUNCE, Known({}, {})) is BOUNCE
+
+
+def test_a_value_on_a_bound_can_be_gone_on_from() -> None:
+    """It is moved inside by a thousandth of the range."""
+    after = drifted(SPEED, Known({"motor_speed": 2.0}, {"motor_speed": 0.1}))
+    assert SPEED.lower < after.start < SPEED.upper
+
+
+def test_a_linear_coordinate_drifts_by_a_share_of_its_width() -> None:
+    """5 % of the smaller of the prior and a uniform one between the bounds."""
+    slope = replace(SPEED, coordinate=Coordinate.LINEAR, lower=-0.6, upper=0.6, start=0.0, prior_sd=math.inf)
+    assert drift_of(slope) == pytest.approx(0.05 * 1.2 / math.sqrt(12))
+    assert drift_of(replace(slope, prior_sd=0.1)) == pytest.approx(0.005)
+
+
+def test_what_an_artifact_knows() -> None:
+    """The determined speed with the sd of its coordinate; nothing of the restitution, which keeps its prior."""
+    known = known_of(identification(found()))
+    assert known == Known({"motor_speed": 0.8}, {"motor_speed": 0.01})
+
+
+def test_what_was_free_is_free_again() -> None:
+    """With the start, bounds and prior that it had, as a spec that can be read."""
+    specs = specs_of(identification(found()))
+    speed, bounce = select(tuple(specs.values()), subject().robot)
+    assert (speed.name, speed.start, speed.lower, speed.upper, speed.prior_sd) == ("motor_speed", 1.0, 0.1, 2.0, 0.3)
+    assert (bounce.name, bounce.start, bounce.upper) == ("restitution", 0.3, 0.95)
+
+
+def test_a_run_that_shows_nothing_changes_nothing_but_the_width() -> None:
+    """The speed is learned, the restitution stays what it was and drifts on; its update has no sd."""
+    frees = (replace(SPEED, start=0.9, prior_sd=0.1), replace(BOUNCE, start=0.4, prior_sd=0.2))
+    sure: Any = SimpleNamespace(
+        parameters=(
+            ParameterFound(frees[0], 0.8, 0.016, 0.77, 0.83, NAN, Trust.IDENTIFIED),
+            ParameterFound(frees[1], 0.7, 0.3, 0.1, 0.9, NAN, Trust.NOT_IDENTIFIABLE),
+        ),
+        spread=SimpleNamespace(covariance=np.diag([4e-4, 0.04])),
+    )
+    before = Known({"motor_speed": 0.9, "restitution": 0.4}, {"motor_speed": 0.08, "restitution": 0.19})
+    after = learned(before, frees, sure)
+    assert after.value == {"motor_speed": 0.8, "restitution": 0.4}
+    assert after.sd_z == pytest.approx({"motor_speed": 0.02, "restitution": 0.2})
+    update = update_of("two", frees, sure)
+    assert update.value.tolist() == [0.8, 0.4] and update.sd[0] == 0.016 and np.isnan(update.sd[1])
+
+
+def test_runs_are_taken_one_after_the_other() -> None:
+    """In the order in which they are named first, each once."""
+    train = (Selection("b", (3,)), Selection("a", (1, 2)), Selection("b", (1,)))
+    assert by_run(train) == (Selection("b", (1, 3)), Selection("a", (1, 2)))

@@ -186,21 +186,18 @@ def test_cma_says_which_of_the_two_won(task: Task, no_rivals: None) -> None:
 
 @pytest.mark.slow
 def test_online_goes_on_run_after_run(task: Task, no_rivals: None) -> None:
-    """From 0.7 +- 0.03 two runs at 0.8: both move it there; interrupted it goes on alike."""
+    """From 0.7 +- 0.03 two runs at 0.8: both move it there; interrupted after the first it goes on."""
     speed = ParameterFound(SPEED_FREE, 0.7, 0.02, 0.66, 0.74, (math.nan, math.nan), Trust.IDENTIFIED)
     before = identification(planted(parameters=(speed, planted().parameters[1]), covariance=np.diag([9e-4, 1e-2])))
     (run,) = task.runs
     two = replace(task, runs=(run, replace(run, name="later")),
                   request=replace(task.request, train=(ANY.train[0], Selection("later", (1, 2))), test=()))  # fmt: skip
-    made = found_by(two, iterations=5, online=True, before=before)
-    assert [one.run for one in made.updates] == ["gait", "later"]
-    first, second = (one.value[0] for one in made.updates)
-    assert 0.7 < first and abs(second - SPEED) < 0.05 * SPEED
-    assert made.parameters[0].free.start == first
-    assert made.parameters[0].free.prior_sd >= 0.05
     kept = Kept(stop_after=1)
     with pytest.raises(KeyboardInterrupt):
-        found_by(two, checkpoint=kept, iterations=5, online=True, before=before)
-    again = found_by(two, checkpoint=kept, iterations=5, online=True, before=before)
-    assert [one.value[0] for one in again.updates] == [first, second]
-    assert identification(again).groups["history"]["run"].tolist() == [b"gait", b"later"]
+        found_by(two, checkpoint=kept, iterations=3, online=True, before=before)
+    made = found_by(two, checkpoint=kept, iterations=3, online=True, before=before)
+    first, second = (one.value[0] for one in made.updates)
+    assert first > 0.7 and abs(second - SPEED) < 0.05 * SPEED
+    assert made.parameters[0].free.start == first
+    assert made.parameters[0].free.prior_sd >= 0.05
+    assert identification(made).groups["history"]["run"].tolist() == [b"gait", b"later"]

@@ -163,8 +163,10 @@ class Simulator:
             return None if x is None else x.expand(batch, *x.shape[-axes:])
 
         # What no direction changes needs no tangent: less to compile, and less to compute.
-        moved = None if d_parameters is None else d_parameters.abs().amax(-1).reshape(-1, d_parameters.shape[-2]).amax(0)
-        active = None if moved is None else tuple(torch.nonzero(moved).flatten().tolist())
+        active = None
+        if d_parameters is not None:
+            size = d_parameters.abs().amax(-1).reshape(-1, d_parameters.shape[-2]).amax(0)
+            active = tuple(torch.nonzero(size).flatten().tolist())
         d_s0, d_u, d_p = spread(d_state, 2), spread(d_commands, 3), spread(d_parameters, 2)
         run = partial(self.kernels.jvp, threads=self.threads) if self.native else self.kernels.torch_jvp
         frames, tangents = run(

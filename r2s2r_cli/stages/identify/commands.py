@@ -10,7 +10,7 @@ from r2s2r_cli.stages.identify.data import RunData
 class CommandLog:
     """The commands of one run as a function of time: 0 before the first row, then piecewise constant.
 
-    Rows that are commands as they were sent hold from their stamps. Where they are what the camera frames found in force
+    Rows that are commands as they were sent hold from their stamps. Where they are what the frames found in force
     (`RunData.sampled`), a command was switched at an unknown moment between two rows; half-way is the guess of
     least variance, and holding until the row that shows it would be half a frame late at every switch.
     """

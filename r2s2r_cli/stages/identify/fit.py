@@ -15,17 +15,20 @@ from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
 from r2s2r_cli.stages.identify.residuals import CapResiduals
 from r2s2r_cli.stages.identify.solve.horizon import Limits
+from r2s2r_cli.stages.identify.solve.levenberg import levenberg_marquardt
 from r2s2r_cli.stages.identify.solve.loss import LOSSES
 from r2s2r_cli.stages.identify.solve.record import Checkpoint, Progress as SolverProgress, Solution
 from r2s2r_cli.stages.identify.solve.starts import MultiStart, multi_start, starts
 from r2s2r_cli.stages.identify.start import states_at
-from r2s2r_cli.stages.identify.windows import Window, begins_after_tip, selected, window
+from r2s2r_cli.stages.identify.windows import Window, begins_after_tip, selected, spans, window
 
 if TYPE_CHECKING:
     from r2s2r_cli.engine import State
 
 EARLY_HORIZONS = Limits(max_iterations=4, tolerance=1e-2, step_sd=0.3, gradient_sd=0.1)
 """Of all horizons but the last: they only have to come near."""
+EXACT = 1.5
+"""Residuals of at most so many times the noise that was measured: the model is not what is wrong."""
 FILTERED_TOLERANCE = 1e-3
 """Of the later rounds: their start states change from round to round by more than that."""
 START_SPREAD = 0.4
@@ -89,11 +92,12 @@ def filtered_windows(
     for one in train:
         run = named[one.run]
         breaks = begins_after_tip(run)
-        for length in recipe.short:
-            for number in one.intervals:
-                numbers = tuple(range(number, number + length))
-                if set(numbers) <= set(one.intervals) and not breaks & set(numbers[1:]):
-                    found.append(window(run, numbers, states[run.name, number], known=True))
+        for stretch in spans(one.intervals, len(run.intervals), breaks):
+            lengths = [length for length in recipe.short if length <= len(stretch)] or [len(stretch)]
+            for length in lengths:
+                for first in range(len(stretch) - length + 1):
+                    numbers = stretch[first : first + length]
+                    found.append(window(run, numbers, states[run.name, numbers[0]], known=True))
     return [one for one in found if len(one.frames)]
 
 
@@ -150,6 +154,14 @@ def fit(
         values = values_of(frees, solution.z[: len(frees)])
         if number == 0 and all(one.known for one in windows):
             break  # nothing to make again
+        if number == 0 and problem.misfit(solution.z) < EXACT:
+            # The model explains the data to their noise: no filter knows these start states as well as the fit does.
+            problem = CapResiduals(predictor, windows, spread=recipe.spread, noise=0.0, key_only=recipe.key_only)
+            solution = levenberg_marquardt(
+                problem, solution.z, loss=LOSSES[recipe.loss], max_iterations=iterations, tolerance=1e-4
+            )
+            values = values_of(frees, solution.z[: len(frees)])
+            break
     return Fit(problem, solution, values, trials, first)
 
 

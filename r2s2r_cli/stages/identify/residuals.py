@@ -12,6 +12,10 @@ from r2s2r_cli.stages.identify.predict import Prediction, Predictor
 from r2s2r_cli.stages.identify.solve.problem import Evaluation
 from r2s2r_cli.stages.identify.windows import Window
 
+LEAST_NOISE = 1e-5
+"""[m] A simulated log without noise must not divide by 0."""
+CHI2_MEDIAN = 0.4549
+"""Median of a squared standard normal number."""
 FIXED_SD = 1e-9
 """Prior sd of an offset that is not free: it stays, and needs no case of its own."""
 
@@ -53,15 +57,27 @@ class CapResiduals:
         self.z0 = self.prior_mean.copy()
         self.kept = np.concatenate([w.key if key_only else np.ones(len(w.frames), bool) for w in windows])
         self._observed = np.concatenate([w.run.observed[w.frames] for w in windows])[self.kept]
-        wide = [np.broadcast_to(np.maximum(w.run.noise, noise), (len(w.frames), *w.run.noise.shape)) for w in windows]
+        own = [
+            np.broadcast_to(np.maximum(w.run.noise, LEAST_NOISE), (len(w.frames), *w.run.noise.shape)) for w in windows
+        ]
+        self._noise = np.concatenate(own)[self.kept]
+        wide = [
+            np.broadcast_to(np.maximum(w.run.noise, max(noise, LEAST_NOISE)), (len(w.frames), *w.run.noise.shape))
+            for w in windows
+        ]
         self._sd = np.concatenate(wide)[self.kept]
         self._window = np.concatenate([np.full(len(w.frames), k) for k, w in enumerate(windows)])[self.kept]
         runs = list(dict.fromkeys(w.run.name for w in windows))
         most = 1 + max(max(w.intervals) for w in windows)
-        own = [runs.index(w.run.name) * most + np.array(w.intervals)[w.place] for w in windows]
-        self.cluster = np.repeat(np.concatenate(own)[self.kept], self._observed[0].size)
+        place = [runs.index(w.run.name) * most + np.array(w.intervals)[w.place] for w in windows]
+        self.cluster = np.repeat(np.concatenate(place)[self.kept], self._observed[0].size)
         self.block = np.repeat(np.arange(self._observed[..., 0].size), 3)
         self._width = n
+
+    def misfit(self, z: np.ndarray) -> float:
+        """Median size of the residuals over the noise that was measured, 1 where the model is exact and noise normal."""
+        square = ((self.predict(z).p_WE[self.kept] - self._observed) / self._noise) ** 2
+        return float(np.sqrt(np.median(square) / CHI2_MEDIAN))
 
     def split(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """Values (n,) in their units and offsets (W, offset), None where no start is free."""

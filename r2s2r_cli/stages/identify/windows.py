@@ -40,7 +40,7 @@ class Window:
     @property
     def duration(self) -> float:
         """To the last compared frame [s]."""
-        return float(self.run.t[self.frames[-1]]) - self.start
+        return float(self.run.t[self.frames[-1]]) - self.start if len(self.frames) else 0.0
 
     def until(self, intervals: int) -> Window:
         """Its first `intervals` intervals: the horizon of a fit that grows."""
@@ -91,7 +91,8 @@ def spans(intervals: Sequence[int], length: int, begins: frozenset[int] = frozen
 def window(run: RunData, numbers: tuple[int, ...], state: State, *, known: bool = False, whole: bool = False) -> Window:
     """The window of consecutive intervals `numbers` that starts with `state` at the first frame of the first.
 
-    Frames after a tip-over inside it are left out, be it all of them, unless `whole`. Segments inside an interval (a control that reverses) have key frames of their own.
+    Frames after a tip-over inside it are left out, be it all of them, unless `whole`. Segments inside an interval (a
+    control that reverses) have key frames of their own.
     """
     keys = set(run.segments.last.tolist())
     begin = int(run.intervals.first[numbers[0] - 1])

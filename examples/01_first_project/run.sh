@@ -37,9 +37,12 @@ step calibrate --points "$real/tribar_calibration/length_capacitance_points.csv"
 step import "$real/tribar_crawl/crawl.csv"
 step estimate
 step simulate --replay crawl
+# One fit; without these two the range over starts and the profiles are studied as well, which takes minutes.
+step identify --train crawl:1-7 --test crawl:8-11 --starts 1 --set identify.profiles=0
 step validate
 step status
 echo
 echo "look at: $demo/crawl/calibration.html"
 echo "look at: $demo/crawl/iterations/001/20-estimate.html"
 echo "look at: $demo/crawl/iterations/001/simulation.html"
+echo "look at: $demo/crawl/iterations/001/30-identify.html"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from r2s2r_cli.errors import NumericalError
+from r2s2r_cli.errors import NumericalError, UsageError
 from r2s2r_cli.stages.identify.commands import CommandLog
 from r2s2r_cli.stages.identify.offsets import count, displaced, displacement_jacobian
 from r2s2r_cli.stages.identify.windows import Window
@@ -40,7 +40,8 @@ class Prediction:
 class Predictor:
     """Simulates windows by command replay. Holds the compiled step: keep it for a whole fit.
 
-    step: of the engine [s]. cache_dir: of the machine code. rollouts counts simulated windows.
+    step: of the engine [s]. cache_dir: of the machine code. rollouts counts simulated windows. Raises UsageError for a
+    free number that a start state would have to follow.
     """
 
     def __init__(
@@ -48,6 +49,13 @@ class Predictor:
     ) -> None:
         from r2s2r_cli.engine.rollout import Simulator
 
+        moving = [name for name in mapping.names if name.startswith("com.")]
+        if moving:
+            # Start states are places of the centres of mass: these would have to move along.
+            raise UsageError(
+                f"{moving[0]} cannot be free in command replay", where="--free", expected="it given, not fitted",
+                received=", ".join(moving), hint=f"r2s2r identify --fix {moving[0]}=0.005",
+            )  # fmt: skip
         self.mapping = mapping
         self.structure = mapping.structure
         self.cable_caps = tuple((a, b) for a, b in (cable.caps for cable in mapping.robot.cables))

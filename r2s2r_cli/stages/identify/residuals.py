@@ -75,7 +75,7 @@ class CapResiduals:
         self._width = n
 
     def misfit(self, z: np.ndarray) -> float:
-        """Median size of the residuals over the noise that was measured, 1 where the model is exact and noise normal."""
+        """Median size of the residuals over the measured noise: 1 where the model is exact and the noise normal."""
         square = ((self.predict(z).p_WE[self.kept] - self._observed) / self._noise) ** 2
         return float(np.sqrt(np.median(square) / CHI2_MEDIAN))
 

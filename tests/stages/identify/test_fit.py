@@ -14,7 +14,6 @@ import pytest
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.fit import Fit, fit, more_starts, training_windows
-from r2s2r_cli.stages.identify.free.base import values_of
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
 from r2s2r_cli.stages.identify.solve.record import Checkpoint, Progress
@@ -179,20 +178,28 @@ def test_standard_deviations_are_those_of_the_error() -> None:
     assert np.abs(errors).max() < 4.0
 
 
+def misfitting(seed: int) -> RunData:
+    """The planted run, said to be observed four times as well as it was: a model that does not explain its data."""
+    run = planted(seed)
+    return replace(run, noise=run.noise / 4)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
-def test_planted_values_come_back_from_filtered_starts(seed: int) -> None:
-    """Nothing is known of the start but its noisy frame: the first round, whose starts are free, comes within 2 % of
-    speed and rest length and 5 % of the friction; the second, from starts that are not, within 5 % and 10 %."""
+def test_planted_values_come_back_from_free_starts(seed: int) -> None:
+    """Nothing is known of the start but its noisy frame: speed and rest length come within 2 %, friction within 5 %; the
+    model explains the data, so that no filter replaces the starts that were fitted."""
     fitted = fit([planted(seed)], TRAIN, predictor(), RECIPE)
-    assert fitted.trials is not None
-    n = len(TRUTH)
-    first = values_of(predictor().mapping.frees, fitted.trials.best.z[:n])
-    assert (np.abs(first / truth() - 1) < [0.02, 0.05, 0.02]).all()
-    assert (np.abs(fitted.values / truth() - 1) < [0.05, 0.1, 0.05]).all()
+    assert (np.abs(fitted.values / truth() - 1) < [0.02, 0.05, 0.02]).all()
+    assert not any(one.known for one in fitted.problem.windows)
+
+
+@pytest.mark.slow
+def test_where_the_model_does_not_explain_the_data_short_windows_start_from_the_filter() -> None:
+    """Windows of each length in the recipe, from every interval on, none of whose starts is free."""
+    fitted = fit([misfitting(0)], TRAIN, predictor(), RECIPE)
     assert all(one.known for one in fitted.problem.windows)
-    lengths = {len(one.intervals) for one in fitted.problem.windows}
-    assert lengths == set(RECIPE.short)
+    assert {len(one.intervals) for one in fitted.problem.windows} == set(RECIPE.short)
     starts = [one.intervals[0] for one in fitted.problem.windows if len(one.intervals) == min(RECIPE.short)]
     assert starts == list(range(1, INTERVALS + 2 - min(RECIPE.short)))
 
@@ -200,7 +207,7 @@ def test_planted_values_come_back_from_filtered_starts(seed: int) -> None:
 @pytest.mark.slow
 def test_an_interruption_in_the_second_round_changes_no_bit() -> None:
     """Its start states are made again with the values of the round before."""
-    run = planted(1)
+    run = misfitting(1)
     told: list[int] = []
     whole = fit([run], TRAIN, predictor(), RECIPE, progress=lambda number, rounds, one: told.append(number))
     assert set(told) == {0, 1}

@@ -16,17 +16,19 @@ _STRONG = 0.9
 def verdict(report: IdentifyReport) -> str:
     """What the numbers are worth, in two sentences."""
     free = [name for name, found in report.parameters.items() if found.trust != "fixed"]
-    sure = [name for name in free if report.parameters[name].identifiable]
-    told = f"The runs determine {len(sure)} of {counted(len(free), 'free parameter')}."
+    sure = [name for name in free if report.parameters[name].trust == "identified"]
+    others = [report.parameters[name].trust for name in free if name not in sure]
+    rest = ", ".join(f"{others.count(trust)} {trust}" for trust in dict.fromkeys(others))
+    told = f"The runs determine {len(sure)} of {counted(len(free), 'free parameter')}{f' ({rest})' if rest else ''}."
     held = report.heldout
     if held is None:
         return f"{told} Nothing was held out: how well it predicts is not known."
-    others = ", ".join(f"{name} {millimetres(b.keyframe_cap_rmse_m)}" for name, b in held.baselines.items())
+    rivals = ", ".join(f"{name} {millimetres(b.keyframe_cap_rmse_m)}" for name, b in held.baselines.items())
     count = sum(segment.role == "test" for segment in report.segments)
     floor = "not known" if held.floor_m is None else f"{millimetres(held.floor_m)} mm"
     error = f"{millimetres(held.keyframe_cap_rmse_m)} mm{spread(held.intervals.keyframe_cap_rmse_m)}"
     found = f"{error} at the key frames of {counted(count, 'held-out segment')}, floor {floor}"
-    return f"{told} {found}; in mm: {others or 'no baseline'}."
+    return f"{told} {found}; in mm: {rivals or 'no baseline'}."
 
 
 def report_tables(report: IdentifyReport) -> Iterator[PageTable]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from r2s2r_cli.stages.identify.conclude import Fitted, concluded, known_before, start_found
@@ -12,6 +14,7 @@ from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.solve.record import Checkpoint as SolverCheckpoint, Progress as SolverProgress
 from r2s2r_cli.stages.identify.task import Task, free_parameters
+from r2s2r_cli.stages.identify.trust.identifiability import Trust
 
 LOSS = (
     "end caps at all frames, Student t: windows of up to {window} intervals with free start states, then of {short} "
@@ -26,6 +29,9 @@ def find_default(task: Task) -> Found:
     frees = free_parameters(task.robot, task.runs, task.request, task.settings)
     predictor = task.predictor(frees)
     before = known_before(task, predictor)
+    hopeless = zip(before.names, before.trust, strict=True)
+    held = tuple(name for name, trust in hopeless if trust is Trust.NOT_IDENTIFIABLE)
+    task = replace(task, held=held)
     trace: list[TraceStep] = []
     fitted = first_fit(task, predictor, trace)
     starts, near = _other_starts(task, fitted)

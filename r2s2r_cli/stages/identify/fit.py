@@ -134,7 +134,9 @@ def fit(
     for number in range(at, rounds):
         make = training_windows if number == 0 else filtered_windows
         windows = make(runs, train, predictor, values, recipe, known)
-        problem = CapResiduals(predictor, windows, spread=recipe.spread, noise=recipe.noise, key_only=recipe.key_only)
+        problem = CapResiduals(
+            predictor, windows, spread=recipe.spread, noise=recipe.noise, key_only=recipe.key_only, held=recipe.held
+        )
         z0 = problem.z0.copy()
         z0[: len(frees)] = [free.to_z(float(value)) for free, value in zip(frees, values, strict=True)]
         longest = max(len(one.intervals) for one in windows)
@@ -156,7 +158,9 @@ def fit(
             break  # nothing to make again
         if number == 0 and problem.misfit(solution.z) < EXACT:
             # The model explains the data to their noise: no filter knows these start states as well as the fit does.
-            problem = CapResiduals(predictor, windows, spread=recipe.spread, noise=0.0, key_only=recipe.key_only)
+            problem = CapResiduals(
+                predictor, windows, spread=recipe.spread, noise=0.0, key_only=recipe.key_only, held=recipe.held
+            )
             solution = levenberg_marquardt(
                 problem, solution.z, loss=LOSSES[recipe.loss], max_iterations=iterations, tolerance=1e-4
             )
@@ -179,14 +183,17 @@ def more_starts(
     return multi_start(stages, z0s, loss=LOSSES[recipe.loss], seed=seed, last=last, progress=progress), z0s
 
 
+def _problem(predictor: Predictor, windows: Sequence[Window], recipe: Recipe, noise: float) -> CapResiduals:
+    return CapResiduals(
+        predictor, windows, spread=recipe.spread, noise=noise, key_only=recipe.key_only, held=recipe.held
+    )
+
+
 def _stages(problem: CapResiduals, horizons: tuple[int, ...], recipe: Recipe) -> list[tuple[str, CapResiduals]]:
     """The problem cut to each horizon; the last is the problem itself."""
     found = []
     for length in horizons[:-1]:
-        cut = CapResiduals(
-            problem.predictor, [one.until(length) for one in problem.windows], spread=recipe.spread,
-            noise=recipe.noise, key_only=recipe.key_only,
-        )  # fmt: skip
+        cut = _problem(problem.predictor, [one.until(length) for one in problem.windows], recipe, recipe.noise)
         found.append((f"{length} intervals", cut))
     return [*found, ("all", problem)]
 

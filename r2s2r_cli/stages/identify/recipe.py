@@ -24,7 +24,7 @@ class Recipe:
 
     noise [m]: see CapResiduals. key_only: compare key frames only. max_iterations, filtered_iterations: of the last
     horizon of the first, and of each later round. loss: name in solve.LOSSES. belief: of the filter. step [s]: of the
-    engine.
+    engine. held: free parameters that stay at their starts, since the training intervals do not show them.
     """
 
     window: int = 12
@@ -38,6 +38,7 @@ class Recipe:
     belief: Filter = field(default_factory=Filter)
     spread: StartSpread = field(default_factory=StartSpread)
     step: float = 1e-3
+    held: tuple[str, ...] = ()
 
     def horizons(self, longest: int) -> tuple[int, ...]:
         """Intervals that the stages of a growing fit cover, for windows of at most `longest`: 1, 2, 4 ... all."""
@@ -56,14 +57,14 @@ SOFTER = 0.5
 """Line, winch and motor mount give way in series with the cable that robot.toml describes: the fit begins at half."""
 
 
-def default_free(robot: Robot, moved: tuple[int, ...]) -> tuple[str, ...]:
+def default_free(robot: Robot, moved: tuple[tuple[str, int], ...]) -> tuple[str, ...]:
     """Specs of the parameters that are free where nobody says so: 12 on the 3-bar robot in its crawl.
 
-    moved: cables whose motors the commands turn, in either direction. Winding and unwinding rates of the winches that
-    work most, friction, the stiffness behind the winched cables, the rest lengths of the passive tendons, and the delay
+    moved: (way, cable), in or out, of the winches that the commands turn. Winding and unwinding rates of those that do
+    most, friction, the stiffness behind the winched cables, the rest lengths of the passive tendons, and the delay
     between a logged command and the motion that is seen. Priors are wide where nobody has measured.
     """
-    speeds = [f"motor_speed_{way}.{cable},~0.2" for way in ("in", "out") for cable in moved]
+    speeds = [f"motor_speed_{way}.{cable},~0.2" for way, cable in moved]
     passive = [f"rest_length.{k},~0.02" for k, cable in enumerate(robot.cables) if cable.kind == "passive"]
     stiff = [cable.stiffness_n_per_m for cable in robot.cables if cable.kind == "actuated"]
     soft = f"stiffness_actuated={SOFTER * sum(stiff) / len(stiff):g},~0.5"

@@ -26,7 +26,7 @@ class CapResiduals:
     noise: sd of an observed coordinate is at least this [m]; a model that is not exact misses by more than the tracker.
     key_only: compare key frames only (the paper's Key Frame Loss without its detours), else every frame. Windows whose
     start is known have no offsets. cluster: target interval of each residual, in which misfit and tracker errors
-    persist; windows that overlap share it.
+    persist; windows that overlap share it. held: parameters that stay at their starts.
     """
 
     def __init__(
@@ -37,6 +37,7 @@ class CapResiduals:
         spread: StartSpread | None = None,
         noise: float = 1e-3,
         key_only: bool = False,
+        held: Sequence[str] = (),
     ) -> None:
         self.predictor = predictor
         self.windows = tuple(windows)
@@ -53,7 +54,9 @@ class CapResiduals:
         self.upper = np.concatenate([bounds[:, 1], np.full(rest, np.inf)])
         start = np.array([free.to_z(free.start) for free in self.frees])
         self.prior_mean = np.concatenate([start, np.zeros(rest)])
-        self.prior_sd = np.concatenate([np.array([free.prior_sd for free in self.frees]), *each])
+        self.held = tuple(held)
+        own_sd = [FIXED_SD if free.name in held else free.prior_sd for free in self.frees]
+        self.prior_sd = np.concatenate([np.array(own_sd), *each])
         self.z0 = self.prior_mean.copy()
         self.kept = np.concatenate([w.key if key_only else np.ones(len(w.frames), bool) for w in windows])
         self._observed = np.concatenate([w.run.observed[w.frames] for w in windows])[self.kept]

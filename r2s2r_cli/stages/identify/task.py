@@ -18,8 +18,10 @@ from r2s2r_cli.stages.identify.request import Checkpoint, Progress, Request, sil
 from schemas.config import IdentifySettings
 from schemas.robot import Robot
 
-MOVED_SHARE = 0.25
+MOVED_SHARE = 0.3
 """Of the busiest winch's running time: winches that run less than this are left at robot.toml's speed by default."""
+WAY_SHARE = 0.1
+"""Of its running time: a winch that runs less than this in one way has no rate of its own there."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +35,13 @@ class Task:
     cache_dir: Path | None = None
     progress: Progress = silent
     checkpoint: Checkpoint | None = None
+    held: tuple[str, ...] = ()
+    """Free parameters that the training intervals do not show."""
 
     @property
     def recipe(self) -> Recipe:
         """The recipe with the settings of the project."""
-        return recipe_of(self.settings)
+        return replace(recipe_of(self.settings), held=self.held)
 
     def predictor(self, frees: Sequence[Free]) -> Predictor:
         """The engine with these free numbers."""
@@ -93,18 +97,26 @@ def free_parameters(
     return select(given if not request.free else specs, robot, request.effects)
 
 
-def busy(robot: Robot, runs: Sequence[RunData], request: Request) -> tuple[int, ...]:
-    """Cables whose winches ran for a fair share of the training intervals, all runs together."""
-    spent = np.zeros(len(robot.actuated))
+def busy(robot: Robot, runs: Sequence[RunData], request: Request) -> tuple[tuple[str, int], ...]:
+    """(way, cable), in or out: winches that ran for a fair share of the training intervals, all runs together, each way
+    that they ran in."""
+    inwards, outwards = np.zeros(len(robot.actuated)), np.zeros(len(robot.actuated))
     for one in request.train:
         run = next(run for run in runs if run.name == one.run)
         for number in one.intervals:
             inside = (run.t_command >= run.intervals.t_first[number - 1]) & (
                 run.t_command <= run.intervals.t_last[number - 1]
             )
-            spent += np.abs(np.nan_to_num(run.control[inside])).sum(axis=0)
+            control = np.nan_to_num(run.control[inside])
+            inwards += np.maximum(control, 0.0).sum(axis=0)
+            outwards += np.maximum(-control, 0.0).sum(axis=0)
+    both = inwards + outwards
+    fair = both > MOVED_SHARE * max(both.max(), 1e-12)
     return tuple(
-        cable for cable, time in zip(robot.actuated, spent, strict=True) if time > MOVED_SHARE * max(spent.max(), 1e-12)
+        (way, cable)
+        for way, spent in (("in", inwards), ("out", outwards))
+        for k, cable in enumerate(robot.actuated)
+        if fair[k] and spent[k] > WAY_SHARE * both[k]
     )
 
 

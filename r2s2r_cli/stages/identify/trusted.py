@@ -49,7 +49,9 @@ def sureness(fitted: Fit, others: np.ndarray, *, loss: str, seed: int) -> Surene
     found = []
     for k, free in enumerate(frees):
         trust, reason = after.trust[k], after.reason[k]
-        if trust is not Trust.NOT_IDENTIFIABLE and free.name in bound and values[k] != free.start:
+        if free.name in problem.held:
+            trust, reason = Trust.NOT_IDENTIFIABLE, "the training intervals do not show it: held at its start"
+        elif trust is not Trust.NOT_IDENTIFIABLE and free.name in bound and values[k] != free.start:
             trust, reason = Trust.ON_BOUND, "the runs ask for more than its bound allows"
         found.append(
             ParameterFound(

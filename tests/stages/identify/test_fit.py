@@ -187,8 +187,8 @@ def misfitting(seed: int) -> RunData:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_planted_values_come_back_from_free_starts(seed: int) -> None:
-    """Nothing is known of the start but its noisy frame: speed and rest length come within 2 %, friction within 5 %; the
-    model explains the data, so that no filter replaces the starts that were fitted."""
+    """Only a noisy frame is known of the start: speed and rest length come within 2 %, friction within 5 %; the model
+    explains the data, so that no filter replaces the starts that were fitted."""
     fitted = fit([planted(seed)], TRAIN, predictor(), RECIPE)
     assert (np.abs(fitted.values / truth() - 1) < [0.02, 0.05, 0.02]).all()
     assert not any(one.known for one in fitted.problem.windows)

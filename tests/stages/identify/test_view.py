@@ -104,7 +104,7 @@ def test_the_verdict_is_about_what_was_not_fitted() -> None:
     """How many parameters the runs determine, the held-out error with its interval, floor and baselines."""
     said = report(builders.identification())
     text = verdict(said)
-    assert "determine 3 of 4 free parameters" in text
+    assert "determine 2 of 4 free parameters (1 weak, 1 not identifiable)" in text
     assert "8.0 mm (6.4 .. 10.4)" in text and "floor 5.0 mm" in text and "nothing moves 48.0" in text
     assert "Nothing was held out" in verdict(said.model_copy(update={"heldout": None}))
 

@@ -104,7 +104,7 @@ def planted(run: RunData, predictor: Predictor, truth: np.ndarray, rng: np.rando
     recording is. Raises NumericalError, InputError where the robot cannot be simulated.
     """
     state = start_states(run, predictor, truth, 1)[0]
-    whole = window(run, tuple(range(1, len(run.intervals) + 1)), state)
+    whole = window(run, tuple(range(1, len(run.intervals) + 1)), state, whole=True)
     p_WE = simulated_paths(predictor, truth, [whole])[0]
     frames = np.concatenate([[whole.first], whole.frames])
     caps = p_WE + run.noise * rng.normal(size=p_WE.shape)

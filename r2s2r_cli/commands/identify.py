@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from r2s2r_cli.artifact import ArtifactData
     from schemas.results import StageResult
     from schemas.results_identify import IdentifyReport, IdentifyResult
-    from schemas.robot import Robot
 
 METHODS = ("default", "paper", "cma")
 DRIVES = {"replay": "command replay", "closed-loop": "closed loop"}
@@ -145,7 +144,7 @@ def identify(
     checkpoint = CheckpointFile(unfinished, key, resume)
     result, report = run.run(
         lambda: compute(asked, settings, checkpoint, console),
-        (lambda data, said: _draw(data, here.robot(), said)) if draw else None,
+        _draw if draw else None,
         lambda said: checkpoint.clear(),
     )
     show_outcome(_answer(result, report), console)
@@ -175,12 +174,12 @@ def _answer(result: StageResult, report: IdentifyReport | None) -> IdentifyResul
     )  # fmt: skip
 
 
-def _draw(data: ArtifactData, robot: Robot, report: IdentifyReport) -> Iterator[tuple[str, bytes]]:
+def _draw(data: ArtifactData, report: IdentifyReport) -> Iterator[tuple[str, bytes]]:
     from r2s2r_cli.views.identify import draw_identification
     from r2s2r_cli.views.identify_page import identify_page
 
     pictures = []
-    for name, title, png in draw_identification(data, robot):
+    for name, title, png in draw_identification(data):
         yield f"-{name}.png", png
         pictures.append((title, png))
     yield ".html", identify_page(report, data, pictures)

@@ -13,12 +13,11 @@ from r2s2r_cli.views.identify_errors import draw_errors
 from r2s2r_cli.views.identify_fits import draw_fit, draw_free_run
 from r2s2r_cli.views.identify_information import draw_information
 from r2s2r_cli.views.identify_search import draw_history, draw_search
-from schemas.robot import Robot
 
 _ZERO = 1e-12
 
 
-def draw_identification(data: ArtifactData, robot: Robot) -> Iterator[tuple[str, str, bytes]]:
+def draw_identification(data: ArtifactData) -> Iterator[tuple[str, str, bytes]]:
     """(name, title, PNG) of every picture for which the artifact has the numbers, in the order of reading."""
     yield (
         "parameters",
@@ -37,7 +36,7 @@ def draw_identification(data: ArtifactData, robot: Robot) -> Iterator[tuple[str,
         if f"runs/{run}/fit" in data.groups:
             yield f"fit-{run}", f"Run {run}: every segment simulated from its own start", draw_fit(data, run)
         if f"runs/{run}/free_run" in data.groups:
-            yield f"free-{run}", f"Run {run}: free run over the test segments", draw_free_run(data, run, robot)
+            yield f"free-{run}", f"Run {run}: free run over the test segments", draw_free_run(data, run)
     if "trace" in data.groups or "profiles" in data.groups:
         yield "search", "Loss of every start, and profile likelihood of the weakest", draw_search(data)
     if "history" in data.groups:

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WHITENESS = "correlation of neighbouring residuals; ! not white: something is not modelled, or the tracker drifts"
+_DARK = 0.6
+"""Correlations whose colour hides black signs."""
 _MARKS = ("_", "x", "+", "^", "v", "d", "s", "*")
 
 
@@ -61,7 +63,8 @@ def _whiteness(figure: Figure, axes: Axes, segments: Group) -> None:
     colors = colormaps["RdBu_r"].with_extremes(bad="#d5dae0")
     image: Any = axes.imshow(np.ma.masked_invalid(lag1), cmap=colors, vmin=-1, vmax=1, aspect="auto")
     for cap, segment in np.argwhere(~white & np.isfinite(lag1)).tolist():
-        axes.annotate("!", (segment, cap), ha="center", va="center", fontsize=8, weight="bold")
+        color = "white" if abs(lag1[cap, segment]) > _DARK else "black"
+        axes.annotate("!", (segment, cap), ha="center", va="center", fontsize=13, weight="bold", color=color)
     axes.set_yticks(range(len(lag1)), [f"cap {cap}" for cap in range(len(lag1))], fontsize=8)
     axes.set_xticks(range(lag1.shape[1]), segment_names(segments), fontsize=8)
     axes.set_title(_WHITENESS, fontsize=9)

@@ -10,7 +10,6 @@ import numpy as np
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.figure import legend_below, legend_beside, new_figure, png_bytes, rod_color
 from r2s2r_cli.views.identify_data import ROLE_COLORS, ROLE_WORDS, intervals_by_role
-from schemas.robot import Robot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,7 +39,7 @@ def draw_fit(data: ArtifactData, run: str) -> bytes:
     return png_bytes(figure)
 
 
-def draw_free_run(data: ArtifactData, run: str, robot: Robot) -> bytes:
+def draw_free_run(data: ArtifactData, run: str) -> bytes:
     """From above and over time: caps, middle of the caps, and how far the caps are off."""
     free = data.groups[f"runs/{run}/free_run"]
     figure = new_figure(16, 7.5)
@@ -68,7 +67,7 @@ def draw_free_run(data: ArtifactData, run: str, robot: Robot) -> bytes:
                 label=f"{_WORDS[name]}, mean {1e3 * np.nanmean(error):.1f} mm",
             )
     right.set(xlabel="time [s]", ylabel="end caps, rms of the frame [mm]", ylim=(0, None))
-    right.set_title(f"{robot.name}: one start at the first test frame, no other", fontsize=10)
+    right.set_title(f"run {run}: one start at the first test frame, no other", fontsize=10)
     legend_below(figure, [left, right], columns=3)
     return png_bytes(figure)
 

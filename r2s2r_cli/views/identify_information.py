@@ -16,19 +16,28 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WEAK, _STRONG = "#c1272d", "#2a7f3e"
-_WRAP = 46
+_WRAP = 58
+"""Characters of a line of words."""
+_LINE_IN = 0.135
+"""Height of such a line [inches]."""
 _NUMBERS_UP_TO = 16
 """A larger matrix has no room for its numbers."""
 
 
 def draw_information(data: ArtifactData) -> bytes:
     """Spectrum with words, directions as a heat map, and the correlations where there was a covariance."""
+    return png_bytes(information_figure(data))
+
+
+def information_figure(data: ArtifactData) -> Figure:
+    """The same, not yet drawn; its rows are as high as the longest words need."""
     info, names = data.groups["identifiability"], words(data.groups["parameters"], "name")
     covariance = data.groups.get("covariance")
-    size = max(len(names), len(info["eigenvalue"]))
-    figure = new_figure(17, 2.4 + 0.42 * size)
+    labels = [textwrap.wrap(text, _WRAP) or [""] for text in words(info, "words")]
+    row = max(0.42, _LINE_IN * max((len(lines) for lines in labels), default=1) + 0.08)
+    figure = new_figure(19, 2.4 + row * max(len(names), len(labels)))
     columns = figure.subplots(1, 2 if covariance is None else 3, squeeze=False)[0]
-    _spectrum(columns[0], info)
+    _spectrum(columns[0], info, ["\n".join(lines) for lines in labels])
     _matrix(figure, columns[1], info["eigenvector"], "directions (rows as left), share of each parameter")
     columns[1].set_xticks(range(len(names)), names, rotation=90, fontsize=8)
     columns[1].set_yticks([])
@@ -36,10 +45,10 @@ def draw_information(data: ArtifactData) -> bytes:
         _matrix(figure, columns[2], covariance["correlation"], "correlation of the estimates (grey: not identifiable)")
         columns[2].set_xticks(range(len(names)), names, rotation=90, fontsize=8)
         columns[2].set_yticks(range(len(names)), names, fontsize=8)
-    return png_bytes(figure)
+    return figure
 
 
-def _spectrum(axes: Axes, info: Group) -> None:
+def _spectrum(axes: Axes, info: Group, labels: list[str]) -> None:
     value, weak = info["eigenvalue"], info["weak"]
     threshold = float(info.attributes["threshold"])
     seen = shown_in_log(value)
@@ -52,7 +61,6 @@ def _spectrum(axes: Axes, info: Group) -> None:
     axes.axvline(threshold, color="black", lw=1, ls="--")
     axes.annotate("left: prior or range\nsays more than the runs", (threshold, 1.0), (-3, 2), ha="right", va="bottom",
                   xycoords=("data", "axes fraction"), textcoords="offset points", fontsize=7)  # fmt: skip
-    labels = ["\n".join(textwrap.wrap(text, _WRAP)) for text in words(info, "words")]
     axes.set_yticks(rows, labels, fontsize=7)
     axes.set_ylim(len(value) - 0.5, -0.5)
     axes.set_title("spectrum of the scaled normal matrix", fontsize=9, loc="right")

@@ -75,12 +75,16 @@ def _loss(axes: Axes, trace: Group) -> None:
             label=f"start {start}",
         )
     stages = np.array(words(trace, "stage"))[first]
-    for step in np.flatnonzero(stages[1:] != stages[:-1]) + 1:
+    for step in [0, *(np.flatnonzero(stages[1:] != stages[:-1]) + 1)]:
         axes.axvline(step - 0.5, color="gray", lw=0.7, ls=":")
-        axes.annotate(stages[step], (step - 0.5, 1.0), xycoords=("data", "axes fraction"), fontsize=7, rotation=90,
-                      va="top", ha="left")  # fmt: skip
+        axes.annotate(stages[step], (step - 0.5, 1.0), (2, 3), xycoords=("data", "axes fraction"), fontsize=7,
+                      textcoords="offset points", rotation=30, va="bottom", ha="left", annotation_clip=False)  # fmt: skip
+    axes.set_xlim(-0.5, None)
     axes.set_yscale("log")
-    axes.set(xlabel="accepted steps (dotted: a new stage of start 0, with other residuals)", ylabel="loss")
+    axes.set(
+        xlabel="accepted steps (dotted: a new stage of start 0; its loss has other residuals: compare within one)",
+        ylabel="loss",
+    )
     legend_beside(axes)
 
 

@@ -12,7 +12,7 @@ from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.identify import draw_identification
 from r2s2r_cli.views.identify_errors import floor_of
 from r2s2r_cli.views.identify_fits import cap_rmse
-from r2s2r_cli.views.identify_information import draw_information
+from r2s2r_cli.views.identify_information import draw_information, information_figure
 from r2s2r_cli.views.identify_page import identify_page, report_tables, verdict
 from r2s2r_cli.views.identify_self_test import self_test_tables
 from schemas.results_identify import Recovered, RecoveredCase, SelfTestReport
@@ -26,7 +26,7 @@ OPTIONAL = ("covariance", "identifiability", "trace", "starts", "profiles", "win
 @pytest.fixture(scope="module")
 def pictures() -> dict[str, tuple[str, bytes]]:
     """Every picture by name, with its title."""
-    drawn = draw_identification(builders.identification(), builders.robot())
+    drawn = draw_identification(builders.identification())
     return {name: (title, png) for name, title, png in drawn}
 
 
@@ -51,14 +51,14 @@ def test_every_part_is_drawn(pictures: dict[str, tuple[str, bytes]]) -> None:
 
 def test_what_is_not_there_is_not_drawn() -> None:
     """Only parameters and measures are required: the picture of the parameters is always there."""
-    assert [name for name, _, _ in draw_identification(without(*OPTIONAL), builders.robot())] == ["parameters"]
+    assert [name for name, _, _ in draw_identification(without(*OPTIONAL))] == ["parameters"]
 
 
 def test_a_trace_without_values_and_without_profiles_is_drawn() -> None:
     """Methods that keep no values along the way still show their loss."""
     data = without("profiles", *(path for path in OPTIONAL if path not in ("trace", "profiles")))
     bare = Group({k: v for k, v in data.groups["trace"].datasets.items() if k != "value"})
-    drawn = draw_identification(replace(data, groups={**data.groups, "trace": bare}), builders.robot())
+    drawn = draw_identification(replace(data, groups={**data.groups, "trace": bare}))
     assert [name for name, _, _ in drawn] == ["parameters", "search"]
 
 
@@ -112,7 +112,7 @@ def test_the_verdict_is_about_what_was_not_fitted() -> None:
 def test_an_endless_interval_does_not_hide_the_others() -> None:
     """A parameter that is off by a factor of a million leaves the picture drawable."""
     data = changed("parameters", "upper", np.array([0.82, 1e6, np.nan, np.nan]))
-    name, _, png = next(draw_identification(data, builders.robot()))
+    name, _, png = next(draw_identification(data))
     assert name == "parameters" and len(png) > 5000
 
 
@@ -120,6 +120,17 @@ def test_nothing_known_of_the_information_is_drawn() -> None:
     """A spectrum of zeros (no run says anything) has no logarithm, and is drawn."""
     data = changed("identifiability", "eigenvalue", np.zeros(4))
     assert draw_information(data) != draw_information(builders.identification())
+
+
+def test_long_words_do_not_run_into_each_other() -> None:
+    """Four parameters with long names in every direction: no label of the spectrum lies over its neighbour."""
+    long = " and ".join(["raising some_long_name.11 by 0.0123 N/m"] * 6).encode()
+    figure = information_figure(changed("identifiability", "words", np.array([long] * 4)))
+    figure.canvas.draw()
+    boxes = [label.get_window_extent() for label in figure.axes[0].get_yticklabels()]
+    boxes.sort(key=lambda box: box.y0)
+    assert len(boxes) == 4 and len(figure.axes[0].get_yticklabels()[0].get_text().splitlines()) >= 4
+    assert all(low.y1 <= high.y0 for low, high in zip(boxes, boxes[1:], strict=False))
 
 
 def test_the_error_of_a_frame_is_over_the_caps_that_are_seen() -> None:

@@ -97,8 +97,9 @@ def _with(free: Free, spec: Spec, text: str) -> Free:
         upper=free.upper if spec.upper is None else spec.upper,
         prior_sd=free.prior_sd if spec.prior_sd is None else spec.prior_sd,
     )
-    range_of = f"{made.lower:g} to {made.upper:g} {free.unit}"
-    possible = f"{free.lower:g} to {free.upper:g} {free.unit}"
+    unit = "" if free.unit == "1" else f" {free.unit}"
+    range_of = f"{made.lower:g} to {made.upper:g}{unit}"
+    possible = f"{free.lower:g} to {free.upper:g}{unit}"
     if not all(math.isfinite(value) for value in (made.start, made.lower, made.upper)):
         raise _contradiction(free, "a start or bound is no finite number", text, expected="finite numbers")
     if not made.lower < made.upper:

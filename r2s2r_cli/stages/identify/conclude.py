@@ -104,7 +104,7 @@ def doubts(judged: Judged) -> list[str]:
 def judged_by(task: Task, predictor: Predictor, values: np.ndarray) -> Judged:
     """Train and test intervals by command replay from their own causal starts: one judge for all methods."""
     return held_out(
-        task.robot, task.runs, task.request, predictor, values, task.recipe, task.settings, cache_dir=task.cache_dir,
+        task.robot, task.runs, task.request, predictor, values, task.recipe, cache_dir=task.cache_dir,
         progress=lambda done, total: task.progress(Step("held-out", done, total)),
     )  # fmt: skip
 

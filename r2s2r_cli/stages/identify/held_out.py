@@ -14,16 +14,16 @@ from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.fit import fit
 from r2s2r_cli.stages.identify.found import OURS, FreeRunFound, SegmentFound
 from r2s2r_cli.stages.identify.free import Mapping as FreeMapping, select
-from r2s2r_cli.stages.identify.judged import Replayed, replayed, steps_from
+from r2s2r_cli.stages.identify.judged import replayed, steps_from
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import PAPER_FREE, Recipe
+from r2s2r_cli.stages.identify.replays import free_runs_found, segments_found
 from r2s2r_cli.stages.identify.request import Request
-from r2s2r_cli.stages.identify.trust.whiteness import whiteness
 from r2s2r_cli.stages.measures.floor import Floor, floor_of
 from r2s2r_cli.stages.measures.keyframes import free_run
-from r2s2r_cli.stages.measures.steps import Step, chains
+from r2s2r_cli.stages.measures.replay import observed_run
+from r2s2r_cli.stages.measures.steps import chains
 from r2s2r_cli.stages.measures.table import Predicted, Row, baselines_of, judge
-from schemas.config import IdentifySettings
 from schemas.robot import Robot
 
 NOMINAL = "nominal"
@@ -55,7 +55,6 @@ def held_out(
     predictor: Predictor,
     values: np.ndarray,
     recipe: Recipe,
-    settings: IdentifySettings,
     *,
     cache_dir: Path | None,
     progress: Callable[[int, int], None],
@@ -78,14 +77,13 @@ def held_out(
         closed, said = closed_free_run(runs, ours_test.steps, predictor, values, recipe)
         warnings += said
         if closed:
-            observed = [np.concatenate([step.p_WE for step in chain]) for chain in chains(ours_test.steps)]
+            observed = [observed_run(chain)[1] for chain in chains(ours_test.steps)]
             loop = free_run(np.concatenate(observed), np.concatenate(closed))
     progress(ROUNDS, ROUNDS)
     return Judged(
-        train_segments=_segments(ours_train), train=train, test_segments=_segments(ours_test), test=test,
-        floor=_floor(runs, request), free_runs=_free_runs(ours_test, closed), closed_loop_m=loop,
-        p_RS=sites(predictor, values), rollouts=rollouts,
-        warnings=tuple(warnings),
+        train_segments=segments_found(ours_train), train=train, test_segments=segments_found(ours_test), test=test,
+        floor=_floor(runs, request), free_runs=free_runs_found(ours_test, closed), closed_loop_m=loop,
+        p_RS=sites(predictor, values), rollouts=rollouts, warnings=tuple(warnings),
     )  # fmt: skip
 
 
@@ -119,48 +117,12 @@ def _sides(request: Request) -> tuple[tuple[Selection, ...], tuple[Selection, ..
     return request.train, request.test
 
 
-def _segments(played: Replayed) -> tuple[SegmentFound, ...]:
-    """Each step with the whiteness of its residuals."""
-    if not played.steps:
-        return ()
-    caps = played.simulated[0].shape[1]
-    residual, series, t = [], [], []
-    for k, (step, path) in enumerate(zip(played.steps, played.simulated, strict=True)):
-        for cap in range(caps):
-            residual.append((path[1:, cap] - step.p_WE[1:, cap]) / np.maximum(step.noise[cap], 1e-4))
-            series.append(np.full(len(path) - 1, k * caps + cap))
-            t.append(step.t[1:])
-    tested = whiteness(np.concatenate(residual), np.concatenate(series), np.concatenate(t))
-    place = {int(number): k for k, number in enumerate(tested.series)}
-    found = []
-    for k, (step, path) in enumerate(zip(played.steps, played.simulated, strict=True)):
-        rows = [place.get(k * caps + cap) for cap in range(caps)]
-        lag1 = np.array([np.nan if row is None else tested.lag1[row] for row in rows])
-        white = np.array([True if row is None else bool(tested.white[row]) for row in rows])
-        found.append(SegmentFound(step, path, lag1, white))
-    return tuple(found)
-
-
 def _floor(runs: Sequence[RunData], request: Request) -> Floor | None:
     """From repeats among the training intervals; with too few of them, from all that the request names."""
     own = floor_of(steps_from(runs, request.train))
     if own is not None and own.interval is not None:
         return own
     return floor_of(steps_from(runs, (*request.train, *request.test))) or own
-
-
-def _free_runs(played: Replayed, closed: tuple[np.ndarray, ...]) -> tuple[FreeRunFound, ...]:
-    found = []
-    parts: Sequence[tuple[Step, ...]] = chains(played.steps)
-    for k, (chain, path) in enumerate(zip(parts, played.free, strict=True)):
-        found.append(
-            FreeRunFound(
-                run=chain[0].run, t=np.concatenate([step.t for step in chain]),
-                observed=np.concatenate([step.p_WE for step in chain]), simulated=path,
-                closed_loop=closed[k] if closed else None,
-            )
-        )  # fmt: skip
-    return tuple(found)
 
 
 def sites(predictor: Predictor, values: np.ndarray) -> np.ndarray:

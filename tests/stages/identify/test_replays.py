@@ -46,3 +46,24 @@ def test_chains_become_free_runs() -> None:
 def test_nothing_replayed_is_nothing() -> None:
     """Without test intervals there is nothing to write down."""
     assert segments_found(Replayed((), (), ())) == () == free_runs_found(Replayed((), (), ()))
+
+
+def test_the_frame_of_the_start_says_nothing_of_noise() -> None:
+    """An outlier there, which the filter saw, hides neither drift behind it nor makes noise look like drift."""
+    residual = 1e-3 * np.random.default_rng(5).normal(size=(FRAMES, CAPS, 3))
+    wrong = residual.copy()
+    wrong[0] = 1.0
+    one, other = (segments_found(Replayed((long(1),), (path,), ()))[0] for path in (residual, wrong))
+    np.testing.assert_array_equal(one.lag1, other.lag1)
+    assert one.white.all() and other.white.all()
+
+
+def test_a_step_of_one_frame_is_not_judged() -> None:
+    """Between two others: its caps count as white, without a number, and theirs stay their own."""
+    path = 1e-3 * np.random.default_rng(6).normal(size=(FRAMES, CAPS, 3))
+    path[:, 2] += 5e-3 * np.linspace(-1, 1, FRAMES)[:, None]
+    lone = replace(long(2), t=np.array([4.0]), p_WE=np.zeros((1, CAPS, 3)))
+    first, middle, last = segments_found(Replayed((long(1), lone, long(3)), (path, path[:1], path), ()))
+    assert np.isnan(middle.lag1).all() and middle.white.all()
+    for one in (first, last):
+        assert one.lag1[2] > 0.7 and not one.white[2] and one.white.sum() == CAPS - 1

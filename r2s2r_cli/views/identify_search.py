@@ -78,11 +78,11 @@ def _loss(axes: Axes, trace: Group) -> None:
     for step in [0, *(np.flatnonzero(stages[1:] != stages[:-1]) + 1)]:
         axes.axvline(step - 0.5, color="gray", lw=0.7, ls=":")
         axes.annotate(stages[step], (step - 0.5, 1.0), (2, 3), xycoords=("data", "axes fraction"), fontsize=7,
-                      textcoords="offset points", rotation=30, va="bottom", ha="left", annotation_clip=False)  # fmt: skip
+                      textcoords="offset points", rotation=30, va="bottom", ha="left")  # fmt: skip
     axes.set_xlim(-0.5, None)
     axes.set_yscale("log")
     axes.set(
-        xlabel="accepted steps (dotted: a new stage of start 0; its loss has other residuals: compare within one)",
+        xlabel="accepted steps (dotted: a new stage of start 0; losses compare within a stage)",
         ylabel="loss",
     )
     legend_beside(axes)

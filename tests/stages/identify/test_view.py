@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -130,7 +131,7 @@ def test_long_words_do_not_run_into_each_other() -> None:
     boxes = [label.get_window_extent() for label in figure.axes[0].get_yticklabels()]
     boxes.sort(key=lambda box: box.y0)
     assert len(boxes) == 4 and len(figure.axes[0].get_yticklabels()[0].get_text().splitlines()) >= 4
-    assert all(low.y1 <= high.y0 for low, high in zip(boxes, boxes[1:], strict=False))
+    assert all(low.y1 <= high.y0 for low, high in pairwise(boxes))
 
 
 def test_the_error_of_a_frame_is_over_the_caps_that_are_seen() -> None:

@@ -12,6 +12,7 @@ from r2s2r_cli.engine.batch import common_batch, tensors_of
 from r2s2r_cli.engine.errors import EngineInputError
 from r2s2r_cli.engine.flat import pack_parameters, pack_state, unpack_state
 from r2s2r_cli.engine.hooks import effective
+from r2s2r_cli.engine.link import Link
 from r2s2r_cli.engine.nonfinite import require_finite
 from r2s2r_cli.engine.parameters import Parameters, check_parameters
 from r2s2r_cli.engine.pid import LatchedPid, advance, start_progress, steps_a_tick, ticks
@@ -25,8 +26,8 @@ from r2s2r_cli.engine.structure import Structure
 class ClosedLoopRun:
     """One policy, executed. Frames of the trajectory are the control ticks, and the end.
 
-    u: motor commands (B, tick, actuated); index: number of the target at each tick, S where the policy is through,
-    (B, tick); done: latched, after the tick, (B, tick, actuated); length: of all cables as the controller read them
+    u: motor commands as sent, (B, tick, actuated); index: number of the target at each tick, S where the policy is
+    through, (B, tick); done: latched, after the tick, (B, tick, actuated); length: of all cables as the controller read them
     [m], (B, tick, cable); ticks: how many each environment needed, (B,); timed_out: targets given up, (B, S).
     """
 
@@ -54,11 +55,13 @@ def closed_loop(
     *,
     step: float = 1e-3,
     tail: float = 0.0,
+    link: Link | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> ClosedLoopRun:
     """Run a policy from state0 (frame G): targets (S, actuated) in positions, holds and timeouts (S,) [s].
 
     step: engine step [s], must divide the controller's period. tail: what is simulated after the last target [s].
+    link: delay of the commands, and those sent before the controller took over; None: neither.
     progress: called at every tick with the number of targets that all environments are through. Differentiable in
     everything but the decisions (`done`, the times of transitions). Environments that are through wait for the others,
     motors off.
@@ -68,7 +71,8 @@ def closed_loop(
     check_parameters(structure, theta)
     check_state(structure, state0)
     _check_policy(structure, targets, holds, timeouts)
-    batch = common_batch({**tensors_of(state0), **tensors_of(theta)})
+    linked = {} if link is None else link.tensors(state0.p_WB)
+    batch = common_batch({**tensors_of(state0), **tensors_of(theta), **linked})
     whole = steps_a_tick(pid.period, step)
     n = simulator.substeps(theta, state0, step)
     h, count = step / n, whole * n
@@ -83,8 +87,11 @@ def closed_loop(
     given_up = torch.zeros(batch, len(targets), dtype=torch.bool, device=s.device)
     needed = torch.zeros(batch, dtype=torch.long, device=s.device)
     frames, us, indices, dones, lengths = [s], list[Tensor](), list[Tensor](), list[Tensor](), list[Tensor]()
+    arrived = list[Tensor]()
+    line = None if link is None else link.line(batch, s[:, : structure.n_actuated], pid.period, whole)
+    most += 0 if line is None else int(line.lead.max())
     after = 0
-    for _ in range(most):
+    for tick in range(most):
         state = unpack_state(structure, s)
         length = cap_lengths(pid.cable_caps, end_caps(wide, state))
         for effect in structure.effects:
@@ -92,15 +99,27 @@ def closed_loop(
         running = ~at.finished(len(targets))
         u, memory = pid.tick(memory, length, at.target(targets))
         u = torch.where(running[:, None], u, torch.zeros_like(u))
+        before, (at, moved) = at, advance(at, memory.done, hold_ticks, timeout_ticks)
+        changed = moved.changed
+        if line is not None and bool((tick < line.lead).any()):
+            # The controller has not taken over yet: it starts afresh at the next tick.
+            early = tick < line.lead
+            u = torch.where(early[:, None], line.given(tick), u)
+            at, moved = at.held_back(before, early), moved.held_back(early)
+            running, changed = running & ~early, moved.changed | early
         us.append(u)
-        indices.append(at.index)
+        indices.append(before.index)
         dones.append(memory.done)
         lengths.append(length)
-        before, (at, moved) = at, advance(at, memory.done, hold_ticks, timeout_ticks)
         given_up[moved.timed_out, before.index[moved.timed_out]] = True
-        memory = memory.restarted(moved.changed)
+        memory = memory.restarted(changed)
         needed = needed + running.long()
-        s = simulator.advance(s, u[:, None], p, h=h, hold=count, every=count)[:, -1]
+        if line is None:
+            s = simulator.advance(s, u[:, None], p, h=h, hold=count, every=count)[:, -1]
+        else:
+            rows, line = line.pushed(u)
+            s = simulator.advance(s, rows, p, h=h, hold=n, every=count)[:, -1]
+            arrived.append(rows)
         frames.append(s)
         if not bool(torch.isfinite(s.detach()).all()):
             break  # named below; a number that is none never reaches a target
@@ -111,8 +130,8 @@ def closed_loop(
             if after > tail_ticks:
                 break
     flat, commands = torch.stack(frames, dim=1), torch.stack(us, dim=1)
-    plain = (flat.detach(), commands.detach(), p.detach())
-    require_finite(structure, simulator.kernels.fn, *plain, h=h, hold=count, every=count)
+    plain = (flat.detach(), (torch.cat(arrived, dim=1) if arrived else commands).detach(), p.detach())
+    require_finite(structure, simulator.kernels.fn, *plain, h=h, hold=n if arrived else count, every=count)
     t = torch.arange(flat.shape[1], dtype=flat.dtype, device=flat.device) * pid.period
     trajectory = Trajectory(structure, theta, t, unpack_state(structure, flat), step, n)
     return ClosedLoopRun(

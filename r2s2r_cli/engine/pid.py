@@ -116,6 +116,13 @@ class Progress:
         """The present target of each environment, (B, actuated), of `targets` (S, actuated); after the end the last."""
         return targets[self.index.clamp(max=len(targets) - 1)]
 
+    def held_back(self, before: Progress, where: Tensor) -> Progress:
+        """As it was before in the environments `where` (B,), bool."""
+        return Progress(
+            torch.where(where, before.index, self.index), torch.where(where, before.elapsed, self.elapsed),
+            torch.where(where, before.held, self.held),
+        )  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Transition:
@@ -123,6 +130,10 @@ class Transition:
 
     changed: Tensor
     timed_out: Tensor
+
+    def held_back(self, where: Tensor) -> Transition:
+        """Without those of the environments `where` (B,), bool."""
+        return Transition(self.changed & ~where, self.timed_out & ~where)
 
 
 def start_progress(batch: int, device: torch.device | None = None) -> Progress:

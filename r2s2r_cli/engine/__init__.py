@@ -16,8 +16,8 @@ from r2s2r_cli.engine.flat import (
 )
 from r2s2r_cli.engine.ground import Ground as Ground, tilted as tilted
 from r2s2r_cli.engine.hooks import Channel as Channel, Hooks as Hooks
-from r2s2r_cli.engine.parameters import Parameters as Parameters, check_parameters as check_parameters
 from r2s2r_cli.engine.link import Link as Link
+from r2s2r_cli.engine.parameters import Parameters as Parameters, check_parameters as check_parameters
 from r2s2r_cli.engine.pid import LatchedPid as LatchedPid
 from r2s2r_cli.engine.reading import (
     Reading as Reading,

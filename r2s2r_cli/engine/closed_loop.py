@@ -27,8 +27,8 @@ class ClosedLoopRun:
     """One policy, executed. Frames of the trajectory are the control ticks, and the end.
 
     u: motor commands as sent, (B, tick, actuated); index: number of the target at each tick, S where the policy is
-    through, (B, tick); done: latched, after the tick, (B, tick, actuated); length: of all cables as the controller read them
-    [m], (B, tick, cable); ticks: how many each environment needed, (B,); timed_out: targets given up, (B, S).
+    through, (B, tick); done: latched, after the tick, (B, tick, actuated); length: of all cables as the controller
+    read them [m], (B, tick, cable); ticks: how many each environment needed, (B,); timed_out: targets given up, (B, S).
     """
 
     trajectory: Trajectory

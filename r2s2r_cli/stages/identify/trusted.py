@@ -17,6 +17,7 @@ from r2s2r_cli.stages.identify.trust.covariance import Covariance, covariance
 from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, Trust, identifiability
 from r2s2r_cli.stages.identify.trust.profile import profile
 from r2s2r_cli.stages.identify.trust.redraw import redraw_linear, spans
+from r2s2r_cli.stages.identify.trust.worth import worth
 
 LINEAR_DRAWS = 1000
 
@@ -47,8 +48,9 @@ def sureness(fitted: Fit, others: np.ndarray, *, loss: str, seed: int) -> Surene
         values, np.array([f.lower for f in frees]), np.array([f.upper for f in frees]), problem.names
     )
     found = []
+    judged = worth(after, spread, frees)
     for k, free in enumerate(frees):
-        trust, reason = after.trust[k], after.reason[k]
+        trust, reason = judged[k]
         if free.name in problem.held:
             trust, reason = Trust.NOT_IDENTIFIABLE, "the training intervals do not show it: held at its start"
         elif trust is not Trust.NOT_IDENTIFIABLE and free.name in bound and values[k] != free.start:

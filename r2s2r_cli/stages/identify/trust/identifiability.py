@@ -24,7 +24,7 @@ from r2s2r_cli.stages.identify.trust.information import (
     widths,
 )
 from r2s2r_cli.stages.identify.trust.refuse import NOTHING, refuse_bounds, refuse_hopeless
-from r2s2r_cli.stages.identify.trust.words import amount, direction
+from r2s2r_cli.stages.identify.trust.words import direction, shrunk
 
 IDENTIFIED = 0.5
 """Data know a parameter to this share of its width: the posterior is at most 0.45 times as wide as the prior."""
@@ -146,7 +146,7 @@ def identifiability(
     sd_z[dead] = np.inf
     words = tuple(_words(frees, z0[:p], width, rows[k], eigenvalue[k]) for k in range(p))
     weak = eigenvalue < THRESHOLD
-    trust = tuple(_trust(sd) for sd in sd_z)
+    trust = tuple(trust_of(share) for share in left_of(sd_z).tolist())
     reason = tuple(_reason(i, frees, z0, width, sd_z, dead, stalled | rough) for i in range(p))
     return Identifiability(
         problem.names, z0[:p], width, column_norm, secant_norm, scaled, eigenvalue, rows, weak, words,
@@ -188,10 +188,20 @@ def _words(frees: Sequence[Free], z: np.ndarray, width: np.ndarray, row: np.ndar
     return direction(frees, z, step * width, np.abs(step), seen, weak=bool(eigenvalue < THRESHOLD))
 
 
-def _trust(sd: float) -> Trust:
-    if sd <= IDENTIFIED:
+def left_of(sd: np.ndarray) -> np.ndarray:
+    """Share of each width that is left by data that know a parameter to sd (p,), in widths."""
+    with np.errstate(invalid="ignore"):
+        share = sd / np.hypot(1.0, sd)
+    found: np.ndarray = np.where(np.isfinite(sd), share, 1.0)
+    return found
+
+
+def trust_of(share: float) -> Trust:
+    """The label of a parameter of whose width this share is left."""
+    identified, weak = left_of(np.array([IDENTIFIED, WEAK])).tolist()
+    if share <= identified:
         return Trust.IDENTIFIED
-    return Trust.WEAK if sd <= WEAK else Trust.NOT_IDENTIFIABLE
+    return Trust.WEAK if share <= weak else Trust.NOT_IDENTIFIABLE
 
 
 def _reason(
@@ -205,10 +215,5 @@ def _reason(
 ) -> str:  # fmt: skip
     if dead[i]:
         return "no compared frame depends on it"
-    possible = amount(frees[i], float(z[i]), float(width[i]))
-    if not np.isfinite(sd[i]):
-        return f"the data say nothing about it; prior and bounds: {possible}"
-    found = (
-        f"the data give it to {amount(frees[i], float(z[i]), float(sd[i] * width[i]))}, prior and bounds to {possible}"
-    )
+    found = shrunk(frees[i], float(width[i]), float(left_of(sd)[i]))
     return found + (" (by a finite change: the derivative here is that of a kink)" if finite[i] else "")

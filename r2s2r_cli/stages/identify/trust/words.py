@@ -23,6 +23,13 @@ def amount(free: Free, z: float, dz: float) -> str:
     return f"{change:.2g}" + ("" if free.unit == "1" else f" {free.unit}")
 
 
+def shrunk(free: Free, width: float, share: float) -> str:
+    """What the runs made of what was thought possible. width: of prior and bounds, in z; share: of it that is left."""
+    possible = amount(free, free.to_z(free.start), width)
+    left = "all of it" if share >= 0.995 else f"{share:.2g} of it"
+    return f"prior and bounds allow {possible}, the runs leave {left}"
+
+
 def direction(
     frees: Sequence[Free], z: np.ndarray, dz: np.ndarray, size: np.ndarray, seen: float, *, weak: bool
 ) -> str:

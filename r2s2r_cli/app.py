@@ -16,7 +16,7 @@ from typer.core import TyperGroup
 from r2s2r_cli import __version__
 from r2s2r_cli.commands import COMMANDS, GROUPS
 from r2s2r_cli.console import PipeClosed, print_error
-from r2s2r_cli.errors import DamageWarning, ExitCode, GateError, InputError, R2S2RError, UsageError
+from r2s2r_cli.errors import DamageWarning, ExitCode, GateError, InputError, Interrupted, R2S2RError, UsageError
 
 BUG_MESSAGE = "this is a bug in r2s2r, please report it with the lines above"
 
@@ -72,6 +72,9 @@ def _run_guarded(call: Callable[[], object], as_json: bool) -> int:
             raise KeyboardInterrupt
         sys.stdout.flush()
         return code
+    except Interrupted as error:
+        print(f"interrupted: {error.what}\nhint: {error.hint}", file=sys.stderr)
+        return error.exit_code
     except R2S2RError as error:
         # A gate is judged on a result that was printed: stdout holds its document already.
         print_error(error, as_json=as_json and not isinstance(error, GateError))

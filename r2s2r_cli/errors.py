@@ -81,6 +81,12 @@ class InputError(R2S2RError):
     exit_code = ExitCode.INPUT
 
 
+class Interrupted(R2S2RError):
+    """Ctrl-C during long work of which something is kept: what, and the command that goes on."""
+
+    exit_code = ExitCode.INTERRUPTED
+
+
 class ArtifactError(InputError):
     """An artifact or the project is missing, damaged, or of another kind or version."""
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shlex
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import UsageError
+from r2s2r_cli.errors import Interrupted, UsageError
 from r2s2r_cli.options import (
     DrawOption,
     DryRunOption,
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from r2s2r_cli.artifact import ArtifactData
+    from r2s2r_cli.commands.identify_inputs import Asked
     from schemas.results import StageResult
     from schemas.results_identify import IdentifyReport, IdentifyResult
 
@@ -105,11 +108,9 @@ def identify(
 
     Example: r2s2r identify --train crawl:1-7 --test crawl:8-11
     """
+    from r2s2r_cli.commands.identify_hints import typed_options, whole_hints
     from r2s2r_cli.commands.identify_inputs import Asked
-    from r2s2r_cli.commands.identify_run import compute, plant
-    from r2s2r_cli.commands.stage import StageRun, print_config, show_outcome, wanted
-    from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_key, checkpoint_of
-    from schemas.results_identify import IdentifyReport
+    from r2s2r_cli.commands.stage import print_config, wanted
 
     console = Console(json=json, quiet=quiet)
     here = Project.find(project)
@@ -120,33 +121,81 @@ def identify(
     if show_config:
         print_config("identify", wanted(here, place, "identify", overrides, {}).settings, console)
         return
-    _require_one_of(method, METHODS, "--method")
-    _require_one_of(drive, tuple(DRIVES), "--drive")
+    typed = typed_options(
+        train=train, test=test, free=free, fix=fix, with_effect=with_effect,
+        method=None if method == "default" else method, drive=None if drive == "replay" else drive,
+        online=online, also=also, self_test=self_test, starts=starts, seed=seed or None, project=project, iteration=iteration, set_=set_, no_draw=not draw,
+    )  # fmt: skip
     asked = Asked(
         here, place, train=tuple(train or ()), test=tuple(test or ()), free=tuple(free or ()), fix=tuple(fix or ()),
-        effects=tuple(with_effect or ()), method=method, drive=DRIVES[drive],  # type: ignore[arg-type]
-        online=online, also=tuple(also or ()), seed=seed,
+        effects=tuple(with_effect or ()), method=method, drive=DRIVES.get(drive, drive),  # type: ignore[arg-type]
+        online=online, also=tuple(also or ()), seed=seed, typed=tuple(typed),
     )  # fmt: skip
-    settings = here.config(place, overrides).identify
-    if self_test:
+    with whole_hints(typed, asked.artifacts):
+        _require_one_of(method, METHODS, "--method")
+        _require_one_of(drive, tuple(DRIVES), "--drive")
+        if self_test:
+            _plant(asked, overrides, console, dry_run)
+        else:
+            _fit(asked, overrides, console, _Ways(resume=resume, draw=draw, dry_run=dry_run, force=force))
+
+
+@dataclass(frozen=True)
+class _Ways:
+    """How the command goes about it."""
+
+    resume: bool
+    draw: bool
+    dry_run: bool
+    force: bool
+
+
+def _plant(asked: Asked, overrides: dict[str, Any], console: Console, dry_run: bool) -> None:
+    from r2s2r_cli.commands.identify_run import plant
+
+    settings = asked.project.config(asked.iteration, overrides).identify
+    if dry_run:
+        asked.check(settings)
+        console.say("would plant and fit, and write nothing")
+    else:
         plant(asked, settings, console)
-        return
+
+
+def _fit(asked: Asked, overrides: dict[str, Any], console: Console, how: _Ways) -> None:
+    from r2s2r_cli.commands.identify_run import compute
+    from r2s2r_cli.commands.stage import StageRun, show_outcome
+    from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_key, checkpoint_of
+    from schemas.results_identify import IdentifyReport
+
+    here, place = asked.project, asked.iteration
+    settings = here.config(place, overrides).identify
     unfinished = checkpoint_of(here.artifact("identification", place))
+    resume = how.resume
     if resume and not unfinished.exists():
         console.say("nothing was interrupted: there is no checkpoint to go on from")
     run = StageRun(
         stage="identify", kind="identification", project=here, iteration=place, find_inputs=asked.refs,
-        report_model=IdentifyReport, overrides=overrides, flags=asked.flags(), dry_run=dry_run,
-        force=force or (resume and unfinished.exists()),
+        report_model=IdentifyReport, overrides=overrides, flags=asked.flags(), dry_run=how.dry_run,
+        force=how.force or (resume and unfinished.exists()),
     )  # fmt: skip
+    if how.dry_run:
+        asked.check(settings)
     digests = [ref.sha256 for ref in run.inputs]
     key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
     checkpoint = CheckpointFile(unfinished, key, resume)
-    result, report = run.run(
-        lambda: compute(asked, settings, checkpoint, console),
-        _draw if draw else None,
-        lambda said: checkpoint.clear(),
-    )
+    try:
+        result, report = run.run(
+            lambda: compute(asked, settings, checkpoint, console),
+            _draw if how.draw else None,
+            lambda said: checkpoint.clear(),
+        )
+    except KeyboardInterrupt:
+        if not checkpoint.kept():
+            raise
+        raise Interrupted(
+            f"what was fitted so far is kept in {here.relative(unfinished)}, nothing else was written",
+            hint=shlex.join(["r2s2r", "identify", *asked.typed, "--resume"]),
+        ) from None
     show_outcome(_answer(result, report), console)
     if report is not None:
         _show(report, console)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.commands.stage import require_input
@@ -16,6 +17,7 @@ from schemas.header import InputRef
 if TYPE_CHECKING:
     from r2s2r_cli.stages.identify.data import RunData
     from r2s2r_cli.stages.identify.request import Drive, Method, Request
+    from schemas.config import IdentifySettings
 
 _KINDS = ("recording", "estimate")
 
@@ -36,6 +38,8 @@ class Asked:
     online: bool = False
     also: tuple[int, ...] = ()
     seed: int = 0
+    typed: tuple[str, ...] = ()
+    """The options as given."""
 
     def flags(self) -> dict[str, Any]:
         """What else than settings and inputs decides the result, for the provenance."""
@@ -73,7 +77,7 @@ class Asked:
         from r2s2r_cli.store.header import whole_header
         from r2s2r_cli.store.staleness import artifact_ref
 
-        paths = [place.artifact(kind) for place in self.sources for kind in _KINDS]
+        paths = self.artifacts()
         if self.last is not None:
             paths.append(self.last.artifact("identification"))
         return [artifact_ref(self.project, path, whole_header(path)) for path in paths]
@@ -89,6 +93,23 @@ class Asked:
             prefix = "" if place == self.sources[0] else f"{place.number:03d}-"
             found += [run_data(recording, estimate, run, name=prefix + run) for run in estimate.runs()]
         return found
+
+    def artifacts(self) -> list[Path]:
+        """Recordings and estimates that are read, those of the main iteration first."""
+        return [place.artifact(kind) for place in self.sources for kind in _KINDS]
+
+    def check(self, settings: IdentifySettings) -> None:
+        """Find what is wrong with the request before any work: names, bounds, intervals, runs, what goes together.
+
+        Raises UsageError, InputError or ArtifactError, as the fit would.
+        """
+        from r2s2r_cli.stages.identify.free import Mapping
+        from r2s2r_cli.stages.identify.task import free_parameters, require_combination
+
+        robot, runs = self.project.robot(), self.runs()
+        request = self.request(runs, settings.train_share)
+        require_combination(request)
+        Mapping(robot, free_parameters(robot, runs, request, settings), request.effects, fixed=request.fixed)
 
     def request(self, runs: Sequence[RunData], train_share: float) -> Request:
         """The request, its intervals resolved. Raises UsageError for runs and intervals that do not exist."""

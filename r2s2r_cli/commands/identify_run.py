@@ -22,21 +22,16 @@ if TYPE_CHECKING:
 def compute(
     asked: Asked, settings: IdentifySettings, checkpoint: CheckpointFile, console: Console
 ) -> tuple[ArtifactData, IdentifyReport]:
-    """Fit; the report knows how long each part took. An interrupt says how to go on."""
+    """Fit; the report knows how long each part took. What is asked for is checked before anything heavy is loaded."""
     runs = asked.runs()
     request = asked.request(runs, settings.train_share)
     (stage,) = whole_items(_loaded())
     clock = Clock()
-    try:
-        with _shown(console, clock) as progress:
-            data, report = stage.identify(
-                asked.project.robot(), runs, request, settings, cache_dir=asked.project.cache, progress=progress,
-                checkpoint=checkpoint,
-            )  # fmt: skip
-    except KeyboardInterrupt:
-        if checkpoint.path.exists():
-            console.hint("the same command with --resume goes on from here")
-        raise
+    with _shown(console, clock) as progress:
+        data, report = stage.identify(
+            asked.project.robot(), runs, request, settings, cache_dir=asked.project.cache, progress=progress,
+            checkpoint=checkpoint,
+        )  # fmt: skip
     return data, report.model_copy(update={"wall_s": clock.total(), "seconds": clock.seconds()})
 
 

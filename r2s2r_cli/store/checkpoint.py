@@ -43,6 +43,13 @@ class CheckpointFile:
                              hint="run the command without --resume")  # fmt: skip
         return values
 
+    def kept(self) -> bool:
+        """Whether work of this very request lies there, with which --resume goes on."""
+        try:
+            return bool(json.loads(self.path.read_text("utf-8"))["key"] == self.key)
+        except (OSError, ValueError, KeyError, TypeError):
+            return False
+
     def save(self, values: Mapping[str, Any]) -> None:
         """Replace what was saved, whole or not at all; floats come back bit by bit. Raises ArtifactError."""
         write_text(self.path, json.dumps({"form": _FORM, "key": self.key, "values": dict(values)}))

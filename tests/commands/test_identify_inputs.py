@@ -12,9 +12,10 @@ import pytest
 import typer
 
 from r2s2r_cli.commands.identify import _answer, identify
+from r2s2r_cli.commands.identify_hints import completed, located, typed_options
 from r2s2r_cli.commands.identify_inputs import Asked, parse_fixed
 from r2s2r_cli.commands.identify_run import Clock
-from r2s2r_cli.errors import UsageError
+from r2s2r_cli.errors import R2S2RError, UsageError
 from r2s2r_cli.store.again import command_again
 from r2s2r_cli.store.project import Project
 from schemas.results import StageResult
@@ -132,6 +133,96 @@ def test_intervals_are_resolved(estimated: Path) -> None:
     request = found.request(found.runs(), 0.65)
     assert [one.intervals for one in request.train] == [(1, 2)]
     assert request.test[0].intervals[0] == 3
+
+
+def test_a_dry_run_checks_what_is_asked_for(estimated: Path) -> None:
+    """Names, runs, intervals and what goes together: the same refusal and code as that of the fit."""
+    for typed, expected in {
+        "--free frictoin": "--free friction",
+        "--fix frictoin=1 --free mass": "--free mass --fix friction=0.5",
+        "--with-effect motor_leg": "--with-effect motor_lag",
+        "--train sampel:1-2 --seed 3": "--seed 3 --train sample:1-2",
+        "--method cma --drive closed-loop": "--drive closed-loop   #",
+        "--self-test --free frictoin": "--self-test --free friction",
+    }.items():
+        result = invoke("identify", *typed.split(), "--dry-run")
+        assert result.exit_code == 2, (typed, result.stderr)
+        assert result.stderr.splitlines()[-1].startswith(f"hint: r2s2r identify {expected}"), (typed, result.stderr)
+    assert invoke("identify", "--free", "friction=2,3..1", "--dry-run").exit_code == 4
+    assert invoke("identify", "--test", "sample:99", "--dry-run").exit_code == 2
+
+
+def refusal(hint: str, where: str = "--free", received: str = "") -> R2S2RError:
+    """An error with that hint."""
+    return UsageError("what", where=where, received=received, hint=hint)
+
+
+@pytest.mark.parametrize(
+    ("typed", "error", "expected"),
+    [
+        ("--train a:1-7 --free mass", refusal("r2s2r identify --fix mass=1"), "--train a:1-7 --fix mass=1"),
+        ("--train a:1-7 --train b", refusal("--train a:1-3"), "--train b --train a:1-3"),
+        ("--free f=3,0..1 --free g", refusal("r2s2r identify --free f=0.5,0..1"), "--free g --free f=0.5,0..1"),
+        ("--free=motor_sped", refusal("r2s2r identify --free motor_speed", received="motor_sped"),
+         "--free motor_speed"),
+        ("--method cma --drive closed-loop --seed 1",
+         refusal("r2s2r identify --drive closed-loop   # so", where="--method cma --drive closed-loop"),
+         "--seed 1 --drive closed-loop   # so"),
+        ("--method papier --online", refusal("r2s2r identify --method paper"), "--online --method paper"),
+        ("--set identify.start=3", refusal("--set identify.starts=3", received="identify.start"),
+         "--set identify.starts=3"),
+    ],
+)  # fmt: skip
+def test_a_hint_keeps_what_was_asked_for(typed: str, error: R2S2RError, expected: str) -> None:
+    """The wrong option is replaced, the others stay, and the whole can be pasted."""
+    assert completed(error, shlex.split(typed)) == f"r2s2r identify {expected}"
+
+
+def test_a_hint_about_something_else_stays() -> None:
+    """Other commands are left alone; an artifact gets the way to it, once."""
+    assert completed(refusal("r2s2r estimate"), ["--train", "a"]) == "r2s2r estimate"
+    path = Path("iterations/002/20-estimate.h5")
+    shown = "r2s2r inspect iterations/002/20-estimate.h5   # frames"
+    assert located("r2s2r inspect 20-estimate.h5   # frames", [path.absolute()]) == located(shown, [path]) == shown
+
+
+def test_options_as_words() -> None:
+    """Lists repeat, flags stand alone, what was not given is left out."""
+    words = typed_options(train=["a:1", "b"], free=None, online=True, no_draw=False, seed=3, set_=["identify.starts=1"])
+    assert words == ["--train", "a:1", "--train", "b", "--online", "--seed", "3", "--set", "identify.starts=1"]
+
+
+def test_a_run_without_motion_is_looked_at_where_it_lies(estimated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The file that the hint names exists, seen from where the command was given."""
+    import r2s2r_cli.stages.identify.load as load
+
+    monkeypatch.setattr(load, "STILL", 1e9)
+    monkeypatch.chdir(estimated / "iterations")
+    result = invoke("identify")
+    assert result.exit_code == 4 and "nothing moves" in result.stderr
+    path = result.stderr.splitlines()[-1].split()[3]
+    assert path == "001/20-estimate.h5" and Path(path).is_file()
+
+
+def test_an_interrupt_is_one_statement(estimated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a checkpoint of this request: what is kept, and the command that goes on; without one: run it again."""
+    saves = [True, False]
+
+    def stopped(asked: Asked, settings: Any, checkpoint: Any, console: Any) -> None:
+        if saves.pop(0):
+            checkpoint.save({"round": 1})
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("r2s2r_cli.commands.identify_run.compute", stopped)
+    result = invoke("identify", "--train", "sample:1-2", "--seed", "4", "--no-draw")
+    assert result.exit_code == 130
+    assert result.stderr.splitlines() == [
+        "interrupted: what was fitted so far is kept in iterations/001/30-identify.partial, nothing else was written",
+        "hint: r2s2r identify --train sample:1-2 --seed 4 --no-draw --resume",
+    ]
+    result = invoke("identify", "--train", "sample:1-3")  # another request: that checkpoint is not its own
+    assert result.stderr == "interrupted: nothing is half-written; run the command again\n"
+    assert result.exit_code == 130
 
 
 def test_fixed_values_are_numbers() -> None:

@@ -1,0 +1,100 @@
+"""Hints of `identify` as whole commands: what was asked for stays, what was wrong goes, files have their path."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from r2s2r_cli.errors import R2S2RError
+
+FLAGS = ("--online", "--self-test", "--resume", "--json", "--quiet", "--no-draw", "--dry-run", "--force", "--draw")
+"""Options without a value."""
+SINGLE = ("--method", "--drive", "--seed", "--starts", "--iteration", "--project")
+"""Options that are given once."""
+_COMMAND = "r2s2r identify"
+Option = tuple[str, str | None]
+
+
+@contextmanager
+def whole_hints(typed: Sequence[str], artifacts: Callable[[], Sequence[Path]]) -> Iterator[None]:
+    """An error on the way leaves with a hint that can be pasted. typed: options as given; artifacts: what is read."""
+    try:
+        yield
+    except R2S2RError as error:
+        error.hint = completed(error, typed)
+        with suppress(R2S2RError):
+            error.hint = located(error.hint, artifacts())
+        raise
+
+
+def typed_options(**given: object) -> list[str]:
+    """Options as words, of the values that the command received by name; what is not given or false is left out."""
+    words: list[str] = []
+    for name, value in given.items():
+        option = f"--{name.strip('_').replace('_', '-')}"
+        if value is True:
+            words.append(option)
+        elif value is not None and value is not False:
+            words += [word for one in (value if isinstance(value, list) else [value]) for word in (option, str(one))]
+    return words
+
+
+def completed(error: R2S2RError, typed: Sequence[str]) -> str:
+    """The hint with the other options of the command line, where it is about options of `identify`.
+
+    An option of the hint takes the place of the one that was wrong: of the same name, run or parameter, of the value
+    that the error received, or of a choice that the error names as its place. A parameter that it fixes is not free.
+    """
+    command, gap, remark = error.hint.partition("   #")
+    if command.startswith(_COMMAND):
+        command = command[len(_COMMAND) :]
+    elif not command.startswith("--"):
+        return error.hint
+    new = options_of(shlex.split(command))
+    kept = [one for one in options_of(typed) if not any(_replaces(other, one, error) for other in new)]
+    kept = [one for one in kept if not (one[0] in SINGLE and one[0] in error.where)]
+    words = [word for name, value in (*kept, *new) for word in ((name,) if value is None else (name, value))]
+    return f"{_COMMAND} {shlex.join(words)}".rstrip() + gap + remark
+
+
+def options_of(words: Sequence[str]) -> list[Option]:
+    """(name, value) of each option, None for the value of a flag; `--name=value` as well."""
+    found: list[Option] = []
+    rest = list(words)
+    while rest:
+        name, equals, value = rest.pop(0).partition("=")
+        if not name.startswith("--"):
+            continue
+        if equals:
+            found.append((name, value))
+        else:
+            found.append((name, rest.pop(0) if rest and name not in FLAGS else None))
+    return found
+
+
+def located(hint: str, artifacts: Sequence[Path]) -> str:
+    """The hint with the way from here to each artifact that it calls by its bare name; the first of that name."""
+    for path in artifacts:
+        here = shlex.quote(os.path.relpath(path))
+        hint = re.sub(rf"(?<![\w/.-]){re.escape(path.name)}\b", lambda _, here=here: here, hint)  # type: ignore[misc]
+    return hint
+
+
+def _replaces(new: Option, old: Option, error: R2S2RError) -> bool:
+    name, value = old
+    if new[0] == "--fix" and name == "--free":
+        return _about(new[1]) == _about(value)
+    if new[0] != name:
+        return False
+    if name in SINGLE or name in FLAGS:
+        return True
+    return _about(new[1]) == _about(value) or error.received in (value, _about(value))
+
+
+def _about(value: str | None) -> str:
+    """The run, parameter or setting that a value is about."""
+    return re.split("[:=,]", value or "", maxsplit=1)[0]

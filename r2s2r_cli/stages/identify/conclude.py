@@ -78,7 +78,7 @@ def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:
         free_runs=judged.free_runs, closed_loop_m=judged.closed_loop_m,
         covariance=widened(sure.spread.covariance, len(fixed)), information=made.before, trace=made.trace,
         starts=made.starts, profiles=profiles, windows=start_shifts(fit), updates=made.updates, p_RS=judged.p_RS,
-        uncertainty=sure.spread.how, computed_by_torch=not predictor.native, warnings=(*warnings, *judged.warnings),
+        uncertainty=sure.spread.how, natures=task.natures, computed_by_torch=not predictor.native, warnings=(*warnings, *judged.warnings),
     )  # fmt: skip
 
 
@@ -95,8 +95,8 @@ def doubts(judged: Judged) -> list[str]:
     idle = None if still is None else still.free_m
     if judged.closed_loop_m is not None and idle is not None and judged.closed_loop_m > idle:
         found.append(
-            "with the controller in the loop the free run is worse than 'nothing moves': delays and sensors are not in "
-            "that loop, so it drifts out of step with the robot"
+            "with the controller in the loop the free run is worse than 'nothing moves': it drifts out of step with "
+            "the robot"
         )
     return found
 

@@ -74,7 +74,7 @@ def held_out(
     loop = None
     closed: tuple[np.ndarray, ...] = ()
     if ours_test.steps:
-        closed, said = closed_free_run(runs, ours_test.steps, predictor, values, recipe)
+        closed, said = closed_free_run(runs, ours_test.steps, predictor, values, recipe, request.train)
         warnings += said
         if closed:
             observed = [observed_run(chain)[1] for chain in chains(ours_test.steps)]

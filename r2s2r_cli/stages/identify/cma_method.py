@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from r2s2r_cli.stages.identify.conclude import Fitted, concluded, known_before, start_found
-from r2s2r_cli.stages.identify.default_method import first_fit, loss_words
+from r2s2r_cli.stages.identify.conclude import Fitted, concluded, start_found
+from r2s2r_cli.stages.identify.default_method import first_fit, holding, loss_words
 from r2s2r_cli.stages.identify.fit import START_SPREAD, Fit
 from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep
 from r2s2r_cli.stages.identify.free.base import values_of
+from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.solve.cma_es import Sampled, cma_es
 from r2s2r_cli.stages.identify.solve.levenberg import levenberg_marquardt
@@ -26,31 +29,41 @@ def find_cma(task: Task) -> Found:
     """The default fit; CMA-ES from robot.toml's values as wide as their priors, at the start states of that fit; the
     better of the two, CMA-ES's finished by Levenberg-Marquardt. Raises as `identify`."""
     predictor = task.predictor(free_parameters(task.robot, task.runs, task.request, task.settings))
-    before = known_before(task, predictor)
-    trace: list[TraceStep] = []
-    fitted = first_fit(task, predictor, trace)
-    sampled = _sampled(task, fitted, trace)
+    task, before = holding(task, predictor)
+    kept = Kept(task.checkpoint)
+    fitted = first_fit(task, predictor, kept)
+    sampled = _sampled(task, fitted, kept)
     best, starts, words = better_of(task, fitted, sampled)
     made = Fitted(
-        best, starts, best.solution.z[None, : len(best.values)], tuple(trace),
+        best, starts, best.solution.z[None, : len(best.values)], tuple(kept.steps),
         f"{loss_words(task)}; CMA-ES over the parameters beside it", before, task.settings.profiles, remarks=(words,),
     )  # fmt: skip
     return concluded(task, predictor, made)
 
 
-def _sampled(task: Task, fitted: Fit, trace: list[TraceStep]) -> Sampled:
+def _sampled(task: Task, fitted: Fit, kept: Kept) -> Sampled:
+    """CMA-ES beside the fit. Its checkpoint holds the costs of all generations: told again, they take it to where it
+    was, and make the same steps of the trace; no simulation is made twice."""
     problem, n = fitted.problem, len(fitted.values)
+    predictor = problem.predictor
     z0 = fitted.solution.z.copy()
     z0[:n] = problem.z0[:n]
     budget = EVALUATIONS * task.settings.max_iterations
+    before = predictor.rollouts
+    predictor.rollouts += kept.saved.get("sampling", 0)
+    known = [[math.inf if cost is None else cost for cost in one] for one in kept.saved.get("generations", ())]
 
     def told(one: SolverProgress) -> None:
-        trace.append(TraceStep(1, "CMA-ES", one.iteration, one.cost))
+        kept.steps.append(TraceStep(1, "CMA-ES", one.iteration, one.cost))
         task.progress(Step("CMA-ES", min(one.counts.plain, budget), budget, one.cost))
+
+    def keep(generations: Sequence[Sequence[float]]) -> None:
+        rows = [[cost if math.isfinite(cost) else None for cost in one] for one in generations]
+        kept.save(generations=rows, sampling=predictor.rollouts - before)
 
     return cma_es(
         problem, z0, sd0=np.minimum(problem.prior_sd[:n], START_SPREAD), budget=budget, seed=task.request.seed,
-        loss=LOSSES[task.recipe.loss], progress=told,
+        loss=LOSSES[task.recipe.loss], progress=told, checkpoint=keep, resume=known,
     )  # fmt: skip
 
 

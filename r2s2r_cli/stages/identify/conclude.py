@@ -78,7 +78,8 @@ def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:
         free_runs=judged.free_runs, closed_loop_m=judged.closed_loop_m,
         covariance=widened(sure.spread.covariance, len(fixed)), information=made.before, trace=made.trace,
         starts=made.starts, profiles=profiles, windows=start_shifts(fit), updates=made.updates, p_RS=judged.p_RS,
-        uncertainty=sure.spread.how, natures=task.natures, computed_by_torch=not predictor.native, warnings=(*warnings, *judged.warnings),
+        uncertainty=sure.spread.how, natures=task.natures, computed_by_torch=not predictor.native,
+        warnings=(*warnings, *judged.warnings),
     )  # fmt: skip
 
 

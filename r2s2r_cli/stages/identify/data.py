@@ -17,7 +17,8 @@ class RunData:
     their sd [m], (cap, 3). p_WE, sd_p, v_WE, sd_v: smoothed end caps [m], [m/s] and sd per axis, (frame, cap, 3): they
     know later frames, so no test segment may start from them. quality: codes of schemas/estimate.py, (frame, cap).
     t_command: (row,) [s]; control, target: (row, actuated), a row holds until the next. intervals, segments: of the
-    design. sampled: the rows are what the frames found in force, not the commands as they were sent.
+    design. sampled: the rows are what the frames found in force, not the commands as they were sent. nature: what the
+    recording is, in words, empty where it does not say.
     """
 
     name: str
@@ -35,6 +36,7 @@ class RunData:
     intervals: Intervals
     segments: Segments
     sampled: bool = False
+    nature: str = ""
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,12 @@ from r2s2r_cli.stages.identify.conclude import Fitted, concluded, known_before, 
 from r2s2r_cli.stages.identify.fit import Fit, fit, more_starts
 from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep
 from r2s2r_cli.stages.identify.free.base import values_of
+from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.solve.record import Checkpoint as SolverCheckpoint, Progress as SolverProgress
 from r2s2r_cli.stages.identify.task import Task, free_parameters
-from r2s2r_cli.stages.identify.trust.identifiability import Trust
+from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, Trust
 
 LOSS = (
     "end caps at all frames, Student t: windows of up to {window} intervals with free start states, then of {short} "
@@ -28,15 +29,22 @@ def find_default(task: Task) -> Found:
     """Fit and judge. Raises as `identify`."""
     frees = free_parameters(task.robot, task.runs, task.request, task.settings)
     predictor = task.predictor(frees)
-    before = known_before(task, predictor)
-    hopeless = zip(before.names, before.trust, strict=True)
-    held = tuple(name for name, trust in hopeless if trust is Trust.NOT_IDENTIFIABLE)
-    task = replace(task, held=held)
-    trace: list[TraceStep] = []
-    fitted = first_fit(task, predictor, trace)
+    task, before = holding(task, predictor)
+    kept = Kept(task.checkpoint)
+    fitted = first_fit(task, predictor, kept)
     starts, near = _other_starts(task, fitted)
-    made = Fitted(fitted, starts, near, tuple(trace), loss_words(task), before, task.settings.profiles)
+    made = Fitted(fitted, starts, near, tuple(kept.steps), loss_words(task), before, task.settings.profiles)
     return concluded(task, predictor, made)
+
+
+def holding(task: Task, predictor: Predictor) -> tuple[Task, Identifiability]:
+    """The task with those parameters held at their starts that its training intervals do not show, and what they show.
+
+    Raises as `known_before`.
+    """
+    before = known_before(task, predictor)
+    both = zip(before.names, before.trust, strict=True)
+    return replace(task, held=tuple(name for name, trust in both if trust is Trust.NOT_IDENTIFIABLE)), before
 
 
 def loss_words(task: Task) -> str:
@@ -44,26 +52,26 @@ def loss_words(task: Task) -> str:
     return LOSS.format(window=task.recipe.window, short=", ".join(map(str, task.recipe.short)))
 
 
-def first_fit(task: Task, predictor: Predictor, trace: list[TraceStep]) -> Fit:
-    """The fit from the starts of the parameters, with its trace, its progress and its checkpoints."""
-    keep = task.checkpoint
+def first_fit(task: Task, predictor: Predictor, kept: Kept) -> Fit:
+    """The fit from the starts of the parameters, with its trace, its progress and its checkpoints; or the rest of it,
+    from where `kept` was left. Raises as `fit`."""
 
     def told(number: int, rounds: int, one: SolverProgress) -> None:
-        trace.append(TraceStep(0, f"round {number + 1}, {one.stage_name}", one.iteration, one.cost))
+        kept.steps.append(TraceStep(0, f"round {number + 1}, {one.stage_name}", one.iteration, one.cost))
+        kept.save_with_trace(rollouts=predictor.rollouts)
         done = (number + one.fraction) / rounds
         task.progress(Step("fit", int(1000 * done), 1000, one.cost))
 
-    def kept(number: int, values: np.ndarray, one: SolverCheckpoint) -> None:
-        assert keep is not None  # noqa: S101 - only called where there is one
-        keep.save({"round": number, "values": values.tolist(), "solver": one.to_dict()})
+    def hold(number: int, values: np.ndarray, one: SolverCheckpoint) -> None:
+        kept.hold(round=number, values=values.tolist(), solver=one.to_dict())
 
-    saved = keep.load() if keep is not None else None
-    resume = None
-    if saved is not None:
+    saved, resume = kept.saved, None
+    if saved:
         resume = saved["round"], np.array(saved["values"]), SolverCheckpoint.from_dict(saved["solver"])
+        predictor.rollouts = saved["rollouts"]
     return fit(
-        task.runs, task.request.train, predictor, task.recipe, seed=task.request.seed, progress=told,
-        checkpoint=None if keep is None else kept, resume=resume,
+        task.runs, task.request.train, predictor, task.recipe, seed=task.request.seed, progress=told, checkpoint=hold,
+        resume=resume,
     )  # fmt: skip
 
 

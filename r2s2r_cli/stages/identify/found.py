@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -133,10 +133,10 @@ class Found:
     """The whole. n parameters, free ones first, then those fixed by hand; (n,) arrays may be of the free ones alone.
 
     covariance: of the coordinates z, (n, n), NaN rows where not identifiable; None where the method gives none.
-    information: before the fit. train,
-    test: rows of predictors (measures.judge) over the steps of `train_segments` and `test_segments`, OURS among them;
-    test empty where nothing was held out. closed_loop_m: mean error of the free run with the controller in the loop.
-    uncertainty: how sd came about, in words. natures: what each run is. p_RS: attachment points (cable, 2, 3) [m].
+    information: before the fit. train, test: rows of predictors (measures.judge) over the steps of `train_segments` and
+    `test_segments`, OURS among them; test empty where nothing was held out. closed_loop_m: mean error of the free run
+    with the controller in the loop. uncertainty: how sd came about, in words. natures: what runs are, by name, of those
+    that say so. p_RS: attachment points (cable, 2, 3) [m].
     """
 
     request: Request
@@ -167,7 +167,7 @@ class Found:
     p_RS: np.ndarray | None = None
     mask: str | None = None
     uncertainty: str = ""
-    natures: Mapping[str, str] | None = None
+    natures: Mapping[str, str] = field(default_factory=dict)
     computed_by_torch: bool = False
     warnings: tuple[str, ...] = ()
 

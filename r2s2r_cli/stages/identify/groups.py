@@ -269,7 +269,7 @@ def _runs(found: Found) -> dict[str, Group]:
     for run in dict.fromkeys(segment.step.run for segment in rows):
         own = [segment for segment in rows if segment.step.run == run]
         facts: dict[str, Scalar] = {"robot": found.robot}
-        nature = (found.natures or {}).get(run)
+        nature = found.natures.get(run)
         groups[f"runs/{run}"] = Group({}, {**facts, "nature": nature} if nature else facts)
         groups[f"runs/{run}/fit"] = Group(
             {

@@ -53,6 +53,7 @@ def run_data(recording: ArtifactData | None, estimate: ArtifactData, run: str, *
         intervals=intervals,
         segments=Segments.from_group(_group(estimate, run, "segments")),
         sampled=caps is not None and bool(np.isin(commands["t"], caps["t"]).all()),
+        nature=str(estimate.groups[f"runs/{run}"].attributes.get("nature", "")),
     )
     _require_finite(found, run)
     _require_rows(found, run)

@@ -94,7 +94,7 @@ def _found(task: Task, made: Preset, fit: PaperFit, demos: list[Demonstration], 
         rollouts=steps * len(demos) + predictor.rollouts + judged.rollouts, floor=judged.floor,
         free_runs=judged.free_runs, closed_loop_m=judged.closed_loop_m, trace=values,
         starts=(StartFound(made.first, fit.best, float(trace.whole[best]), steps, reason),), p_RS=judged.p_RS,
-        mask="; ".join(fit.words), uncertainty=NO_SD, computed_by_torch=not predictor.native,
+        mask="; ".join(fit.words), uncertainty=NO_SD, natures=task.natures, computed_by_torch=not predictor.native,
         warnings=(*warnings, *judged.warnings),
     )  # fmt: skip
 

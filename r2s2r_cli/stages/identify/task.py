@@ -43,6 +43,11 @@ class Task:
         """The recipe with the settings of the project."""
         return replace(recipe_of(self.settings), held=self.held)
 
+    @property
+    def natures(self) -> dict[str, str]:
+        """What each run is, of those that say so."""
+        return {run.name: run.nature for run in self.runs if run.nature}
+
     def predictor(self, frees: Sequence[Free]) -> Predictor:
         """The engine with these free numbers."""
         return predictor_of(self.robot, frees, self.request, self.recipe, self.settings, self.cache_dir)

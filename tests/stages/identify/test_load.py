@@ -55,6 +55,14 @@ def without(data: ArtifactData, stream: str) -> ArtifactData:
     return ArtifactData(data.kind, {name: one for name, one in data.groups.items() if name != f"runs/walk/{stream}"})
 
 
+def test_what_a_recording_is_goes_with_it() -> None:
+    """A simulation is called one on every page; a recording that does not say has no name for it."""
+    recording, estimate = artifacts()
+    assert run_data(recording, estimate, "walk").nature == ""
+    groups = {**estimate.groups, "runs/walk": Group({}, {"nature": "simulated"})}
+    assert run_data(recording, ArtifactData("estimate", groups), "walk").nature == "simulated"
+
+
 def test_observed_caps_are_those_of_the_kept_frames_on_the_ground() -> None:
     """Rows that were dropped leave no trace, and the shift of the ground is applied once."""
     recording, estimate = artifacts()

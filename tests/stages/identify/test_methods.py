@@ -27,6 +27,7 @@ from r2s2r_cli.store.read import read_artifact
 from schemas.config import IdentifySettings
 from tests.commands.conftest import invoke
 from tests.stages.identify.planted import SPEED as SPEED_FREE, found as planted
+from tests.support.builders import same
 from tests.support.simulated_log import write_log
 
 GAIT = """\
@@ -172,6 +173,30 @@ def test_gains_are_free_in_closed_loop_only(task: Task, no_rivals: None) -> None
     assert step.jacobian is not None and np.abs(step.jacobian).max() > 1.0
     with pytest.raises(InputError, match="no logged command"):
         found_by(task, drive="closed loop", free=("command_delay=0.1,0..0.5",))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stop_after", [2, 5])
+def test_an_interrupted_fit_leaves_the_same_artifact(task: Task, no_rivals: None, stop_after: int) -> None:
+    """Trace, rollouts and all: the content of the artifact does not say that the fit was taken up again."""
+    whole, kept = identification(found_by(task, iterations=4)), Kept(stop_after)
+    with pytest.raises(KeyboardInterrupt):
+        found_by(task, checkpoint=kept, iterations=4)
+    again = identification(found_by(task, checkpoint=kept, iterations=4))
+    assert len(again.groups["trace"]["cost"]) > stop_after
+    assert same(again, whole)
+
+
+@pytest.mark.slow
+def test_an_interrupted_cma_leaves_the_same_artifact(task: Task, no_rivals: None) -> None:
+    """Stopped at its third generation: the fit before it is not made twice, nor are its samples simulated again."""
+    whole, kept = identification(found_by(task, method="cma", iterations=1)), Kept(1000)
+    steps = [stage.decode() for stage in whole.groups["trace"]["stage"]]
+    kept.left = steps.index("CMA-ES") + 3
+    with pytest.raises(KeyboardInterrupt):
+        found_by(task, checkpoint=kept, method="cma", iterations=1)
+    assert len((kept.load() or {})["generations"]) == 3
+    assert same(identification(found_by(task, checkpoint=kept, method="cma", iterations=1)), whole)
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,6 +44,8 @@ def cma_es(
     population: int | None = None,
     batch: Callable[[np.ndarray], list[float]] | None = None,
     progress: Callable[[Progress], None] | None = None,
+    checkpoint: Callable[[Sequence[Sequence[float]]], None] | None = None,
+    resume: Sequence[Sequence[float]] = (),
 ) -> Sampled:
     """Minimise the same cost as `levenberg_marquardt` over the parameters, without derivatives.
 
@@ -54,7 +56,11 @@ def cma_es(
     z0: (n,). sd0: of the first samples, in z, one number or (parameters,). budget: evaluations at most. Points where
     the simulation is not finite are worse than all others. tolerance: of the cost, ends the search. population: samples
     of a generation, default the package's. batch: costs of points (k, n), instead of one evaluation after the other.
-    Uses no global random numbers, writes no file and prints nothing. Raises NumericalError where no sample is finite.
+    checkpoint is called after every generation with the costs of all samples so far, (generation, sample), inf where
+    the simulation was not finite; then progress; what either raises goes through. resume: such costs are told to the
+    search instead of computed: with the same seed and problem its samples are theirs, and it goes on bit by bit.
+    Uses no global random numbers, writes no file and prints nothing. Raises NumericalError where no sample is finite,
+    ValueError where `resume` is not of generations of this size.
     """
     import warnings
 
@@ -96,18 +102,23 @@ def cma_es(
         warnings.simplefilter("ignore", UserWarning)  # its parser of options stumbles over one of its own defaults
         search = cma.CMAEvolutionStrategy(np.zeros(count), 1.0, options)
     best_u, best, costs, spent = np.zeros(count), np.inf, [], 0
+    generations: list[list[float]] = []
     while not search.stop() and spent < budget:
         samples = search.ask()
-        values = together(samples)
+        again = len(generations) < len(resume)
+        values = list(resume[len(generations)]) if again else together(samples)
         search.tell(samples, values)
+        generations.append(values)
         spent += len(samples)
         least = int(np.argmin(values))
         if values[least] < best:
             best_u, best = np.array(samples[least]), values[least]
         costs.append(best)
+        if checkpoint is not None and not again:
+            checkpoint(generations)
         if progress is not None:
-            generations = max(budget // len(samples), 1)
-            progress(Progress(len(costs), generations, best, 0.0, float(search.sigma), Counts(plain=spent)))
+            most = max(budget // len(samples), 1)
+            progress(Progress(len(costs), most, best, 0.0, float(search.sigma), Counts(plain=spent)))
     if not np.isfinite(best):
         raise not_finite("no sample of the parameters gives a finite simulation", np.full(spent, np.nan))
     z = whole(best_u)

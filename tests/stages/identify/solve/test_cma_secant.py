@@ -44,6 +44,38 @@ def test_cma_is_silent_seeded_and_keeps_nuisances(tmp_path, monkeypatch, capfd) 
     assert capfd.readouterr() == ("", "")
 
 
+def test_cma_goes_on_where_it_was_interrupted() -> None:
+    """Interrupted in the seventh generation: it simulates the rest alone, failed samples among it, and ends bit by bit
+    as the whole search, with the same progress."""
+    full, spent = decay(), [0]
+
+    def f(z):
+        spent[0] += 1
+        return full.f(z) if z[0] > 0.7 else np.full(40, np.nan)
+
+    def search(**options):
+        spent[0], told = 0, []
+        problem = formula(f, full.df, 3, names=("a", "b"))
+        found = cma_es(problem, [1.0, 2.0, 0.5], sd0=[0.5, 0.3], budget=90, seed=4, progress=told.append, **options)
+        return found, told, spent[0]
+
+    def stop(costs):
+        kept[:] = [list(one) for one in costs]
+        if len(costs) == 7:
+            raise KeyboardInterrupt
+
+    kept = []
+    whole, told, evaluations = search()
+    with pytest.raises(KeyboardInterrupt):
+        search(checkpoint=stop)
+    assert len(kept) == 7 and np.isinf(kept).any()
+    again, told_again, rest = search(resume=kept)
+    assert (again.costs, again.counts, again.reason) == (whole.costs, whole.counts, whole.reason)
+    np.testing.assert_array_equal(again.z, whole.z)
+    assert told_again == told
+    assert rest == evaluations - sum(map(len, kept))
+
+
 def test_cma_where_nothing_is_finite() -> None:
     """Without one finite sample there is no answer."""
     problem = formula(lambda z: np.array([np.nan]), lambda z: np.array([[1.0, 1.0]]), 2)

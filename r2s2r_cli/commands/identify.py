@@ -124,7 +124,8 @@ def identify(
     typed = typed_options(
         train=train, test=test, free=free, fix=fix, with_effect=with_effect,
         method=None if method == "default" else method, drive=None if drive == "replay" else drive,
-        online=online, also=also, self_test=self_test, starts=starts, seed=seed or None, project=project, iteration=iteration, set_=set_, no_draw=not draw,
+        online=online, also=also, self_test=self_test, starts=starts, seed=seed or None, project=project,
+        iteration=iteration, set_=set_, no_draw=not draw,
     )  # fmt: skip
     asked = Asked(
         here, place, train=tuple(train or ()), test=tuple(test or ()), free=tuple(free or ()), fix=tuple(fix or ()),

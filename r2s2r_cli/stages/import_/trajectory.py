@@ -13,6 +13,7 @@ from r2s2r_cli.stages import frames
 from r2s2r_cli.stages.import_.checks import ROD_TOLERANCE, UNITS, check_handedness, check_rod_length, check_up_axis
 from r2s2r_cli.stages.import_.clock import check_stamps, few_frames
 from r2s2r_cli.stages.import_.columns import Columns, find_columns
+from r2s2r_cli.stages.import_.missing import missing_commands
 from r2s2r_cli.stages.import_.run import (
     NO_NATURE,
     cap_noise,
@@ -127,6 +128,7 @@ def import_trajectory(
     warnings += few_frames(len(t_kept), dropped_frames(reason)) + _check_control(
         groups["commands"], t_kept, p_kept, robot
     )
+    warnings += missing_commands(table, columns, reason, len(intervals))
     if sidecar.nature is None:
         warnings.append(NO_NATURE)
     if len(intervals) and not intervals.complete[-1]:

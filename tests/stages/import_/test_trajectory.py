@@ -64,6 +64,23 @@ def test_commands_rise_in_time_and_keep_the_rows_without_caps() -> None:
     assert commands["t"] == pytest.approx(np.delete(t, 9))
 
 
+def test_missing_targets_and_commands_are_told() -> None:
+    """A NaN amid a run makes an interval more and a motor rest: each with its count and first place."""
+    t = np.arange(20) * 0.1
+    target, control = steps(20, CYCLE), np.zeros((20, 6))
+    target[:2] = control[-2:] = np.nan  # before the policy began, after it ended: nothing is missing there
+    groups, report = read(csv_text(t, glide(t), target, control))
+    whole = len(groups["intervals"]["first"])
+    assert not any("whole" in warning for warning in report.warnings)
+    target[4, 1], control[7, 3], control[9] = np.nan, np.nan, np.nan
+    groups, report = read(csv_text(t, glide(t), target, control))
+    assert len(groups["intervals"]["first"]) == whole + 1
+    said = [warning for warning in report.warnings if "whole" in warning]
+    assert said[0].startswith("1 row has no whole target, the first at log.csv:6, column 21 (target1): each ends")
+    assert f"and {whole + 1} are counted" in said[0]
+    assert said[1].startswith("2 rows have no whole motor command, the first at log.csv:9, column 29 (control3): ")
+
+
 def test_time_starts_at_the_first_kept_frame() -> None:
     """Stamps since 1970 become seconds of the run; gaps stay."""
     t = np.arange(10) * 0.1

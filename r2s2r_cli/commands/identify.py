@@ -52,7 +52,9 @@ def identify(
     free: Annotated[
         list[str] | None,
         typer.Option(
-            "--free", metavar="SPEC", help="Parameter that is free; repeatable. Default: the set of the method."
+            "--free",
+            metavar="SPEC",
+            help="Parameter that is free; repeatable. Default: the set of the method; +SPEC: beside it.",
         ),
     ] = None,
     fix: Annotated[

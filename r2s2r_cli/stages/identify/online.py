@@ -23,9 +23,10 @@ from r2s2r_cli.stages.identify.fit import fit
 from r2s2r_cli.stages.identify.found import Found, TraceStep, Update
 from r2s2r_cli.stages.identify.free import Free, select
 from r2s2r_cli.stages.identify.free.base import Coordinate
+from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.solve.record import Progress as SolverProgress
-from r2s2r_cli.stages.identify.task import Task, free_parameters
+from r2s2r_cli.stages.identify.task import Task, free_parameters, specs_asked
 from r2s2r_cli.stages.identify.trusted import Sureness, sureness
 
 DRIFT = 0.05
@@ -57,23 +58,29 @@ def find_online(task: Task) -> Found:
         )  # fmt: skip
     wide = first_free(task)
     order = by_run(task.request.train)
-    known_before(task, task.predictor(wide))  # refuses what no run shows
-    known, updates = _resumed(task, known_of(task.request.before))
-    trace: list[TraceStep] = []
+    first = task.predictor(wide)
+    known_before(task, first)  # refuses what no run shows
+    kept = Kept(task.checkpoint)
+    known, updates = _resumed(kept, known_of(task.request.before))
+    rollouts = first.rollouts + kept.saved.get("rollouts", 0)
     for k in range(len(updates), len(order)):
         frees = tuple(drifted(free, known) for free in wide)
         predictor = task.predictor(frees)
         made = fit(
             task.runs, (order[k],), predictor, task.recipe, seed=task.request.seed,
-            progress=_progress(task, trace, order, k),
+            progress=_progress(task, kept.steps, order, k),
         )  # fmt: skip
         sure = sureness(made, made.solution.z[None, : len(frees)], loss=task.recipe.loss, seed=task.request.seed)
         known = learned(known, frees, sure)
         updates.append(update_of(order[k].run, frees, sure))
-        if task.checkpoint is not None and k + 1 < len(order):
-            task.checkpoint.save({"updates": [_row(one) for one in updates], "known": asdict(known)})
+        if k + 1 < len(order):
+            rollouts += predictor.rollouts
+            kept.save_with_trace(
+                updates=[_row(one) for one in updates], known=asdict(known), rollouts=rollouts - first.rollouts
+            )
+    predictor.rollouts += rollouts
     last = Fitted(
-        made, (start_found([free.start for free in frees], made),), made.solution.z[None, : len(frees)], tuple(trace),
+        made, (start_found([free.start for free in frees], made),), made.solution.z[None, : len(frees)], tuple(kept.steps),
         f"{loss_words(task)}; run after run, the cost is of the last", None, task.settings.profiles, tuple(updates),
     )  # fmt: skip
     return concluded(task, predictor, last)
@@ -82,9 +89,9 @@ def find_online(task: Task) -> Found:
 def first_free(task: Task) -> tuple[Free, ...]:
     """Of --free or the settings, else what was free in the earlier identification, with the priors it had."""
     before = task.request.before
-    if task.request.free or task.settings.free or before is None:
+    if before is None:
         return free_parameters(task.robot, task.runs, task.request, task.settings)
-    specs = [spec for name, spec in specs_of(before).items() if name not in task.request.fixed]
+    specs = specs_asked(task.request, task.settings, tuple(specs_of(before).values()))
     return select(specs, task.robot, task.request.effects)
 
 
@@ -167,13 +174,14 @@ def by_run(train: Sequence[Selection]) -> tuple[Selection, ...]:
     return tuple(Selection(run, tuple(sorted(chosen))) for run, chosen in numbers.items())
 
 
-def _resumed(task: Task, known: Known) -> tuple[Known, list[Update]]:
+def _resumed(kept: Kept, known: Known) -> tuple[Known, list[Update]]:
     """Where an interrupted fit stood: after its last whole run."""
-    saved = task.checkpoint.load() if task.checkpoint is not None else None
-    if saved is None:
+    if not kept.saved:
         return known, []
-    rows = [Update(one["run"], np.array(one["value"]), np.array(one["sd"], dtype=float)) for one in saved["updates"]]
-    return Known(**saved["known"]), rows
+    rows = [
+        Update(one["run"], np.array(one["value"]), np.array(one["sd"], dtype=float)) for one in kept.saved["updates"]
+    ]
+    return Known(**kept.saved["known"]), rows
 
 
 def _row(one: Update) -> dict[str, Any]:

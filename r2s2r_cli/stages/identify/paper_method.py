@@ -25,7 +25,7 @@ from r2s2r_cli.stages.identify.paper.adam import identify_paper
 from r2s2r_cli.stages.identify.paper.demonstration import Demonstration
 from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.solve.record import names_on_bound
-from r2s2r_cli.stages.identify.task import Task
+from r2s2r_cli.stages.identify.task import Task, specs_asked
 from r2s2r_cli.stages.identify.trust.identifiability import Trust
 
 NO_SD = "method paper gives no uncertainty"
@@ -41,7 +41,7 @@ def find_paper(task: Task) -> Found:
     from r2s2r_cli.stages.model import structure_of
 
     request, recipe, settings = task.request, task.recipe, task.settings
-    specs = request.free or settings.free or tuple(name for name in PAPER_FREE if name not in request.fixed)
+    specs = specs_asked(request, settings, PAPER_FREE)
     made = preset(
         task.robot, select(specs, task.robot, request.effects), effects=request.effects, fixed=dict(request.fixed),
         structure=replace(structure_of(task.robot), rod_contact=settings.rod_contact), step=recipe.step,

@@ -12,6 +12,7 @@ from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.found import ParameterFound
 from r2s2r_cli.stages.identify.free import Free, Mapping, select
+from r2s2r_cli.stages.identify.free.extend import extended, name_of
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe, default_free, recipe_of
 from r2s2r_cli.stages.identify.request import Checkpoint, Progress, Request, silent
@@ -97,9 +98,16 @@ def free_parameters(
     robot: Robot, runs: Sequence[RunData], request: Request, settings: IdentifySettings
 ) -> tuple[Free, ...]:
     """Of --free, else of the settings, else the default set."""
-    specs = request.free or settings.free or default_free(robot, busy(robot, runs, request))
-    given = tuple(spec for spec in specs if spec.split("=")[0].split(",")[0] not in request.fixed)
-    return select(given if not request.free else specs, robot, request.effects)
+    return select(
+        specs_asked(request, settings, default_free(robot, busy(robot, runs, request))), robot, request.effects
+    )
+
+
+def specs_asked(request: Request, settings: IdentifySettings, default: Sequence[str]) -> tuple[str, ...]:
+    """What is free, as after --free: of the request, else of the settings, else the default; where nothing was named
+    on the command line, without what is fixed there. Raises UsageError for a spec that cannot be read."""
+    own = tuple(spec for spec in extended(settings.free, default) if name_of(spec) not in request.fixed)
+    return extended(request.free, own)
 
 
 def busy(robot: Robot, runs: Sequence[RunData], request: Request) -> tuple[tuple[str, int], ...]:

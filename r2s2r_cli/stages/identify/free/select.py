@@ -6,7 +6,8 @@ NAME: of the catalogue, or FAMILY.* for every element of a family: motor_speed.*
 START: where the fit begins, and the mean of the prior; default: robot.toml's. LOWER..UPPER: bounds; either end may be
 left out (`..2`). ~SD: standard deviation of the prior, in the value's unit, of a positive number with a log coordinate
 relative (~0.1 is 10 %), of a share with a logit coordinate in that; ~inf: no prior. The parts after the name may come
-in any order. Examples: `friction`, `friction=0.5`, `friction=0.5,0.2..1.5,~0.3`, `rest_length.*,~0.005`.
+in any order. A plus before NAME: beside what is free anyway (`extend`). Examples: `friction`, `friction=0.5`,
+`friction=0.5,0.2..1.5,~0.3`, `rest_length.*,~0.005`, `+mass`.
 """
 
 from __future__ import annotations

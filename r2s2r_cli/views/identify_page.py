@@ -14,7 +14,7 @@ _STRONG = 0.9
 
 
 def verdict(report: IdentifyReport) -> str:
-    """What the numbers are worth, in two sentences."""
+    """What the numbers are worth, in two or three sentences."""
     free = [name for name, found in report.parameters.items() if found.trust != "fixed"]
     sure = [name for name in free if report.parameters[name].trust == "identified"]
     others = [report.parameters[name].trust for name in free if name not in sure]
@@ -28,7 +28,9 @@ def verdict(report: IdentifyReport) -> str:
     floor = "not known" if held.floor_m is None else f"{millimetres(held.floor_m)} mm"
     error = f"{millimetres(held.keyframe_cap_rmse_m)} mm{spread(held.intervals.keyframe_cap_rmse_m)}"
     found = f"{error} at the key frames of {counted(count, 'held-out segment')}, floor {floor}"
-    return f"{told} {found}; in mm: {rivals or 'no baseline'}."
+    level = [name for name, one in held.baselines.items() if _open(one)]
+    more = f" Not decided against: {', '.join(level)}." if level else ""
+    return f"{told} {found}; in mm: {rivals or 'no baseline'}.{more}"
 
 
 def report_tables(report: IdentifyReport) -> Iterator[PageTable]:
@@ -100,7 +102,7 @@ def _errors(report: IdentifyReport) -> PageTable:
         rows.append(["identified, held out", key, "-", *free])
         for name, one in held.baselines.items():
             key, *free = _three(one)
-            rows.append([f"{name}, held out", key, _against(one), *free])
+            rows.append([f"{name}, held out", key, _against(name, one, report), *free])
         rows.append(["floor", millimetres(held.floor_m), "-", "-", "-"])
     return PageTable("errors of the end caps (95 % interval by bootstrap over segments)", columns, rows)
 
@@ -111,12 +113,22 @@ def _three(found: HeldOut | Baseline | Measures) -> list[str]:
     return [millimetres(getattr(found, name)) + spread(getattr(intervals, name, None)) for name in names]
 
 
-def _against(one: Baseline) -> str:
-    """`-36.1 .. -21.0, better in 100%` of the resampled segments."""
+def _against(name: str, one: Baseline, report: IdentifyReport) -> str:
+    """`-36.1 .. -21.0, better in 4 of 4` held-out segments; `undecided` where the interval holds 0."""
     ends = one.difference.keyframe_cap_rmse_m
-    if ends is None or one.ours_better is None:
+    if ends is None:
         return "-"
-    return f"{millimetres(ends[0])} .. {millimetres(ends[1])}, better in {one.ours_better:.0%}"
+    pairs = [(s.keyframe_cap_rmse_m, s.baselines.get(name)) for s in report.segments if s.role == "test"]
+    known = [(ours, theirs) for ours, theirs in pairs if theirs is not None]
+    better = sum(ours < theirs for ours, theirs in known)
+    undecided = " (undecided)" if _open(one) else ""
+    return f"{millimetres(ends[0])} .. {millimetres(ends[1])}{undecided}, better in {better} of {len(known)}"
+
+
+def _open(one: Baseline) -> bool:
+    """Whether the interval of the difference holds 0."""
+    ends = one.difference.keyframe_cap_rmse_m
+    return ends is not None and ends[0] <= 0.0 <= ends[1]
 
 
 def _segments(report: IdentifyReport) -> PageTable:

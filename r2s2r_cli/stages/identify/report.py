@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from r2s2r_cli.stages.identify.doubts import doubtful
 from r2s2r_cli.stages.identify.found import OURS, Found, ParameterFound, SegmentFound
 from r2s2r_cli.stages.identify.groups import whole_error
 from r2s2r_cli.stages.measures.bootstrap import Interval
@@ -65,7 +66,7 @@ def report_of(found: Found) -> IdentifyReport:
         reason=found.reason,
         rollouts=found.rollouts,
         computed_by="torch" if found.computed_by_torch else "machine code",
-        warnings=found.warnings,
+        warnings=(*found.warnings, *doubtful(found.parameters)),
     )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from r2s2r_cli.views.identify_fits import cap_rmse
 from r2s2r_cli.views.identify_information import draw_information, information_figure
 from r2s2r_cli.views.identify_page import identify_page, report_tables, verdict
 from r2s2r_cli.views.identify_self_test import self_test_tables
-from schemas.results_identify import Recovered, RecoveredCase, SelfTestReport
+from schemas.results_identify import Intervals, Recovered, RecoveredCase, SelfTestReport
 from tests.stages.identify.reports import report
 from tests.support import builders
 
@@ -97,7 +97,7 @@ def test_errors_stand_beside_floor_and_baselines() -> None:
         "nominal, held out", "refit of two parameters, held out", "floor",
     ]  # fmt: skip
     assert table.rows[1][1:4] == ["8.0 (6.4 .. 10.4)", "-", "11.0"]
-    assert table.rows[2][1:4] == ["48.0", "-60.0 .. -20.0, better in 100%", "50.0"]
+    assert table.rows[2][1:4] == ["48.0", "-60.0 .. -20.0, better in 1 of 1", "50.0"]
     assert table.rows[3][3] == "-"
 
 
@@ -108,6 +108,18 @@ def test_the_verdict_is_about_what_was_not_fitted() -> None:
     assert "determine 2 of 4 free parameters (1 weak, 1 not identifiable)" in text
     assert "8.0 mm (6.4 .. 10.4)" in text and "floor 5.0 mm" in text and "nothing moves 48.0" in text
     assert "Nothing was held out" in verdict(said.model_copy(update={"heldout": None}))
+
+
+def test_an_interval_that_holds_zero_is_undecided() -> None:
+    """Better in every segment and still undecided: the row says both, and the verdict names the rival."""
+    said = report(builders.identification())
+    held = said.heldout
+    assert held is not None
+    rival = held.baselines["nominal"].model_copy(update={"difference": Intervals(keyframe_cap_rmse_m=(-0.0028, 2e-4))})
+    said = said.model_copy(update={"heldout": held.model_copy(update={"baselines": {"nominal": rival}})})
+    rows = next(table for table in report_tables(said) if table.title.startswith("errors")).rows
+    assert rows[2][2] == "-2.8 .. 0.2 (undecided), better in 1 of 1"
+    assert verdict(said).endswith(" Not decided against: nominal.")
 
 
 def test_an_endless_interval_does_not_hide_the_others() -> None:

@@ -1,0 +1,65 @@
+"""What values say against themselves, in words: more than a motor can do, and bounds that were hit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from r2s2r_cli.stages.identify.found import ParameterFound
+from r2s2r_cli.stages.identify.free.base import Coordinate, Free
+from r2s2r_cli.stages.identify.trust.identifiability import Trust
+
+RATE = "motor_speed"
+"""Names of winding rates begin like this; their unit is the no-load speed."""
+
+
+def doubtful(parameters: Sequence[ParameterFound]) -> tuple[str, ...]:
+    """One sentence for all winding rates beyond the no-load speed, and one for each bound that was hit."""
+    free = [one for one in parameters if one.trust is not None]
+    return (*_too_fast(free), *(_on_bound(one) for one in free if one.trust is Trust.ON_BOUND))
+
+
+def _too_fast(parameters: Sequence[ParameterFound]) -> list[str]:
+    fast = [one for one in parameters if one.free.name.startswith(RATE) and one.identifiable and one.value > 1.0]
+    if not fast:
+        return []
+    rates = ", ".join(f"{one.free.name} {one.value:.3g}" for one in fast)
+    unsure = [one.free.name for one in fast if one.lower <= 1.0]
+    text = f"faster than the motor turns without load: {rates}"
+    if unsure:
+        text += f" (the 95 % interval of {', '.join(unsure)} reaches below 1)"
+    why = (
+        "no_load_rad_per_s or winch_radius_m in robot.toml is too small, or these rates make up for something that is "
+        "not modelled, such as line that winds on line"
+    )
+    return [f"{text}. Either {why}: predict with them, do not report them as speeds"]
+
+
+def _on_bound(one: ParameterFound) -> str:
+    free, name = one.free, one.free.name
+    low = one.value - free.lower <= free.upper - one.value
+    unit = "" if free.unit == "1" else f" {free.unit}"
+    text = f"{name} lies on its bound {(free.lower if low else free.upper):g}{unit}: the runs ask for more"
+    wide = wider(free, below=low)
+    if wide is None:
+        return f"{text} than the number can be at all: something else is missing that it makes up for"
+    return f'{text}, and the other numbers make up for what it may not be; add --free "+{name},{wide}" to see how much'
+
+
+def wider(free: Free, *, below: bool) -> str | None:
+    """Bounds LOWER..UPPER that go further on that side, as in a spec; None where the number ends there."""
+    low, high = free.lower, free.upper
+    reach = 0.5 * (high - low) if math.isfinite(high - low) else 1.0
+    if below and free.coordinate is Coordinate.LINEAR and low < 0:
+        low -= reach
+    elif below:
+        if low <= 0:
+            return None
+        low *= 0.5
+    elif free.coordinate is Coordinate.LOGIT:
+        if high >= 1:
+            return None
+        high = 0.5 * (high + 1.0)
+    else:
+        high += reach
+    return "..".join(f"{end:.4g}" if math.isfinite(end) else "" for end in (low, high))

@@ -1,0 +1,71 @@
+"""Doubts that values raise against themselves, in words."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from r2s2r_cli.stages.identify.doubts import doubtful, wider
+from r2s2r_cli.stages.identify.found import ParameterFound
+from r2s2r_cli.stages.identify.free import catalogue
+from r2s2r_cli.stages.identify.free.base import Coordinate, Free
+from r2s2r_cli.stages.identify.free.extend import extended
+from r2s2r_cli.stages.identify.free.select import select
+from r2s2r_cli.stages.identify.report import report_of
+from r2s2r_cli.stages.identify.trust.identifiability import Trust
+from tests.stages.identify.planted import found
+from tests.support.engine import threebar
+
+KNOWN = catalogue(threebar())
+NAN = (math.nan, math.nan)
+
+
+def one(name: str, value: float, lower: float, trust: Trust = Trust.IDENTIFIED) -> ParameterFound:
+    """A found number of the 3-bar robot."""
+    return ParameterFound(KNOWN[name], value, 0.05, lower, value + 0.1, NAN, trust)
+
+
+def test_winding_rates_beyond_the_no_load_speed_are_doubted() -> None:
+    """Those above 1, by name, with those of which the interval reaches below; nothing else is."""
+    rates = (one("motor_speed_out.0", 1.08, 0.98), one("motor_speed_out.1", 1.13, 1.05),
+             one("motor_speed_in.0", 0.9, 0.8), one("friction", 1.3, 1.1))  # fmt: skip
+    (text,) = doubtful(rates)
+    assert text.startswith("faster than the motor turns without load: motor_speed_out.0 1.08, motor_speed_out.1 1.13 (")
+    assert "interval of motor_speed_out.0 reaches below 1)" in text and "friction" not in text
+    assert doubtful(rates[2:]) == ()
+    assert doubtful([replace(rates[0], trust=Trust.NOT_IDENTIFIABLE), replace(rates[1], trust=None)]) == ()
+
+
+def test_a_bound_that_was_hit_comes_with_the_option_that_widens_it() -> None:
+    """The option is read, keeps the prior of the default set, and has room beyond the bound."""
+    bound = KNOWN["rest_length.8"].lower
+    (text,) = doubtful([one("rest_length.8", bound, bound, Trust.ON_BOUND)])
+    assert text.startswith(f"rest_length.8 lies on its bound {bound:g} m: the runs ask for more")
+    spec = text.split('"')[1]
+    (free,) = select(extended((spec,), ("rest_length.8,~0.02",)), threebar())
+    assert free.lower == pytest.approx(bound / 2, rel=1e-3) and free.prior_sd == 0.02
+
+
+@pytest.mark.parametrize(
+    ("free", "below", "expected"),
+    [
+        (Free("a", "1", 1.0, 0.5, 2.0), False, "0.5..2.75"),
+        (Free("a", "m", 0.0, -1.0, 1.0, Coordinate.LINEAR), True, "-2..1"),
+        (Free("a", "m", 0.5, 0.0, 1.0, Coordinate.LINEAR), True, None),
+        (Free("a", "1", 0.5, 0.0, 0.9, Coordinate.LOGIT), False, "0..0.95"),
+        (Free("a", "1", 0.5, 0.0, 1.0, Coordinate.LOGIT), False, None),
+        (Free("a", "1", 0.5, 0.1, math.inf), True, "0.05.."),
+    ],
+)
+def test_bounds_go_further_where_the_number_does(free: Free, below: bool, expected: str | None) -> None:
+    """On the side that was hit, never beyond what the number can be."""
+    assert wider(free, below=below) == expected
+
+
+def test_they_reach_the_report() -> None:
+    """Behind what the fit itself remarked."""
+    fast = replace(found().parameters[0], value=1.2, lower=1.1)
+    warnings = report_of(found(parameters=(fast,), covariance=None, information=None, profiles=())).warnings
+    assert warnings[0] == "a remark" and "motor_speed 1.2" in warnings[1] and len(warnings) == 2

@@ -13,7 +13,7 @@ COORDINATES = {0: "linear: z = x", 1: "log: z = ln x", 2: "logit: z = ln((x - lo
 
 TRUST = {
     0: "identified: the runs say it",
-    1: "weak: the runs say little more than the prior",
+    1: "weak: the runs say it, but hardly better than prior and bounds",
     2: "not identifiable: the runs do not say it, its value means nothing",
     3: "on a bound: the runs ask for more than the bound allows",
     4: "fixed: it was not free",
@@ -131,7 +131,7 @@ PROFILES = GroupSpec(
         column("cost", "float64", ("profile", "point"), "1", "cost with all others fitted, minus that of the solution", nan_means="as value"),
         column("interval", "float64", ("profile", "pair"), "1", "where the cost reaches the threshold: the 95 % interval of the profile",
                nan_means="it does not rise that far within the grid"),
-        column("threshold", "float64", ("profile",), "1", "rise of the cost at the ends of the interval; 1.92 for white residuals of known noise"),
+        column("threshold", "float64", ("profile",), "1", "rise of the cost at the ends of the interval: 1.92 for many windows whose residuals are as large as the noise; times the inflation of the variance where they are larger, and more where windows are few"),
         column("words", "str", ("profile",), "1", "how the interval differs from that of the covariance"),
     ),
 )  # fmt: skip

@@ -55,7 +55,8 @@ class Baseline(Measures):
     difference: Intervals = Intervals()
     """Ours minus this one, 95 %: below 0 we are better, over the segments that both predict."""
     ours_better: float | None = None
-    """Share of the resampled segments in which ours is better at the key frames."""
+    """Share of the resamples of the segments in which ours is better at the key frames. No level of confidence: of few
+    segments all resamples can agree where the interval of the difference, which counts how few they are, holds 0."""
 
 
 class HeldOut(Measures):

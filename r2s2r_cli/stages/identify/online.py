@@ -27,6 +27,7 @@ from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.solve.record import Progress as SolverProgress
 from r2s2r_cli.stages.identify.task import Task, free_parameters, specs_asked
+from r2s2r_cli.stages.identify.trust.identifiability import Trust
 from r2s2r_cli.stages.identify.trusted import Sureness, sureness
 
 DRIFT = 0.05
@@ -80,8 +81,9 @@ def find_online(task: Task) -> Found:
             )
     predictor.rollouts += rollouts
     last = Fitted(
-        made, (start_found([free.start for free in frees], made),), made.solution.z[None, : len(frees)], tuple(kept.steps),
-        f"{loss_words(task)}; run after run, the cost is of the last", None, task.settings.profiles, tuple(updates),
+        made, (start_found([free.start for free in frees], made),), made.solution.z[None, : len(frees)],
+        tuple(kept.steps), f"{loss_words(task)}; run after run, the cost is of the last", None, task.settings.profiles,
+        tuple(updates),
     )  # fmt: skip
     return concluded(task, predictor, last)
 
@@ -147,11 +149,14 @@ def drift_of(free: Free) -> float:
 
 
 def learned(known: Known, frees: Sequence[Free], sure: Sureness) -> Known:
-    """What is known after a run that was fitted with `frees`: where it determined nothing, what was known drifts on."""
+    """What is known after a run that was fitted with `frees`: where it determined nothing, what was known drifts on.
+
+    It is the information of the run that counts, not what its few windows would let one report of it alone.
+    """
     value, sd_z = dict(known.value), dict(known.sd_z)
     for k, (free, one) in enumerate(zip(frees, sure.parameters, strict=True)):
         sd = math.sqrt(max(float(sure.spread.covariance[k, k]), 0.0))
-        if one.identifiable and math.isfinite(sd) and sd > 0:
+        if _determined(sure, k) and math.isfinite(sd) and sd > 0:
             value[free.name], sd_z[free.name] = one.value, sd
         elif free.name in value:
             value[free.name], sd_z[free.name] = free.start, free.prior_sd
@@ -160,10 +165,15 @@ def learned(known: Known, frees: Sequence[Free], sure: Sureness) -> Known:
 
 def update_of(run: str, frees: Sequence[Free], sure: Sureness) -> Update:
     """The estimate after a run, in units: of what it did not determine, what was known before, with sd NaN."""
-    both = list(zip(frees, sure.parameters, strict=True))
-    value = np.array([one.value if one.identifiable else free.start for free, one in both])
-    sd = np.array([one.sd if one.identifiable and math.isfinite(one.sd) else math.nan for _, one in both])
+    value, sd = np.array([free.start for free in frees]), np.full(len(frees), math.nan)
+    for k, one in enumerate(sure.parameters):
+        if _determined(sure, k):
+            value[k], sd[k] = one.value, one.sd if math.isfinite(one.sd) else math.nan
     return Update(run, value, sd)
+
+
+def _determined(sure: Sureness, k: int) -> bool:
+    return sure.after.trust[k] is not Trust.NOT_IDENTIFIABLE
 
 
 def by_run(train: Sequence[Selection]) -> tuple[Selection, ...]:

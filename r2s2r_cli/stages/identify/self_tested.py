@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from r2s2r_cli.stages.identify.data import RunData
-from r2s2r_cli.stages.identify.fit import fit
-from r2s2r_cli.stages.identify.recipe import recipe_of
+from r2s2r_cli.stages.identify.default_method import first_fit, holding
+from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.request import Progress, Request, silent
 from r2s2r_cli.stages.identify.self_test import Fitted, self_test
-from r2s2r_cli.stages.identify.task import free_parameters, predictor_of, require_replay
+from r2s2r_cli.stages.identify.task import Task, free_parameters, require_replay
 from r2s2r_cli.stages.identify.trusted import sureness
 from schemas.config import IdentifySettings
 from schemas.results_identify import SelfTestReport
@@ -28,18 +29,20 @@ def self_tested(
 ) -> SelfTestReport:
     """Plant known values in the runs that are trained on, fit what `identify` would, from where it would start.
 
-    One start each: ranges and profiles are not part of it. Raises as `identify` and `self_test`.
+    What the planted runs do not show is held, as there. One start each: ranges and profiles are not part of it.
+    Raises as `identify` and `self_test`.
     """
     require_replay(request)
-    recipe = recipe_of(settings)
     frees = free_parameters(robot, runs, request, settings)
-    predictor = predictor_of(robot, frees, request, recipe, settings, cache_dir)
+    task = Task(robot, runs, request, settings, cache_dir)
+    predictor = task.predictor(frees)
 
     def once(planted: Sequence[RunData]) -> Fitted:
         before = predictor.rollouts
-        made = fit(planted, request.train, predictor, recipe, seed=request.seed)
-        own = made.solution.z[None, : len(frees)]
-        sure = sureness(made, own, loss=recipe.loss, seed=request.seed)
+        own, _ = holding(replace(task, runs=planted), predictor)
+        made = first_fit(own, predictor, Kept(None))
+        near = made.solution.z[None, : len(frees)]
+        sure = sureness(made, near, loss=own.recipe.loss, seed=request.seed)
         return Fitted(sure.parameters, made.solution.reason.converged, predictor.rollouts - before)
 
     trained = {one.run for one in request.train}

@@ -221,6 +221,9 @@ def test_online_goes_on_run_after_run(task: Task, no_rivals: None) -> None:
     with pytest.raises(KeyboardInterrupt):
         found_by(two, checkpoint=kept, iterations=3, online=True, before=before)
     made = found_by(two, checkpoint=kept, iterations=3, online=True, before=before)
+    whole = found_by(two, iterations=3, online=True, before=before)
+    assert same(identification(made), identification(whole))
+    assert {step.stage.split(",")[0] for step in made.trace} == {"gait", "later"}
     first, second = (one.value[0] for one in made.updates)
     assert first > 0.7 and abs(second - SPEED) < 0.05 * SPEED
     assert made.parameters[0].free.start == first

@@ -69,14 +69,16 @@ def test_what_was_free_is_free_again() -> None:
 
 
 def test_a_run_that_shows_nothing_changes_nothing_but_the_width() -> None:
-    """The speed is learned, the restitution stays what it was and drifts on; its update has no sd."""
+    """The speed is learned, though the run alone is too short to report it; the restitution stays what it was and
+    drifts on; its update has no sd."""
     frees = (replace(SPEED, start=0.9, prior_sd=0.1), replace(BOUNCE, start=0.4, prior_sd=0.2))
     sure: Any = SimpleNamespace(
         parameters=(
-            ParameterFound(frees[0], 0.8, 0.016, 0.77, 0.83, NAN, Trust.IDENTIFIED),
+            ParameterFound(frees[0], 0.8, 0.016, 0.77, 0.83, NAN, Trust.NOT_IDENTIFIABLE, "too few windows"),
             ParameterFound(frees[1], 0.7, 0.3, 0.1, 0.9, NAN, Trust.NOT_IDENTIFIABLE),
         ),
         spread=SimpleNamespace(covariance=np.diag([4e-4, 0.04])),
+        after=SimpleNamespace(trust=(Trust.IDENTIFIED, Trust.NOT_IDENTIFIABLE)),
     )
     before = Known({"motor_speed": 0.9, "restitution": 0.4}, {"motor_speed": 0.08, "restitution": 0.19})
     after = learned(before, frees, sure)

@@ -10,11 +10,11 @@ import numpy as np
 
 from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.identify.closed_free_run import closed_free_run
-from r2s2r_cli.stages.identify.data import RunData, Selection
+from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.fit import fit
 from r2s2r_cli.stages.identify.found import OURS, FreeRunFound, SegmentFound
 from r2s2r_cli.stages.identify.free import Mapping as FreeMapping, select
-from r2s2r_cli.stages.identify.judged import replayed, steps_from
+from r2s2r_cli.stages.identify.judged import Replayed, replayed, starts_of, steps_from
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import PAPER_FREE, Recipe
 from r2s2r_cli.stages.identify.replays import free_runs_found, segments_found
@@ -60,8 +60,7 @@ def held_out(
     progress: Callable[[int, int], None],
 ) -> Judged:
     """Judge the values. Nothing is fitted to test intervals; the rivals are fitted to the same training intervals."""
-    ours_train = replayed(runs, request.train, predictor, values, recipe, free_run=False)
-    ours_test = replayed(runs, request.test, predictor, values, recipe)
+    ours_train, ours_test = _both(runs, request, predictor, values, recipe)
     progress(1, ROUNDS)
     rivals, rollouts, warnings = _rivals(robot, runs, request, recipe, predictor, cache_dir, progress)
     test = None
@@ -101,11 +100,13 @@ def _rivals(
             frees = select(names, robot) if names else ()
             mapping = FreeMapping(robot, frees, structure=replace(predictor.structure, effects=()))
             own = Predictor(mapping, step=recipe.step, cache_dir=cache_dir)
+            if own.structure == predictor.structure:
+                own.simulator = predictor.simulator  # its machine code
             at = np.array([free.start for free in frees])
             if names:
                 at = fit(runs, request.train, own, recipe, seed=request.seed).values
-            both = [replayed(runs, side, own, at, recipe, free_run=side is request.test) for side in _sides(request)]
-            found[name] = both[0].predicted, both[1].predicted
+            train, test = _both(runs, request, own, at, recipe)
+            found[name] = train.predicted, test.predicted
             count += own.rollouts
         except NumericalError as error:
             warnings.append(f"the rival '{name}' could not be simulated: {error.what}")
@@ -113,8 +114,15 @@ def _rivals(
     return found, count, warnings
 
 
-def _sides(request: Request) -> tuple[tuple[Selection, ...], tuple[Selection, ...]]:
-    return request.train, request.test
+def _both(
+    runs: Sequence[RunData], request: Request, predictor: Predictor, values: np.ndarray, recipe: Recipe
+) -> tuple[Replayed, Replayed]:
+    """Train and test intervals replayed, these also in free runs, from one pass of the filter."""
+    starts = starts_of(runs, (*request.train, *request.test), predictor, values, recipe)
+    return (
+        replayed(runs, request.train, predictor, values, recipe, free_run=False, starts=starts),
+        replayed(runs, request.test, predictor, values, recipe, starts=starts),
+    )
 
 
 def _floor(runs: Sequence[RunData], request: Request) -> Floor | None:

@@ -19,6 +19,9 @@ from r2s2r_cli.stages.measures.table import Predicted
 if TYPE_CHECKING:
     from r2s2r_cli.engine import State
 
+Starts = dict[tuple[str, int], "State"]
+"""Start states (batch of 1) by run and interval, 1-based."""
+
 
 @dataclass(frozen=True)
 class Replayed:
@@ -47,6 +50,19 @@ def steps_from(runs: Sequence[RunData], selections: Sequence[Selection], *, smoo
     return tuple(found)
 
 
+def starts_of(
+    runs: Sequence[RunData], selections: Sequence[Selection], predictor: Predictor, values: np.ndarray, recipe: Recipe
+) -> Starts:
+    """Causal start states of the selected intervals, and of those before them: one pass of the filter over each run.
+
+    Raises as `states_at`.
+    """
+    last: dict[str, int] = {}
+    for one in selections:
+        last[one.run] = max(*one.intervals, last.get(one.run, 1))
+    return states_at([run for run in runs if run.name in last], predictor, values, last, belief=recipe.belief)
+
+
 def replayed(
     runs: Sequence[RunData],
     selections: Sequence[Selection],
@@ -56,8 +72,10 @@ def replayed(
     *,
     free_run: bool = True,
     known: dict[str, State] | None = None,
+    starts: Starts | None = None,
 ) -> Replayed:
-    """Simulate the selected intervals by command replay. known: true states at the first frames of runs.
+    """Simulate the selected intervals by command replay. known: true states at the first frames of runs. starts: what
+    `starts_of` says of these intervals, and maybe others, with the same values; None: found here.
 
     Raises NumericalError where the simulation leaves the finite numbers.
     """
@@ -65,13 +83,8 @@ def replayed(
     if not steps:
         return Replayed((), (), ())
     named = {run.name: run for run in runs}
-    last: dict[str, int] = {}
-    for step in steps:
-        last[step.run] = max(step.interval, last.get(step.run, 1))
-    guessed = [run for run in runs if run.name in last]
-    states = states_at(guessed, predictor, values, last, belief=recipe.belief)
-    for name, state in (known or {}).items():
-        states[name, 1] = state
+    states = starts_of(runs, selections, predictor, values, recipe) if starts is None else dict(starts)
+    states.update({(name, 1): state for name, state in (known or {}).items()})
     windows = [window(named[step.run], (step.interval,), states[step.run, step.interval], whole=True) for step in steps]
     runs_free = [
         window(

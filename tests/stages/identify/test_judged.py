@@ -11,7 +11,7 @@ import torch
 
 from r2s2r_cli.engine import end_caps
 from r2s2r_cli.stages.identify.data import RunData, Selection
-from r2s2r_cli.stages.identify.judged import Replayed, replayed, simulated_paths, steps_from
+from r2s2r_cli.stages.identify.judged import Replayed, replayed, simulated_paths, starts_of, steps_from
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
 from r2s2r_cli.stages.identify.start import Filter, states_at
@@ -76,6 +76,20 @@ def test_nothing_later_is_known_to_a_prediction() -> None:
     np.testing.assert_array_equal(played().simulated[0], earlier.simulated[0])
     np.testing.assert_array_equal(played().free[0], earlier.free[0])
     assert not np.array_equal(played().simulated[1], earlier.simulated[1])
+
+
+def test_one_pass_of_the_filter_serves_both_sides() -> None:
+    """Starts of all intervals at once are those that the test intervals alone have, bit by bit."""
+    run = [noisy()]
+    both = (Selection("walk", (3,)), Selection("walk", (1,)))
+    starts = starts_of(run, both, predictor(), values(), RECIPE)
+    assert sorted(starts) == [("walk", 1), ("walk", 2), ("walk", 3)]
+    other = replayed(run, TEST, predictor(), values(), RECIPE, starts=starts)
+    for one, two in zip((*played().simulated, *played().free), (*other.simulated, *other.free), strict=True):
+        np.testing.assert_array_equal(one, two)
+    (early,) = replayed(run, both[1:], predictor(), values(), RECIPE, free_run=False).simulated
+    (late,) = replayed(run, both[1:], predictor(), values(), RECIPE, free_run=False, starts=starts).simulated
+    np.testing.assert_array_equal(early, late)
 
 
 def test_later_commands_change_nothing_before_them() -> None:

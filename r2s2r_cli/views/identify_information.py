@@ -42,7 +42,7 @@ def information_figure(data: ArtifactData) -> Figure:
     columns[1].set_xticks(range(len(names)), names, rotation=90, fontsize=8)
     columns[1].set_yticks([])
     if covariance is not None:
-        _matrix(figure, columns[2], covariance["correlation"], "correlation of the estimates (grey: not identifiable)")
+        _matrix(figure, columns[2], covariance["correlation"], "correlation of the estimates (grey: nothing is known)")
         columns[2].set_xticks(range(len(names)), names, rotation=90, fontsize=8)
         columns[2].set_yticks(range(len(names)), names, fontsize=8)
     return figure

@@ -16,10 +16,11 @@ from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.solve.record import Checkpoint as SolverCheckpoint, Progress as SolverProgress
 from r2s2r_cli.stages.identify.task import Task, free_parameters
 from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, Trust
+from r2s2r_cli.stages.identify.windows import spans
 
 LOSS = (
-    "end caps at all frames, Student t: windows of up to {window} intervals with free start states, then of {short} "
-    "intervals from filtered ones"
+    "end caps at all frames, Student t: windows of up to {window} target intervals with free start states, then of "
+    "{short} from filtered ones"
 )
 CLOSE_SHARE = 1e-3
 """Costs within this many times the number of residuals are about as good: residuals of real runs are correlated."""
@@ -48,8 +49,11 @@ def holding(task: Task, predictor: Predictor) -> tuple[Task, Identifiability]:
 
 
 def loss_words(task: Task) -> str:
-    """What the default fit makes small."""
-    return LOSS.format(window=task.recipe.window, short=", ".join(map(str, task.recipe.short)))
+    """What the default fit makes small: windows as long as the training intervals allow."""
+    recipe = task.recipe
+    longest = max(len(one) for chosen in task.request.train for one in spans(chosen.intervals, recipe.window))
+    short = [length for length in recipe.short if length <= longest] or [longest]
+    return LOSS.format(window=longest, short=", ".join(map(str, short)))
 
 
 def first_fit(task: Task, predictor: Predictor, kept: Kept) -> Fit:

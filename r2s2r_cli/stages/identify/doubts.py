@@ -11,12 +11,14 @@ from r2s2r_cli.stages.identify.trust.identifiability import Trust
 
 RATE = "motor_speed"
 """Names of winding rates begin like this; their unit is the no-load speed."""
+ON_BOUND = 1e-6
+"""Relative distance from a bound that is none."""
 
 
 def doubtful(parameters: Sequence[ParameterFound]) -> tuple[str, ...]:
     """One sentence for all winding rates beyond the no-load speed, and one for each bound that was hit."""
     free = [one for one in parameters if one.trust is not None]
-    return (*_too_fast(free), *(_on_bound(one) for one in free if one.trust is Trust.ON_BOUND))
+    return (*_too_fast(free), *(_on_bound(one) for one in free if _hit(one)))
 
 
 def _too_fast(parameters: Sequence[ParameterFound]) -> list[str]:
@@ -35,9 +37,21 @@ def _too_fast(parameters: Sequence[ParameterFound]) -> list[str]:
     return [f"{text}. Either {why}: predict with them, do not report them as speeds"]
 
 
+def _hit(one: ParameterFound) -> bool:
+    """Whether the fit ended on a bound: also of a number that the runs turned out not to determine."""
+    free = one.free
+    away = min(one.value - free.lower, free.upper - one.value)
+    return one.trust is Trust.ON_BOUND or (one.value != free.start and away <= ON_BOUND * max(abs(one.value), 1e-12))
+
+
 def _on_bound(one: ParameterFound) -> str:
     free, name = one.free, one.free.name
     low = one.value - free.lower <= free.upper - one.value
+    if one.trust is Trust.NOT_IDENTIFIABLE:
+        return (
+            f"{name} went to its bound {one.value:g} although the runs do not determine it: other numbers can make up "
+            f"for it, so give it a value that is known, --fix {name}={free.start:g}, or a narrower prior"
+        )
     unit = "" if free.unit == "1" else f" {free.unit}"
     text = f"{name} lies on its bound {(free.lower if low else free.upper):g}{unit}: the runs ask for more"
     wide = wider(free, below=low)

@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import pytest
 
+from r2s2r_cli.stages.identify.data import Selection
+from r2s2r_cli.stages.identify.default_method import loss_words
 from r2s2r_cli.stages.identify.doubts import doubtful, wider
 from r2s2r_cli.stages.identify.found import ParameterFound
 from r2s2r_cli.stages.identify.free import catalogue
@@ -14,7 +16,10 @@ from r2s2r_cli.stages.identify.free.base import Coordinate, Free
 from r2s2r_cli.stages.identify.free.extend import extended
 from r2s2r_cli.stages.identify.free.select import select
 from r2s2r_cli.stages.identify.report import report_of
+from r2s2r_cli.stages.identify.request import Request
+from r2s2r_cli.stages.identify.task import Task
 from r2s2r_cli.stages.identify.trust.identifiability import Trust
+from schemas.config import IdentifySettings
 from tests.stages.identify.planted import found
 from tests.support.engine import threebar
 
@@ -48,6 +53,14 @@ def test_a_bound_that_was_hit_comes_with_the_option_that_widens_it() -> None:
     assert free.lower == pytest.approx(bound / 2, rel=1e-3) and free.prior_sd == 0.02
 
 
+def test_a_bound_that_was_hit_for_nothing_is_told_too() -> None:
+    """A number that the runs do not determine and that still went to its bound: give it, or hold it tighter."""
+    bound = KNOWN["rest_length.8"].lower
+    (text,) = doubtful([one("rest_length.8", bound, bound, Trust.NOT_IDENTIFIABLE)])
+    assert f"--fix rest_length.8={KNOWN['rest_length.8'].start:g}," in text and "do not determine it" in text
+    assert doubtful([one("rest_length.8", 1.01 * bound, bound, Trust.NOT_IDENTIFIABLE)]) == ()
+
+
 @pytest.mark.parametrize(
     ("free", "below", "expected"),
     [
@@ -69,3 +82,13 @@ def test_they_reach_the_report() -> None:
     fast = replace(found().parameters[0], value=1.2, lower=1.1)
     warnings = report_of(found(parameters=(fast,), covariance=None, information=None, profiles=())).warnings
     assert warnings[0] == "a remark" and "motor_speed 1.2" in warnings[1] and len(warnings) == 2
+
+
+def test_the_loss_names_windows_that_there_are() -> None:
+    """Of at most as many intervals as follow each other in training, not of as many as the recipe allows."""
+
+    def said(*intervals: int) -> str:
+        return loss_words(Task(threebar(), [], Request((Selection("walk", intervals),)), IdentifySettings()))
+
+    assert "up to 3 target intervals" in said(1, 2, 3, 5, 6) and "then of 2, 3 from" in said(1, 2, 3, 5, 6)
+    assert "up to 1 target intervals" in said(4) and "then of 1 from" in said(4)

@@ -12,6 +12,7 @@ from r2s2r_cli.stages.identify.free.base import Free
 from r2s2r_cli.stages.identify.request import Request
 from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, Trust
 from r2s2r_cli.stages.measures.floor import Floor
+from r2s2r_cli.stages.measures.keyframes import frame_rmse
 from r2s2r_cli.stages.measures.steps import Step
 from r2s2r_cli.stages.measures.table import Row
 
@@ -100,12 +101,28 @@ class WindowFound:
 
 @dataclass(frozen=True)
 class SegmentFound:
-    """One target interval from its own start. simulated (frame, cap, 3) [m] at the frames of the step; lag1 (cap,)."""
+    """One target interval from its own start. simulated: (frame, cap, 3) [m] at the frames of the step. lag1, white:
+    (cap,), of the residuals, see `trust.whiteness`."""
 
     step: Step
     simulated: np.ndarray
     lag1: np.ndarray
     white: np.ndarray
+
+    @property
+    def keyframe_error(self) -> np.ndarray:
+        """Simulated minus observed end caps at the key frame, (cap, 3) [m]."""
+        return np.asarray(self.simulated[-1] - self.step.key)
+
+    @property
+    def keyframe_cap_rmse(self) -> float:
+        """Root mean square over caps of its length [m]."""
+        return float(np.sqrt(np.sum(self.keyframe_error**2, axis=-1).mean()))
+
+    @property
+    def cap_rmse(self) -> float:
+        """Root mean square over frames and caps of the distance [m]."""
+        return float(np.sqrt(np.mean(frame_rmse(self.step.p_WE, self.simulated) ** 2)))
 
 
 @dataclass(frozen=True)

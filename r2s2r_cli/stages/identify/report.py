@@ -9,7 +9,6 @@ import numpy as np
 
 from r2s2r_cli.stages.identify.doubts import doubtful
 from r2s2r_cli.stages.identify.found import OURS, Found, ParameterFound, SegmentFound
-from r2s2r_cli.stages.identify.groups import whole_error
 from r2s2r_cli.stages.measures.bootstrap import Interval
 from r2s2r_cli.stages.measures.table import Row
 from schemas.results_identify import (
@@ -124,8 +123,8 @@ def _side(role: str, segments: Sequence[SegmentFound], rows: Mapping[str, Row]) 
     return [
         SegmentFigures(
             run=one.step.run, interval=one.step.interval, role=role,  # type: ignore[arg-type]
-            keyframe_cap_rmse_m=float(np.sqrt(np.sum((one.simulated[-1] - one.step.key) ** 2, axis=-1).mean())),
-            cap_rmse_m=whole_error(one),
+            keyframe_cap_rmse_m=one.keyframe_cap_rmse,
+            cap_rmse_m=one.cap_rmse,
             baselines={name: _finite(row.key.per_segment_m[i]) for name, row in rows.items() if name != OURS},
             not_white=tuple(int(cap) for cap in np.flatnonzero(~np.asarray(one.white, dtype=bool))),
         )

@@ -14,8 +14,9 @@ from r2s2r_cli.artifact import Group
 from r2s2r_cli.checks import CHECKS
 from r2s2r_cli.checks.base import run_checks
 from r2s2r_cli.checks.subjects import Content
+from r2s2r_cli.stages.identify.columns import texts
 from r2s2r_cli.stages.identify.found import ParameterFound
-from r2s2r_cli.stages.identify.groups import identification, texts
+from r2s2r_cli.stages.identify.groups import identification
 from r2s2r_cli.stages.identify.report import report_of
 from r2s2r_cli.store.read import read_artifact
 from r2s2r_cli.store.write import write_artifact
@@ -129,6 +130,12 @@ def test_what_was_fixed_by_hand_stands_behind_what_was_free(tmp_path: Path) -> N
         report_of(replace(plain, parameters=(*plain.parameters, fixed), covariance=wide)).parameters["friction"].trust
         == "fixed"
     )
+
+
+def test_a_page_can_say_that_a_run_is_no_measurement() -> None:
+    """What a run is stands beside its data; a run that does not say has no such word, not an empty one."""
+    assert identification(found()).groups["runs/line"].attributes["nature"] == "simulated"
+    assert "nature" not in identification(found(natures={})).groups["runs/line"].attributes
 
 
 def test_words_are_stored_as_text() -> None:

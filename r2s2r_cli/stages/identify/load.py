@@ -14,6 +14,9 @@ from r2s2r_cli.stages.segments import Intervals, Segments
 STILL = 3.0
 """A run whose smoothed caps move less than this many standard deviations of the noise (all axes) shows no motion."""
 
+LEAST_M = 1e-5
+"""Noise of a log that has none: its numbers are rounded somewhere."""
+
 
 def run_data(recording: ArtifactData | None, estimate: ArtifactData, run: str, *, name: str = "") -> RunData:
     """The run of both artifacts; `name`: what it is called in the fit (default: as there).
@@ -135,7 +138,7 @@ def _require_rows(data: RunData, run: str) -> None:
 
 def _require_motion(data: RunData, run: str) -> None:
     moved = np.linalg.norm(data.p_WE - data.p_WE[0], axis=-1).max(axis=0)
-    noise = np.linalg.norm(data.noise, axis=-1)
+    noise = np.maximum(np.linalg.norm(data.noise, axis=-1), LEAST_M)
     if (moved < STILL * noise).all():
         cap = int(np.argmax(moved / noise))
         raise InputError(

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from r2s2r_cli.errors import UsageError
+from r2s2r_cli.stages.identify.commands import CommandLog
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.found import ParameterFound
 from r2s2r_cli.stages.identify.free import Free, Mapping, select
@@ -50,8 +51,12 @@ class Task:
         return {run.name: run.nature for run in self.runs if run.nature}
 
     def predictor(self, frees: Sequence[Free]) -> Predictor:
-        """The engine with these free numbers."""
-        return predictor_of(self.robot, frees, self.request, self.recipe, self.settings, self.cache_dir)
+        """The engine with these free numbers, those that were given, and the effects that were asked for."""
+        from r2s2r_cli.stages.model import structure_of
+
+        structure = replace(structure_of(self.robot), rod_contact=self.settings.rod_contact)
+        mapping = Mapping(self.robot, frees, self.request.effects, fixed=self.request.fixed, structure=structure)
+        return Predictor(mapping, step=self.recipe.step, cache_dir=self.cache_dir)
 
     def fixed(self) -> tuple[ParameterFound, ...]:
         """The numbers that were given."""
@@ -111,18 +116,13 @@ def specs_asked(request: Request, settings: IdentifySettings, default: Sequence[
 
 
 def busy(robot: Robot, runs: Sequence[RunData], request: Request) -> tuple[tuple[str, int], ...]:
-    """(way, cable), in or out: winches that ran for a fair share of the training intervals, all runs together, each way
-    that they ran in."""
+    """(way, cable), in or out: winches that ran for a fair share of the time of the training intervals, all runs
+    together, each way that they ran in."""
     inwards, outwards = np.zeros(len(robot.actuated)), np.zeros(len(robot.actuated))
     for one in request.train:
         run = next(run for run in runs if run.name == one.run)
-        for number in one.intervals:
-            inside = (run.t_command >= run.intervals.t_first[number - 1]) & (
-                run.t_command <= run.intervals.t_last[number - 1]
-            )
-            control = np.nan_to_num(run.control[inside])
-            inwards += np.maximum(control, 0.0).sum(axis=0)
-            outwards += np.maximum(-control, 0.0).sum(axis=0)
+        inwards += _wound(run, one.intervals, 1.0)
+        outwards += _wound(run, one.intervals, -1.0)
     both = inwards + outwards
     fair = both > MOVED_SHARE * max(both.max(), 1e-12)
     return tuple(
@@ -133,13 +133,12 @@ def busy(robot: Robot, runs: Sequence[RunData], request: Request) -> tuple[tuple
     )
 
 
-def predictor_of(
-    robot: Robot, frees: Sequence[Free], request: Request, recipe: Recipe, settings: IdentifySettings,
-    cache_dir: Path | None,
-) -> Predictor:  # fmt: skip
-    """The engine with these free and fixed numbers and the effects asked for."""
-    from r2s2r_cli.stages.model import structure_of
-
-    structure = replace(structure_of(robot), rod_contact=settings.rod_contact)
-    mapping = Mapping(robot, frees, request.effects, fixed=request.fixed, structure=structure)
-    return Predictor(mapping, step=recipe.step, cache_dir=cache_dir)
+def _wound(run: RunData, intervals: Sequence[int], way: float) -> np.ndarray:
+    """Integral of the commands of that sign over the intervals (1-based), (actuated,) [s at full speed]."""
+    log = CommandLog(replace(run, control=np.maximum(way * np.nan_to_num(run.control), 0.0)))
+    spent = np.zeros(run.control.shape[1])
+    for number in intervals:
+        begin, end = (float(side[number - 1]) for side in (run.intervals.t_first, run.intervals.t_last))
+        if end > begin:
+            spent += (end - begin) * log.rows(begin, 1, step=end - begin, delay=0.0)[0][0]
+    return spent

@@ -160,6 +160,15 @@ def test_a_run_that_moves_less_than_its_noise_is_bad_input(factor: float, still:
     assert "cap 4" in error.value.received
 
 
+def test_a_log_without_noise_that_does_not_move_is_bad_input() -> None:
+    """No noise at all: still is still, and nothing is divided by 0."""
+    recording, estimate = artifacts(p_WE=np.tile(path(1)[:1], (36, 1, 1)))
+    exact = changed(estimate, "tracks", noise_sd=np.zeros((6, 3)))
+    with pytest.raises(InputError, match="nothing moves") as error:
+        run_data(recording, exact, "walk")
+    assert "at most 0.0 mm" in error.value.received
+
+
 def test_one_interval_alone_is_bad_input_and_two_of_any_runs_are_not() -> None:
     """One complete interval in all runs: exit 4; constant targets are called by their name."""
     one, many = run(1), run(3)

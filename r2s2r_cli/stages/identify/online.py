@@ -29,6 +29,7 @@ from r2s2r_cli.stages.identify.solve.record import Progress as SolverProgress
 from r2s2r_cli.stages.identify.task import Task, free_parameters, specs_asked
 from r2s2r_cli.stages.identify.trust.identifiability import Trust
 from r2s2r_cli.stages.identify.trusted import Sureness, sureness
+from r2s2r_cli.stages.identify.twice import learned_twice
 
 DRIFT = 0.05
 """Standard deviation of what a run changes: of a logarithmic coordinate, 5 %; else this share of its width."""
@@ -83,9 +84,19 @@ def find_online(task: Task) -> Found:
     last = Fitted(
         made, (start_found([free.start for free in frees], made),), made.solution.z[None, : len(frees)],
         tuple(kept.steps), f"{loss_words(task)}; run after run, the cost is of the last", None, task.settings.profiles,
-        tuple(updates),
+        tuple(updates), _remarks(learned_twice(task.request.before, task.runs, order)),
     )  # fmt: skip
     return concluded(task, predictor, last)
+
+
+def _remarks(twice: tuple[str, ...]) -> tuple[str, ...]:
+    if not twice:
+        return ()
+    names = ", ".join(twice)
+    text = (
+        f"the earlier identification has learned from {names} already: what these runs say counts twice, and intervals"
+    )
+    return (f"{text} are too narrow; --online is for runs that are new",)
 
 
 def first_free(task: Task) -> tuple[Free, ...]:

@@ -27,10 +27,13 @@ from r2s2r_cli.stages.identify.online import (
     update_of,
 )
 from r2s2r_cli.stages.identify.trust.identifiability import Trust
+from r2s2r_cli.stages.identify.twice import learned_twice
 from tests.stages.identify.planted import BOUNCE, SPEED, found
+from tests.stages.measures.gait import run as walk
 from tests.support.robots import subject
 
 NAN = (math.nan, math.nan)
+NOTHING: dict[str, Any] = {"train_segments": (), "test_segments": (), "test": None, "free_runs": ()}
 
 
 def test_the_prior_is_what_was_known_and_the_drift() -> None:
@@ -92,3 +95,20 @@ def test_runs_are_taken_one_after_the_other() -> None:
     """In the order in which they are named first, each once."""
     train = (Selection("b", (3,)), Selection("a", (1, 2)), Selection("b", (1,)))
     assert by_run(train) == (Selection("b", (1, 3)), Selection("a", (1, 2)))
+
+
+def test_a_run_is_learned_from_once() -> None:
+    """Under whatever name: frames of a training interval count twice, those that were only tested do not, and another
+    run of the same gait, with noise of its own, is new."""
+    before = identification(found())
+    line = [segment.step for segment in (*found().train_segments, *found().test_segments)]
+    t, p_WE = (np.concatenate([getattr(step, name) for step in line]) for name in ("t", "p_WE"))
+    ends = np.cumsum([len(step.t) for step in line])
+    starts = ends - len(line[0].t)
+    table = replace(walk(4).intervals, first=starts, last=ends - 1)
+    same_run = replace(walk(4), name="002-line", t=t, observed=p_WE, intervals=table)
+    other = replace(same_run, name="other", observed=p_WE + 1e-9)
+    for intervals, twice in (((2, 3), ("002-line",)), ((4,), ())):
+        train = (Selection("002-line", intervals), Selection("other", intervals))
+        assert learned_twice(before, [same_run, other], train) == twice
+    assert learned_twice(identification(found(**NOTHING)), [same_run], (Selection("002-line", (1,)),)) == ()

@@ -23,7 +23,8 @@ def verdict(report: IdentifyReport) -> str:
     held = report.heldout
     if held is None:
         return f"{told} Nothing was held out: how well it predicts is not known."
-    rivals = ", ".join(f"{name} {millimetres(b.keyframe_cap_rmse_m)}" for name, b in held.baselines.items())
+    known = {name: b.keyframe_cap_rmse_m for name, b in held.baselines.items() if b.keyframe_cap_rmse_m is not None}
+    rivals = ", ".join(f"{name} {millimetres(error)}" for name, error in known.items())
     count = sum(segment.role == "test" for segment in report.segments)
     floor = "not known" if held.floor_m is None else f"{millimetres(held.floor_m)} mm"
     error = f"{millimetres(held.keyframe_cap_rmse_m)} mm{spread(held.intervals.keyframe_cap_rmse_m)}"
@@ -154,7 +155,8 @@ def _how(report: IdentifyReport) -> Iterator[list[str]]:
     if report.uncertainty:
         yield ["standard deviations", report.uncertainty]
     yield ["effects", ", ".join(report.effects) or "none"]
-    yield ["ended", f"{'converged' if report.converged else 'not converged'}: {report.reason}"]
+    ended = "converged" if report.converged else "not converged"
+    yield ["ended", report.reason if report.reason.lower().startswith("converged") else f"{ended}: {report.reason}"]
     yield ["residuals", f"{report.residuals}, loss {figure_of(report.cost, 6)}"]
     yield ["work", f"{report.rollouts} rollouts, {report.wall_s:.1f} s"
            + "".join(f"; {part} {seconds:.1f} s" for part, seconds in report.seconds.items())]  # fmt: skip

@@ -19,7 +19,7 @@ from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, Tru
 from r2s2r_cli.stages.identify.windows import spans
 
 LOSS = (
-    "end caps at all frames, Student t: windows of up to {window} target intervals with free start states, then of "
+    "end caps at all frames, Student t: windows of up to {window} with free start states, then of "
     "{short} from filtered ones"
 )
 CLOSE_SHARE = 1e-3
@@ -53,7 +53,8 @@ def loss_words(task: Task) -> str:
     recipe = task.recipe
     longest = max(len(one) for chosen in task.request.train for one in spans(chosen.intervals, recipe.window))
     short = [length for length in recipe.short if length <= longest] or [longest]
-    return LOSS.format(window=longest, short=", ".join(map(str, short)))
+    whole = f"{longest} target interval{'s' if longest > 1 else ''}"
+    return LOSS.format(window=whole, short=", ".join(map(str, short)))
 
 
 def first_fit(task: Task, predictor: Predictor, kept: Kept) -> Fit:

@@ -91,4 +91,4 @@ def test_the_loss_names_windows_that_there_are() -> None:
         return loss_words(Task(threebar(), [], Request((Selection("walk", intervals),)), IdentifySettings()))
 
     assert "up to 3 target intervals" in said(1, 2, 3, 5, 6) and "then of 2, 3 from" in said(1, 2, 3, 5, 6)
-    assert "up to 1 target intervals" in said(4) and "then of 1 from" in said(4)
+    assert "up to 1 target interval with" in said(4) and "then of 1 from" in said(4)

@@ -24,7 +24,8 @@ def worth(after: Identifiability, spread: Covariance, frees: Sequence[Free]) -> 
 
     Counted is the share of the width of prior and bounds that is left: by the information at the solution, or by the
     reported interval (95 %), whichever leaves more. The interval knows what the information does not: windows that
-    disagree, and that few of them tell little. An interval that reaches both bounds leaves more than 0.88.
+    disagree, and that few of them tell little. An interval that reaches both bounds leaves more than 0.88. One window
+    alone knows of no disagreement, so that its intervals are of noise only: nothing is identified by it.
     """
     reported = spread.sd_z * spread.quantile / _NORMAL_95 / after.width
     reported = np.where(np.isfinite(reported), reported, 1.0)
@@ -39,5 +40,8 @@ def worth(after: Identifiability, spread: Covariance, frees: Sequence[Free]) -> 
             reason += f": {spread.clusters} windows are too few to say more" if spread.clusters else ": too few windows"
         elif free.name in (*after.stalled, *after.rough):
             reason += _BY_CHANGE
-        found.append((trust_of(share), reason))
+        trust = trust_of(share)
+        if spread.clusters < 2 and trust is Trust.IDENTIFIED:
+            trust, reason = Trust.WEAK, f"{reason}, but by one interval alone: nothing shows what others would say"
+        found.append((trust, reason))
     return tuple(found)

@@ -64,6 +64,16 @@ def test_an_interval_to_both_bounds_is_no_identification() -> None:
     assert reason == "prior and bounds allow 42 %, the runs leave all of it: 2 windows are too few to say more"
 
 
+def test_one_window_alone_identifies_nothing() -> None:
+    """However much information: without a second window no disagreement can show."""
+    after, spread = told(0.004)
+    ((found, reason),) = worth(after, replace(spread, clusters=1), (FREE,))
+    assert found is Trust.WEAK and "by one interval alone" in reason
+    after, spread = told(0.2)
+    ((found, reason),) = worth(after, replace(spread, clusters=1), (FREE,))
+    assert found is Trust.NOT_IDENTIFIABLE and "alone" not in reason
+
+
 def test_what_nothing_depends_on_says_so() -> None:
     """A column of zeros."""
     after, spread = told(1e9)

@@ -58,7 +58,7 @@ PARAMETERS = GroupSpec(
         column("lower", "float64", ("parameter",), "1", "lower end of the 95 % interval", nan_means=_NO_SD),
         column("upper", "float64", ("parameter",), "1", "upper end of the 95 % interval", nan_means=_NO_SD),
         column("range", "float64", ("parameter", "pair"), "1", "smallest and largest value over starts and re-drawn noise",
-               nan_means="no study of the range was made"),
+               nan_means="no study of the range was made, or the runs do not say it"),
         column("bounds", "float64", ("parameter", "pair"), "1", "smallest and largest allowed value", nan_means="no bound"),
         column("start", "float64", ("parameter",), "1", "value of robot.toml (or of the estimate that was continued), where the fit began"),
         column("prior_mean", "float64", ("parameter",), "1", "mean of the prior", nan_means="flat"),

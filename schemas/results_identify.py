@@ -23,7 +23,7 @@ class ParameterFigures(Frozen):
     upper: float | None
     """95 % interval."""
     range: Interval | None
-    """Over starts and re-drawn noise; None: not studied."""
+    """Over starts and re-drawn noise; None: not studied, or the runs do not say the number."""
     unit: str
     identifiable: bool
     trust: Trust

@@ -55,10 +55,11 @@ def sureness(fitted: Fit, others: np.ndarray, *, loss: str, seed: int) -> Surene
             trust, reason = Trust.NOT_IDENTIFIABLE, "the training intervals do not show it: held at its start"
         elif trust is not Trust.NOT_IDENTIFIABLE and free.name in bound and values[k] != free.start:
             trust, reason = Trust.ON_BOUND, "the runs ask for more than its bound allows"
+        wide = (np.nan, np.nan) if trust is Trust.NOT_IDENTIFIABLE else (float(reach[k, 0]), float(reach[k, 1]))
         found.append(
             ParameterFound(
                 free=free, value=float(values[k]), sd=float(spread.sd[k]), lower=float(spread.lower[k]),
-                upper=float(spread.upper[k]), range=(float(reach[k, 0]), float(reach[k, 1])), trust=trust,
+                upper=float(spread.upper[k]), range=wide, trust=trust,
                 reason=reason,
             )
         )  # fmt: skip

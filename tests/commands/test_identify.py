@@ -16,7 +16,9 @@ import pytest
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.read import read_artifact
 from tests.commands.conftest import document, invoke
-from tests.support.simulated_log import write_log
+from tests.support.builders import same
+from tests.support.resumed import but_for_rollouts
+from tests.support.simulated_log import simulated_project
 
 pytestmark = pytest.mark.slow
 
@@ -49,17 +51,8 @@ main()
 def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A log of the engine's own robot, estimated; then robot.toml is made wrong by a fifth, and identified."""
     root = tmp_path_factory.mktemp("identified") / "robot"
-    where = ("--project", str(root))
-    assert invoke("init", str(root)).exit_code == 0
-    (root / "gait.toml").write_text(GAIT)
-    assert invoke("simulate", str(root / "gait.toml"), "--no-draw", *where).exit_code == 0
-    write_log(read_artifact(root / "iterations/001/simulation.h5")[1], "gait", root / "log" / "gait.csv")
-    assert invoke("import", str(root / "log" / "gait.csv"), "--no-draw", *where).exit_code == 0
-    assert invoke("estimate", "--no-draw", *where).exit_code == 0
-    robot = root / "robot.toml"
-    assert "speed = 0.8" in robot.read_text()
-    robot.write_text(robot.read_text().replace("speed = 0.8", "speed = 0.64"))
-    result = invoke("identify", *ASK, *where)
+    simulated_project(root, GAIT, told=0.64)
+    result = invoke("identify", *ASK, "--project", str(root))
     assert result.exit_code == 0, result.stderr
     return root
 
@@ -126,8 +119,9 @@ def test_one_interval_is_too_few(identified: Path) -> None:
 
 
 def test_ctrl_c_leaves_a_checkpoint_and_resume_ends_the_same(identified: Path) -> None:
-    """Interrupted it leaves with 130, the artifact as it was; taken up, it ends with the values of the whole fit."""
+    """Interrupted it leaves with 130, the artifact as it was; taken up, it leaves the artifact of the whole fit."""
     before = read_header(identified / IDENTIFY).content_sha256
+    whole = read_artifact(identified / IDENTIFY, "identification")[1]
     code = START.format(arguments=[*ASK, "--force", "--no-draw"])
     child = subprocess.Popen([sys.executable, "-c", code], cwd=identified, stdout=subprocess.DEVNULL,
                              stderr=subprocess.PIPE, text=True, env={**os.environ})  # fmt: skip
@@ -143,10 +137,9 @@ def test_ctrl_c_leaves_a_checkpoint_and_resume_ends_the_same(identified: Path) -
     assert checkpoint.exists()
     refused = invoke("identify", *ASK, "--seed", "9", "--resume")
     assert refused.exit_code == 2 and "another request" in refused.stderr
-    whole = document("identify", *ASK)["parameters"]
     assert document("identify", *ASK, "--resume", "--no-draw")["state"] == "done"
-    again = document("identify", *ASK, "--no-draw")["parameters"]
-    assert {name: one["value"] for name, one in again.items()} == {name: one["value"] for name, one in whole.items()}
+    again = read_artifact(identified / IDENTIFY, "identification")[1]
+    assert same(but_for_rollouts(again), but_for_rollouts(whole))
     assert not checkpoint.exists()
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.store.read import read_artifact
+from tests.commands.conftest import invoke
 
 SIDECAR = """\
 robot = "threebar"
@@ -16,6 +18,23 @@ source = "the engine itself"
 noise_sd_m = {noise}
 """
 PERIOD_S = 0.05
+SPEED = 0.8
+"""Of the motors in the robot.toml of a new project."""
+
+
+def simulated_project(root: Path, gait: str, *, told: float) -> None:
+    """A new project with a log `gait` of its own robot walking that policy, estimated; its robot.toml then says that
+    the motors have the speed `told`."""
+    where = ("--project", str(root))
+    assert invoke("init", str(root)).exit_code == 0
+    (root / "gait.toml").write_text(gait)
+    assert invoke("simulate", str(root / "gait.toml"), "--no-draw", *where).exit_code == 0
+    write_log(read_artifact(root / "iterations/001/simulation.h5")[1], "gait", root / "log" / "gait.csv")
+    assert invoke("import", str(root / "log" / "gait.csv"), "--no-draw", *where).exit_code == 0
+    assert invoke("estimate", "--no-draw", *where).exit_code == 0
+    robot = root / "robot.toml"
+    assert f"speed = {SPEED}" in robot.read_text()
+    robot.write_text(robot.read_text().replace(f"speed = {SPEED}", f"speed = {told}"))
 
 
 def write_log(data: ArtifactData, run: str, path: Path, *, noise: float = 0.001, seed: int = 0) -> None:

@@ -51,7 +51,7 @@ def find_paper(task: Task) -> Found:
     demos = [demo for one in request.train for demo in demonstrations(named[one.run], one)]
     asked = Settings(iterations=settings.max_iterations, closed_loop=request.drive == "closed loop")
     fit = _fitted(task, made, demos, asked)
-    return _found(task, made, fit, demos, asked)
+    return _found(task, made, fit, demos)
 
 
 def _fitted(task: Task, made: Preset, demos: list[Demonstration], asked: Settings) -> PaperFit:
@@ -72,7 +72,7 @@ def _fitted(task: Task, made: Preset, demos: list[Demonstration], asked: Setting
     )  # fmt: skip
 
 
-def _found(task: Task, made: Preset, fit: PaperFit, demos: list[Demonstration], asked: Settings) -> Found:
+def _found(task: Task, made: Preset, fit: PaperFit, demos: list[Demonstration]) -> Found:
     frees, trace = made.numbers.frees, fit.trace
     # The same numbers in the engine of the other methods, which replays commands and judges.
     predictor = task.predictor(frees)

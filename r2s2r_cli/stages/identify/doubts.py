@@ -53,7 +53,8 @@ def _on_bound(one: ParameterFound) -> str:
             f"for it, so give it a value that is known, --fix {name}={free.start:g}, or a narrower prior"
         )
     unit = "" if free.unit == "1" else f" {free.unit}"
-    text = f"{name} lies on its bound {(free.lower if low else free.upper):g}{unit}: the runs ask for more"
+    asked = "less" if low else "more"
+    text = f"{name} lies on its bound {(free.lower if low else free.upper):g}{unit}: the runs ask for {asked}"
     wide = wider(free, below=low)
     if wide is None:
         return f"{text} than the number can be at all: something else is missing that it makes up for"

@@ -47,7 +47,7 @@ def test_a_bound_that_was_hit_comes_with_the_option_that_widens_it() -> None:
     """The option is read, keeps the prior of the default set, and has room beyond the bound."""
     bound = KNOWN["rest_length.8"].lower
     (text,) = doubtful([one("rest_length.8", bound, bound, Trust.ON_BOUND)])
-    assert text.startswith(f"rest_length.8 lies on its bound {bound:g} m: the runs ask for more")
+    assert text.startswith(f"rest_length.8 lies on its bound {bound:g} m: the runs ask for less")
     spec = text.split('"')[1]
     (free,) = select(extended((spec,), ("rest_length.8,~0.02",)), threebar())
     assert free.lower == pytest.approx(bound / 2, rel=1e-3) and free.prior_sd == 0.02

@@ -9,7 +9,7 @@ import numpy as np
 
 from r2s2r_cli import __version__
 from r2s2r_cli.stages.identify.fit import Fit, training_windows
-from r2s2r_cli.stages.identify.found import OURS, Found, StartFound, TraceStep, Update
+from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep, Update
 from r2s2r_cli.stages.identify.held_out import Judged, held_out
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
@@ -18,7 +18,6 @@ from r2s2r_cli.stages.identify.starts_found import start_shifts
 from r2s2r_cli.stages.identify.task import Task
 from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, identifiability
 from r2s2r_cli.stages.identify.trusted import profiled, sureness, weakest
-from r2s2r_cli.stages.measures.baselines import NOTHING_MOVES
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,6 @@ def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:
             f"come from a filter, and more iterations fit these instead of the robot. {fit.solution.message}"
         )
     judged = judged_by(task, predictor, fit.values)
-    warnings += doubts(judged)
     fixed = task.fixed()
     return Found(
         request=request, robot=task.robot.name, engine=f"r2s2r {__version__}", step=recipe.step, loss=made.loss,
@@ -81,25 +79,6 @@ def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:
         uncertainty=sure.spread.how, natures=task.natures, computed_by_torch=not predictor.native,
         warnings=(*warnings, *judged.warnings),
     )  # fmt: skip
-
-
-def doubts(judged: Judged) -> list[str]:
-    """What the held-out errors say against the fit, in words."""
-    rows = judged.test or {}
-    ours, found = rows.get(OURS), list[str]()
-    if ours is None or ours.key.rmse_m is None:
-        return []
-    for name, row in rows.items():
-        if name != OURS and row.key.rmse_m is not None and row.key.rmse_m < ours.key.rmse_m:
-            found.append(f"'{name}' predicts the held-out key frames better than the identified simulator")
-    still = rows.get(NOTHING_MOVES)
-    idle = None if still is None else still.free_m
-    if judged.closed_loop_m is not None and idle is not None and judged.closed_loop_m > idle:
-        found.append(
-            "with the controller in the loop the free run is worse than 'nothing moves': it drifts out of step with "
-            "the robot"
-        )
-    return found
 
 
 def judged_by(task: Task, predictor: Predictor, values: np.ndarray) -> Judged:

@@ -1,18 +1,42 @@
-"""What values say against themselves, in words: more than a motor can do, and bounds that were hit."""
+"""What speaks against a fit, in words: rivals that predict as well, more than a motor can do, bounds that were hit."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from r2s2r_cli.stages.identify.found import ParameterFound
+from r2s2r_cli.stages.identify.found import OURS, ParameterFound
 from r2s2r_cli.stages.identify.free.base import Coordinate, Free
 from r2s2r_cli.stages.identify.trust.identifiability import Trust
+from r2s2r_cli.stages.measures.baselines import NOTHING_MOVES
+from r2s2r_cli.stages.measures.table import Row
 
 RATE = "motor_speed"
 """Names of winding rates begin like this; their unit is the no-load speed."""
 ON_BOUND = 1e-6
 """Relative distance from a bound that is none."""
+
+
+def outdone(rows: Mapping[str, Row], closed_loop_m: float | None) -> tuple[str, ...]:
+    """Rivals of no larger held-out error, and a free run with the controller that is worse than none. rows: predictors
+    over the test intervals; closed_loop_m: mean error of that free run."""
+    ours, found = rows.get(OURS), list[str]()
+    if ours is None or ours.key.rmse_m is None:
+        return ()
+    for name, row in rows.items():
+        if name == OURS or row.key.rmse_m is None or row.key.rmse_m >= ours.key.rmse_m:
+            continue
+        difference = ours.against(row)
+        surely = difference is not None and difference.interval.lower > 0.0
+        how = "better than" if surely else "at least as well as"
+        found.append(f"'{name}' predicts the held-out key frames {how} the identified simulator")
+    idle = rows[NOTHING_MOVES].free_m if NOTHING_MOVES in rows else None
+    if closed_loop_m is not None and idle is not None and closed_loop_m > idle:
+        found.append(
+            "with the controller in the loop the free run is worse than 'nothing moves': it drifts out of step with "
+            "the robot"
+        )
+    return tuple(found)
 
 
 def doubtful(parameters: Sequence[ParameterFound]) -> tuple[str, ...]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.identify.default_method import loss_words
-from r2s2r_cli.stages.identify.doubts import doubtful, wider
-from r2s2r_cli.stages.identify.found import ParameterFound
+from r2s2r_cli.stages.identify.doubts import doubtful, outdone, wider
+from r2s2r_cli.stages.identify.found import OURS, ParameterFound
 from r2s2r_cli.stages.identify.free import catalogue
 from r2s2r_cli.stages.identify.free.base import Coordinate, Free
 from r2s2r_cli.stages.identify.free.extend import extended
@@ -19,8 +20,10 @@ from r2s2r_cli.stages.identify.report import report_of
 from r2s2r_cli.stages.identify.request import Request
 from r2s2r_cli.stages.identify.task import Task
 from r2s2r_cli.stages.identify.trust.identifiability import Trust
+from r2s2r_cli.stages.measures.baselines import NOTHING_MOVES
+from r2s2r_cli.stages.measures.table import Predicted, judge
 from schemas.config import IdentifySettings
-from tests.stages.identify.planted import found
+from tests.stages.identify.planted import found, step
 from tests.support.engine import threebar
 
 KNOWN = catalogue(threebar())
@@ -59,6 +62,30 @@ def test_a_bound_that_was_hit_for_nothing_is_told_too() -> None:
     (text,) = doubtful([one("rest_length.8", bound, bound, Trust.NOT_IDENTIFIABLE)])
     assert f"--fix rest_length.8={KNOWN['rest_length.8'].start:g}," in text and "do not determine it" in text
     assert doubtful([one("rest_length.8", 1.01 * bound, bound, Trust.NOT_IDENTIFIABLE)]) == ()
+
+
+def test_rivals_that_predict_as_well_are_named() -> None:
+    """One better in every step, one better on the whole by chance, one worse; and a controller worse than standing."""
+    steps = [step(interval) for interval in range(1, 9)]
+
+    def off(*by: float) -> Predicted:
+        """Errors of the steps in turn [m], along z."""
+        size = np.resize(by, len(steps))
+        key = np.array([one.key for one in steps])
+        key[..., 2] += size[:, None]
+        return Predicted(
+            key, tuple(one.p_WE + np.array([0.0, 0.0, more]) for one, more in zip(steps, size, strict=True))
+        )
+
+    rivals = {"nominal": off(0.001), "last": off(0.0055, 0.001), NOTHING_MOVES: off(0.02)}
+    rows = judge(steps, {OURS: off(0.004), **rivals})
+    said = [
+        "'nominal' predicts the held-out key frames better than the identified simulator",
+        "'last' predicts the held-out key frames at least as well as the identified simulator",
+    ]
+    assert outdone(rows, 0.019) == (*said,)
+    assert outdone(rows, 0.021)[:2] == (*said,) and "worse than 'nothing moves'" in outdone(rows, 0.021)[2]
+    assert outdone({}, None) == ()
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Switches:
     """When the targets of a run were given, on the clock of its log. at: of each interval [s], (interval,); spread: how
-    far that is known, sd [s], (interval,). end: when the last interval was over [s], the last row of its log."""
+    far that is known, sd [s], (interval,). end: the last frame of the last interval [s], which nobody saw end."""
 
     at: np.ndarray
     spread: np.ndarray
@@ -34,10 +34,11 @@ class Switches:
         every = np.append(self.at, self.end)
         return np.asarray(every[np.array(numbers)] - every[np.array(numbers) - 1])
 
-    def took_sd(self, numbers: tuple[int, ...]) -> np.ndarray:
-        """Sd of how long they took [s]."""
-        every = np.append(self.spread, 0.0) ** 2
-        return np.asarray(np.sqrt(every[np.array(numbers)] + every[np.array(numbers) - 1]))
+    def between(self, numbers: tuple[int, ...]) -> np.ndarray:
+        """How far the switches are known that begin consecutive intervals, and end the last, sd [s], (n + 1,); inf
+        for the end of the run."""
+        every = np.append(self.spread, np.inf)
+        return np.asarray(every[numbers[0] - 1 : numbers[-1] + 1])
 
 
 def switches(run: RunData) -> Switches:

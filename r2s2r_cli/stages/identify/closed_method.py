@@ -1,129 +1,103 @@
-"""`--drive closed-loop`: the controller inside the simulation, Levenberg-Marquardt on key frames by differences."""
+"""`--drive closed-loop`: the controller inside the simulation, from several starts; judged as every other fit."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+import math
+from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
-from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.identify.closed_fit import ClosedFit, fit_closed
 from r2s2r_cli.stages.identify.closed_residuals import ClosedResiduals
 from r2s2r_cli.stages.identify.conclude import Fitted, concluded, start_found
-from r2s2r_cli.stages.identify.fit import START_SPREAD, Fit, training_windows
+from r2s2r_cli.stages.identify.fit import Fit, training_windows
 from r2s2r_cli.stages.identify.found import Found, TraceStep
-from r2s2r_cli.stages.identify.free.base import values_of
+from r2s2r_cli.stages.identify.free import Free, select
+from r2s2r_cli.stages.identify.kept import Kept
+from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
-from r2s2r_cli.stages.identify.solve.cma_es import cma_es
-from r2s2r_cli.stages.identify.solve.horizon import Limits
-from r2s2r_cli.stages.identify.solve.linearised import cost_of
-from r2s2r_cli.stages.identify.solve.loss import LOSSES, Loss
-from r2s2r_cli.stages.identify.solve.problem import Evaluation
-from r2s2r_cli.stages.identify.solve.record import Checkpoint as SolverCheckpoint, Progress as SolverProgress
-from r2s2r_cli.stages.identify.solve.starts import CLOSE, multi_start
+from r2s2r_cli.stages.identify.residuals import CapResiduals
+from r2s2r_cli.stages.identify.solve.record import Progress as SolverProgress
+from r2s2r_cli.stages.identify.solve.starts import CLOSE
 from r2s2r_cli.stages.identify.task import Task, free_parameters
 from r2s2r_cli.stages.identify.trust.identifiability import identifiability
 
 LOSS = (
     "end caps at the key frame of each interval and its duration, controller in the loop, windows of {window} "
-    "intervals, Student t, start states as estimated, derivatives by differences"
+    "intervals with free start states, Student t, planes through samples"
 )
-POPULATION = 32
-"""Closed loops side by side in a generation."""
-ENOUGH = 0.1
-"""Differences of the cost within a generation below which sampling ends: a small share of what one sd is worth."""
-ROUGH = "the cost of a closed loop is rough on the scale of these standard deviations: take them for a lower limit"
-OF_THE_LOG = ("command_delay", "camera_delay")
-"""Numbers between a log and the winches: no logged command is replayed here."""
+ROUGH = (
+    "about the fit, simulations scatter by {:.2g} of what observations do, since a controller decides tick by tick: "
+    "the standard deviations count that"
+)
+OF_THE_LOOP = ("camera_delay,~0.1", "pid_min_length,~0.1")
+"""Free beside the default set: when the controller sees a cable arrive, and how long it reads."""
 
 
 def find_closed(task: Task) -> Found:
-    """CMA-ES, finished by Levenberg-Marquardt, once a start; no profiles: every Jacobian is 4 n + 1 closed loops.
-
-    Raises InputError for delays of a log and numbers without effect, NumericalError where nothing can be simulated.
-    """
-    problem = closed_problem(task)
-    predictor, recipe = problem.predictor, task.recipe
+    """A fit for each start; no profiles: every point of one is a search. Raises InputError for numbers without effect,
+    NumericalError where nothing can be simulated."""
+    predictor = closed_predictor(task)
+    problem = closed_problem(task, predictor)
     before = identifiability(problem, problem.z0, problem.frees)
-    trace: list[TraceStep] = []
-    keep = task.checkpoint
-    saved = keep.load() if keep is not None else None
-
-    def told(one: SolverProgress) -> None:
-        trace.append(TraceStep(one.start, "closed loop", one.iteration, one.cost))
-        task.progress(Step("fit", int(1000 * one.fraction), 1000, one.cost))
-
-    def kept(one: SolverCheckpoint) -> None:
-        if keep is not None:
-            keep.save({"solver": one.to_dict()})
-
-    z0s = _begins(task, problem, trace)
-    trials = multi_start(
-        [("closed loop", problem)], z0s, loss=LOSSES[recipe.loss], seed=task.request.seed,
-        last=Limits(max_iterations=recipe.max_iterations, tolerance=1e-4, step_sd=0.1, gradient_sd=0.05),
-        progress=told, checkpoint=kept, resume=None if saved is None else SolverCheckpoint.from_dict(saved["solver"]),
-    )  # fmt: skip
-    begin = np.array([free.start for free in problem.frees])
-    first = np.tile(begin, (len(z0s), 1))
-    fits = [Fit(problem, one, values_of(problem.frees, one.z), trials, first) for one in trials.solutions]
-    rows = tuple(start_found(first[k], one) for k, one in zip(trials.order, fits, strict=True))
-    close = [one.z for one in trials.solutions if one.cost <= trials.best.cost + CLOSE]
-    took, real = problem.seconds(trials.best.z)
+    kept = Kept(task.checkpoint)
+    fits = [_fit_of(task, predictor, kept, start) for start in range(task.settings.starts)]
+    first = np.array([free.start for free in problem.frees])
+    best = min(fits, key=lambda one: (one.problem.noise > 0, one.solution.cost))
+    near = [one.solution.z[: len(first)] for one in fits if one.solution.cost <= best.solution.cost + CLOSE]
+    rows = tuple(start_found(first, _as_fit(one, first)) for one in fits)
+    took, real = best.problem.seconds(best.solution.z)
     made = Fitted(
-        fits[0], rows, np.array(close), tuple(trace), LOSS.format(window=recipe.window), before, profiles=0,
-        remarks=(f"in closed loop the training windows take {took:.2f} s, {real:.2f} s in the runs", ROUGH),
+        _as_fit(best, first), rows, np.array(near), tuple(kept.steps), LOSS.format(window=task.recipe.window), before,
+        profiles=0,
+        remarks=(
+            f"in closed loop the training windows take {took:.2f} s, {real:.2f} s in the runs",
+            ROUGH.format(float(np.median(best.surface.rough))),
+        ),
     )  # fmt: skip
     return concluded(task, predictor, made)
 
 
-def _begins(task: Task, problem: ClosedResiduals, trace: list[TraceStep]) -> np.ndarray:
-    """Where Levenberg-Marquardt begins, (starts, n)."""
-    count = task.settings.starts
-    found = []
-    for start in range(count):
-
-        def told(one: SolverProgress, start: int = start) -> None:
-            trace.append(TraceStep(start, "CMA-ES", one.iteration, one.cost))
-            task.progress(Step("CMA-ES", int(1000 * (start + one.fraction) / count), 1000, one.cost))
-
-        found.append(sampled(task, problem, LOSSES[task.recipe.loss], task.request.seed + start, told))
-    return np.array(found)
-
-
-def sampled(
-    task: Task, problem: ClosedResiduals, loss: Loss, seed: int, progress: Callable[[SolverProgress], None]
-) -> np.ndarray:
-    """The best point of CMA-ES from robot.toml's values, (n,): a generation is one batch of closed loops.
-
-    The cost is rough where a robot rolls or a motor stops a tick later: from far off, differences lead nowhere.
-    """
-
-    def costs(points: np.ndarray) -> list[float]:
-        found = []
-        for z, residual in zip(points, problem.batch(points), strict=True):
-            known = bool(np.isfinite(residual).all())
-            found.append(cost_of(problem, z, Evaluation(residual, None, problem.block), loss)[0] if known else np.inf)
-        return found
-
-    return cma_es(
-        problem, problem.z0, sd0=np.minimum(problem.prior_sd, START_SPREAD), seed=seed, loss=loss, tolerance=ENOUGH,
-        budget=POPULATION * task.recipe.max_iterations, population=POPULATION, batch=costs, progress=progress,
-    ).z  # fmt: skip
-
-
-def closed_problem(task: Task) -> ClosedResiduals:
-    """The training windows of a request at robot.toml's values."""
-    asked = task.request.free or task.settings.free
+def closed_predictor(task: Task) -> Predictor:
+    """The engine with the free numbers of a request; where it names none, those of the loop as well."""
     frees = free_parameters(task.robot, task.runs, task.request, task.settings)
-    delays = [free.name for free in frees if free.name in OF_THE_LOG]
-    if asked and delays:
-        raise InputError(
-            f"{delays[0]} has no effect in closed loop: no logged command is replayed", where="--drive closed-loop",
-            expected="numbers of the robot, its ground and its controller", received=", ".join(delays),
-            hint=f"r2s2r identify --drive replay --free {delays[0]}",
-        )  # fmt: skip
-    predictor = task.predictor([free for free in frees if free.name not in OF_THE_LOG])
+    if not (task.request.free or task.settings.free):
+        given = {*task.request.fixed, *(free.name for free in frees)}
+        own = tuple(spec for spec in OF_THE_LOOP if spec.split(",")[0] not in given)
+        more: tuple[Free, ...] = select(own, task.robot, task.request.effects)
+        frees = (*frees, *more)
+    return task.predictor(frees)
+
+
+def closed_problem(task: Task, predictor: Predictor | None = None) -> ClosedResiduals:
+    """The training windows of a request at robot.toml's values."""
+    predictor = predictor or closed_predictor(task)
     values = np.array([free.start for free in predictor.mapping.frees])
-    recipe = replace(task.recipe, key_only=True)
-    windows = training_windows(task.runs, task.request.train, predictor, values, recipe)
-    return ClosedResiduals(predictor, windows, noise=recipe.noise)
+    windows = training_windows(task.runs, task.request.train, predictor, values, task.recipe)
+    return ClosedResiduals(predictor, windows, values, spread=task.recipe.spread, noise=task.recipe.noise)
+
+
+def _fit_of(task: Task, predictor: Predictor, kept: Kept, start: int) -> ClosedFit:
+    """One start. Its checkpoint holds the costs of all generations of all starts: told again they take the searches to
+    where they were; planes are made again, and are the same."""
+    count, key = task.settings.starts, f"generations {start}"
+
+    def told(stage: str, one: SolverProgress) -> None:
+        kept.steps.append(TraceStep(start, stage, one.iteration, one.cost))
+        done = (start + one.iteration / max(one.max_iterations, 1)) / count
+        task.progress(Step(stage, int(1000 * done), 1000, one.cost))
+
+    def keep(generations: Sequence[Sequence[float]]) -> None:
+        kept.save(**{key: [[cost if math.isfinite(cost) else None for cost in one] for one in generations]})
+
+    known = [[math.inf if cost is None else cost for cost in one] for one in kept.saved.get(key, ())]
+    return fit_closed(
+        task.runs, task.request.train, predictor, task.recipe, seed=task.request.seed + start, progress=told,
+        checkpoint=keep, resume=known,
+    )  # fmt: skip
+
+
+def _as_fit(one: ClosedFit, first: np.ndarray) -> Fit:
+    """The plane at the minimum stands for the problem: it has all that is asked of one there."""
+    return Fit(cast(CapResiduals, one.surface), one.solution, one.values, None, first[None])

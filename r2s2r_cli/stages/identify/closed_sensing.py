@@ -1,4 +1,4 @@
-"""What the robot's controller reads of its cables, measured on the log: when it saw a cable arrive, and how long it was.
+"""What the controller reads of its cables, measured on the log: when it saw a cable arrive, and how long that was.
 
 A motor that stops, or a target that is followed by the next, says that the controller read this cable at the edge of
 its tolerance. The camera says how long it was. Read at the same moment they would agree, but for the sensor: the moment
@@ -19,7 +19,7 @@ from schemas.robot import Robot
 FEWEST = 8
 """Arrivals, of cables that are reeled in and of such that are paid out together, from which something is said."""
 SPREAD = 5e-3
-"""[m] An arrival is seen so well: noise of two caps, and a cable that runs 2 mm between two ticks and 5 between rows."""
+"""[m] An arrival is seen so well: noise of two caps, and a cable that runs 5 mm between two rows of a log."""
 APART = 4e-3
 """[m] Sd of the error of one sensor about that of all: of a linear calibration (robots.md: 1.2 to 3.9 mm)."""
 DOF = 4.0
@@ -33,7 +33,7 @@ RUNNING = 0.5
 @dataclass(frozen=True)
 class Sensing:
     """camera_delay: a frame stamped t shows what the controller read at t - camera_delay [s]. bias: reading minus
-    distance of the cap centres [m], (actuated,). arrivals: what it rests on; 0: nothing was measured, both are as given.
+    distance of the cap centres [m], (actuated,). arrivals: what it rests on; 0: nothing was measured, as given.
     """
 
     camera_delay: float

@@ -149,7 +149,7 @@ def test_the_closed_loop_finds_the_speed(task: Task, no_rivals: None) -> None:
     """Residuals vanish within their sd at the planted speed, and the fit comes back to it."""
     problem = closed_problem(replace(task, request=replace(task.request, drive="closed loop")))
     at = {speed: np.abs(problem.batch(np.log([[speed]]))[0]).max() for speed in (TOLD, SPEED)}
-    assert at[SPEED] < 1.5 and at[TOLD] > 3.0
+    assert at[SPEED] < 1.5 and at[TOLD] > 2.0
     made = found_by(task, drive="closed loop", iterations=4)
     (speed,) = made.parameters
     assert abs(speed.value - SPEED) < 0.03 * SPEED
@@ -158,12 +158,15 @@ def test_the_closed_loop_finds_the_speed(task: Task, no_rivals: None) -> None:
 
 @pytest.mark.slow
 def test_gains_are_free_in_closed_loop_only(task: Task, no_rivals: None) -> None:
-    """The tolerance decides when a target is reached; delays of a log are refused where no log is replayed."""
+    """The tolerance decides when a target is reached, and so does a delay between the controller and its winches."""
     problem = closed_problem(replace(task, request=replace(task.request, free=("pid_tolerance",), drive="closed loop")))
     step = problem.evaluate(problem.z0, jacobian=True)
     assert step.jacobian is not None and np.abs(step.jacobian).max() > 1.0
-    with pytest.raises(InputError, match="no logged command"):
-        found_by(task, drive="closed loop", free=("command_delay=0.1,0..0.5",))
+    late = closed_problem(
+        replace(task, request=replace(task.request, free=("command_delay=0.1,0..0.5",), drive="closed loop"))
+    )
+    at, after = late.batch(np.array([[0.1], [0.2]]))
+    assert np.abs(after - at).max() > 1.0
 
 
 @pytest.mark.slow

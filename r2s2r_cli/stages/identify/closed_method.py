@@ -13,14 +13,15 @@ from r2s2r_cli.stages.identify.closed_residuals import ClosedResiduals
 from r2s2r_cli.stages.identify.conclude import Fitted, concluded, start_found
 from r2s2r_cli.stages.identify.fit import Fit, training_windows
 from r2s2r_cli.stages.identify.found import Found, TraceStep
-from r2s2r_cli.stages.identify.free import Free, select
+from r2s2r_cli.stages.identify.free import select
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.predict import Predictor
+from r2s2r_cli.stages.identify.recipe import default_free
 from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.residuals import CapResiduals
 from r2s2r_cli.stages.identify.solve.record import Progress as SolverProgress
 from r2s2r_cli.stages.identify.solve.starts import CLOSE
-from r2s2r_cli.stages.identify.task import Task, free_parameters
+from r2s2r_cli.stages.identify.task import Task, busy, specs_asked
 from r2s2r_cli.stages.identify.trust.identifiability import identifiability
 
 LOSS = (
@@ -61,13 +62,9 @@ def find_closed(task: Task) -> Found:
 
 def closed_predictor(task: Task) -> Predictor:
     """The engine with the free numbers of a request; where it names none, those of the loop as well."""
-    frees = free_parameters(task.robot, task.runs, task.request, task.settings)
-    if not (task.request.free or task.settings.free):
-        given = {*task.request.fixed, *(free.name for free in frees)}
-        own = tuple(spec for spec in OF_THE_LOOP if spec.split(",")[0] not in given)
-        more: tuple[Free, ...] = select(own, task.robot, task.request.effects)
-        frees = (*frees, *more)
-    return task.predictor(frees)
+    default = (*default_free(task.robot, busy(task.robot, task.runs, task.request)), *OF_THE_LOOP)
+    specs = specs_asked(task.request, task.settings, default)
+    return task.predictor(select(specs, task.robot, task.request.effects))
 
 
 def closed_problem(task: Task, predictor: Predictor | None = None) -> ClosedResiduals:

@@ -28,7 +28,7 @@ from tests.support.engine import threebar
 PERIOD = 0.02
 LATE = (("command_delay", 0.12), ("camera_delay", 0.08))
 TRAIN = (Selection("crawl", (1, 2)),)
-TUNED, REPORTED = range(0, 7), range(100, 120)
+TUNED, REPORTED = range(7), range(100, 120)
 """Seeds of planted robots: constants of `closed_surface` were chosen on the first, coverage is asked of the second."""
 NUMBERS = ("motor_speed", "friction", "pid_tolerance")
 

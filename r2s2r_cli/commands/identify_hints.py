@@ -54,8 +54,9 @@ def completed(error: R2S2RError, typed: Sequence[str]) -> str:
         command = command[len(_COMMAND) :]
     elif not command.startswith("--"):
         return error.hint
-    new = options_of(shlex.split(command))
-    kept = [one for one in options_of(typed) if not any(_replaces(other, one, error) for other in new)]
+    new, old = options_of(shlex.split(command)), options_of(typed)
+    new = [_as_typed(one, [other for other in old if _replaces(one, other, error)]) for one in new]
+    kept = [one for one in old if not any(_replaces(other, one, error) for other in new)]
     kept = [one for one in kept if not (one[0] in SINGLE and one[0] in error.where)]
     words = [word for name, value in (*kept, *new) for word in ((name,) if value is None else (name, value))]
     return f"{_COMMAND} {shlex.join(words)}".rstrip() + gap + remark
@@ -95,6 +96,13 @@ def _replaces(new: Option, old: Option, error: R2S2RError) -> bool:
     return _about(new[1]) == _about(value) or error.received in (value, _about(value))
 
 
+def _as_typed(new: Option, replaced: Sequence[Option]) -> Option:
+    """With the plus of --free +SPEC, where what it replaces had one."""
+    name, value = new
+    plus = name == "--free" and any((text or "").startswith("+") for _, text in replaced)
+    return (name, f"+{value}") if plus and value and not value.startswith("+") else new
+
+
 def _about(value: str | None) -> str:
     """The run, parameter or setting that a value is about."""
-    return re.split("[:=,]", value or "", maxsplit=1)[0]
+    return re.split("[:=,]", (value or "").removeprefix("+"), maxsplit=1)[0]

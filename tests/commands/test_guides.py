@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -39,6 +40,19 @@ def test_the_frame_of_the_guide_is_read() -> None:
     assert record.sensors[0] == pytest.approx((21.07e-12, 0.1314))
     assert record.imu[0][2] == pytest.approx(0.99 * 9.80665)
     assert record.mocap == {0: pytest.approx((0.1025, -0.0401, 0.0174))}
+
+
+def test_the_identify_commands_of_the_guide_are_requests(estimated: Path) -> None:
+    """Every command of the guide, on the sample's run, asks for something that exists."""
+    page = (GUIDES / "identify.md").read_text()
+    lines = re.findall(r"^(r2s2r identify .*)$", page, flags=re.MULTILINE)
+    options = re.findall(r"`(--(?:free|with-effect) [^`]+)`", page)
+    asked = [*lines, *(f"r2s2r identify {option}" for option in options if "ID" not in option)]
+    assert len(lines) >= 3 and len(asked) >= 6
+    for line in asked:
+        words = shlex.split(line.replace("crawl:1-7", "sample:1-2").replace("crawl:8-11", "sample:3"), comments=True)
+        result = invoke(*words[1:], "--dry-run")
+        assert result.exit_code == 0, (line, result.stderr)
 
 
 def test_the_export_commands_of_the_guide_run(estimated: Path) -> None:

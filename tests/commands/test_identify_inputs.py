@@ -165,6 +165,8 @@ def refusal(hint: str, where: str = "--free", received: str = "") -> R2S2RError:
         ("--free f=3,0..1 --free g", refusal("r2s2r identify --free f=0.5,0..1"), "--free g --free f=0.5,0..1"),
         ("--free=motor_sped", refusal("r2s2r identify --free motor_speed", received="motor_sped"),
          "--free motor_speed"),
+        ("--free +motor_sped", refusal("r2s2r identify --free motor_speed", received="motor_sped"),
+         "--free +motor_speed"),
         ("--method cma --drive closed-loop --seed 1",
          refusal("r2s2r identify --drive closed-loop   # so", where="--method cma --drive closed-loop"),
          "--seed 1 --drive closed-loop   # so"),

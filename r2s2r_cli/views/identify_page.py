@@ -28,10 +28,10 @@ def verdict(report: IdentifyReport) -> str:
     count = sum(segment.role == "test" for segment in report.segments)
     floor = "not known" if held.floor_m is None else f"{millimetres(held.floor_m)} mm"
     error = f"{millimetres(held.keyframe_cap_rmse_m)} mm{spread(held.intervals.keyframe_cap_rmse_m)}"
-    found = f"{error} at the key frames of {counted(count, 'held-out segment')}, floor {floor}"
+    found = f"{error} at the key frames of {counted(count, 'segment')}, floor {floor}"
     level = [name for name, one in held.baselines.items() if _open(one)]
     more = f" Not decided against: {', '.join(level)}." if level else ""
-    return f"{told} {found}; in mm: {rivals or 'no baseline'}.{more}"
+    return f"{told} Held out: {found}; in mm: {rivals or 'no baseline'}.{more}"
 
 
 def report_tables(report: IdentifyReport) -> Iterator[PageTable]:

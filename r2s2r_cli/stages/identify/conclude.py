@@ -59,7 +59,10 @@ def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:
     )  # fmt: skip
     warnings = list(made.remarks)
     if better is not None:
-        warnings.append("a profile came upon a lower cost: the fit is no minimum there, give it more --starts")
+        warnings.append(
+            "a profile came upon a lower loss: the fit is no minimum there. Its intervals are those of the numbers "
+            "that it has, not of the lowest loss; judge it by its held-out errors"
+        )
     if not fit.solution.reason.converged:
         warnings.append(
             f"the last round ended after {fit.solution.iterations} iterations, before it converged: its start states "

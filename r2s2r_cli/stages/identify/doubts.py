@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from r2s2r_cli.stages.identify.found import OURS, ParameterFound
+from r2s2r_cli.stages.identify.found import OURS, ParameterFound, ProfileFound
 from r2s2r_cli.stages.identify.free.base import Coordinate, Free
 from r2s2r_cli.stages.identify.trust.identifiability import Trust
 from r2s2r_cli.stages.measures.baselines import NOTHING_MOVES
@@ -36,6 +36,20 @@ def outdone(rows: Mapping[str, Row], closed_loop_m: float | None) -> tuple[str, 
             "with the controller in the loop the free run is worse than 'nothing moves': it drifts out of step with "
             "the robot"
         )
+    return tuple(found)
+
+
+def contradicted(parameters: Sequence[ParameterFound], profiles: Sequence[ProfileFound]) -> tuple[str, ...]:
+    """Numbers that lie outside the interval of their own profile likelihood: the fit is no minimum along them."""
+    found = []
+    for one in profiles:
+        value, (low, high) = parameters[one.row].value, one.interval
+        if value < low or value > high:  # false beside NaN, where the profile does not end
+            ends = "..".join(f"{end:.4g}" if math.isfinite(end) else "" for end in (low, high))
+            found.append(
+                f"{parameters[one.row].free.name} {value:.4g} lies outside the 95 % interval of its own profile "
+                f"likelihood, {ends}: the loss is rough there, and the printed sd says too little"
+            )
     return tuple(found)
 
 

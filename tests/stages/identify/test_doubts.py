@@ -10,8 +10,8 @@ import pytest
 
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.identify.default_method import loss_words
-from r2s2r_cli.stages.identify.doubts import doubtful, outdone, wider
-from r2s2r_cli.stages.identify.found import OURS, ParameterFound
+from r2s2r_cli.stages.identify.doubts import contradicted, doubtful, outdone, wider
+from r2s2r_cli.stages.identify.found import OURS, ParameterFound, ProfileFound
 from r2s2r_cli.stages.identify.free import catalogue
 from r2s2r_cli.stages.identify.free.base import Coordinate, Free
 from r2s2r_cli.stages.identify.free.extend import extended
@@ -86,6 +86,20 @@ def test_rivals_that_predict_as_well_are_named() -> None:
     assert outdone(rows, 0.019) == (*said,)
     assert outdone(rows, 0.021)[:2] == (*said,) and "worse than 'nothing moves'" in outdone(rows, 0.021)[2]
     assert outdone({}, None) == ()
+
+
+def test_a_value_outside_its_own_profile_is_told() -> None:
+    """Beyond an end; within, or where a side has no end, nothing is said."""
+    free = (one("friction", 0.6, 0.5),)
+
+    def said(low: float, high: float) -> tuple[str, ...]:
+        return contradicted(free, [ProfileFound(0, np.array([0.5]), np.array([0.0]), (low, high))])
+
+    assert said(0.5, 0.7) == said(math.nan, 0.7) == said(math.nan, math.nan) == ()
+    assert said(0.42, 0.58)[0].startswith(
+        "friction 0.6 lies outside the 95 % interval of its own profile likelihood, 0.42..0.58"
+    )
+    assert "0.7..:" in said(0.7, math.nan)[0]
 
 
 @pytest.mark.parametrize(

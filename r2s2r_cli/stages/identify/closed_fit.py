@@ -12,7 +12,7 @@ import numpy as np
 from r2s2r_cli.stages.identify.closed_residuals import ClosedResiduals
 from r2s2r_cli.stages.identify.closed_surface import Surface, planes, posterior
 from r2s2r_cli.stages.identify.data import RunData, Selection
-from r2s2r_cli.stages.identify.fit import EXACT, START_SPREAD, training_windows
+from r2s2r_cli.stages.identify.fit import EXACT, training_windows
 from r2s2r_cli.stages.identify.free.base import values_of
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
@@ -28,6 +28,8 @@ POPULATION = 32
 """Closed loops side by side in a generation."""
 ENOUGH = 0.1
 """Differences of the cost within a generation below which sampling ends: a small share of what one sd is worth."""
+WIDE = 0.4
+"""Sd of the first samples in coordinates without a narrower prior: for a logarithm, a factor of 1.5."""
 FIRST = 0.1
 """Of the samples about the best of CMA-ES, in widths of the priors."""
 SAMPLING, PLANES, LAST = "CMA-ES", "planes", "planes at the last start states"
@@ -91,7 +93,7 @@ def sampled(
     n = len(problem.frees)
     problem.predictor.rollouts += len(problem.windows) * sum(map(len, resume))  # those were simulated before
     return cma_es(
-        problem, problem.z0, sd0=np.minimum(problem.prior_sd[:n], START_SPREAD), seed=seed, loss=loss,
+        problem, problem.z0, sd0=np.minimum(problem.prior_sd[:n], WIDE), seed=seed, loss=loss,
         tolerance=ENOUGH, budget=POPULATION * generations, population=POPULATION,
         batch=lambda points: costs_of(problem, points[:, :n], loss), progress=progress,
         checkpoint=checkpoint, resume=resume,

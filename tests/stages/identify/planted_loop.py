@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from r2s2r_cli.engine import Link, closed_loop
+from r2s2r_cli.engine import Link, closed_loop, settled
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.free import Mapping, select
 from r2s2r_cli.stages.segments import segments, target_intervals
 from tests.support.engine import simulator, threebar
-from tests.support.robots import rested
+from tests.support.robots import frames, rested, subject
 
 GAIT = np.array([[0.1, 0, 0.1, 0, 0, 0], [1, 0.1, 1, 0, 0, 0], [1, 1, 0.1, 0, 0, 0], [0.1, 0, 0.1, 0, 0, 0]])
 """Targets of the crawl."""
@@ -27,10 +27,14 @@ def crawl(
     mapping = Mapping(threebar(), select([name for name, _ in values], threebar()))
     x = np.array([value for _, value in values])
     seen, pid = mapping.observation(x), mapping.pid(torch.as_tensor(x))
+    theta, start = mapping.theta(torch.as_tensor(x)), rested().state
+    if any(name.startswith("attachment") for name, _ in values):
+        caps = subject().p_WE
+        start = settled(simulator(mapping.structure), theta, caps, frames(caps), subject().cable_caps).state
     targets, none = torch.as_tensor(GAIT[:count]), torch.zeros(count, dtype=torch.float64)
     with torch.no_grad():
         run = closed_loop(
-            simulator(mapping.structure), mapping.theta(torch.as_tensor(x)), rested().state,
+            simulator(mapping.structure), theta, start,
             replace(pid, min_length=pid.min_length - biased), targets, none, none + 6.0, tail=0.3,
             link=Link(seen.command_delay),
         )  # fmt: skip

@@ -11,7 +11,7 @@ import torch
 from r2s2r_cli.stages.identify.closed_clock import link_between, switches
 from r2s2r_cli.stages.identify.closed_fit import fit_closed
 from r2s2r_cli.stages.identify.closed_free_run import closed_free_run
-from r2s2r_cli.stages.identify.closed_residuals import ClosedResiduals
+from r2s2r_cli.stages.identify.closed_residuals import WIDTHS, ClosedResiduals
 from r2s2r_cli.stages.identify.closed_sensing import measured_sensing
 from r2s2r_cli.stages.identify.closed_surface import Surface
 from r2s2r_cli.stages.identify.data import Selection
@@ -157,6 +157,52 @@ def test_the_free_run_has_the_delay_of_the_replay(delay: float) -> None:
     off = made[0] - np.concatenate([step.p_WE for step in steps])
     error = float(np.sqrt((off**2).sum(axis=-1).mean(axis=1)).mean())
     assert not said and (error < 0.012) == (delay == 0.2)
+
+
+@pytest.mark.slow
+def test_derivatives_are_central_differences() -> None:
+    """By gains, the tolerance, delays and an attachment: of one of the two widths, over twice that width. The gain of
+    robot.toml would have no effect: its motors run at full speed to the edge of the tolerance."""
+    made = problem("pid_p=2", "pid_d=2", "pid_tolerance", "attachment_phase.0,~0.3")
+    p = len(made.frees)
+    z = made.z0.copy()
+    z[4] += 0.05
+    seen = made.evaluate(z)
+    assert seen.jacobian is not None
+    for k in range(p):
+        found = []
+        for width in WIDTHS:
+            by = np.zeros(p)
+            by[k] = width * made.widths[k]
+            up, down = made.batch(np.array([z[:p] + by, z[:p] - by]))
+            found.append((up - down) / (2 * by[k]))
+        off = [np.abs(seen.jacobian[:, k] - one).max() for one in found]
+        assert min(off) < 1e-6 * np.abs(seen.jacobian[:, k]).max() and np.abs(seen.jacobian[:, k]).max() > 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "truth",
+    [
+        (("command_delay", 0.16), ("camera_delay", 0.05), ("pid_min_length", 0.1)),
+        (("motor_speed", 0.7), ("attachment_phase.0", 0.3)),
+        (("pid_p", 1.7), ("pid_tolerance", 0.1)),
+    ],
+)
+def test_numbers_of_the_loop_come_back(truth: tuple[tuple[str, float], ...]) -> None:
+    """Delays and sensors, an attachment, a gain: within three reported standard deviations, which are at most
+    half of what was thought possible before."""
+    specs = {"command_delay": "command_delay=0.1,0..0.5,~0.1", "camera_delay": "camera_delay=0.02,0..0.5,~0.1",
+             "pid_p": "pid_p=2.2,~0.3"}  # fmt: skip
+    predictor = predictor_of(*(specs.get(name, f"{name},~0.3") for name, _ in truth))
+    recipe = Recipe()
+    made = fit_closed([crawl(4, values=truth)], (Selection("crawl", (1, 2, 3, 4)),), predictor, recipe)
+    spread = covariance(
+        made.surface, made.solution, predictor.mapping.frees, loss=LOSSES[recipe.loss], block=made.surface.block,
+        cluster=made.surface.cluster,
+    )  # fmt: skip
+    assert (np.abs(made.values - [value for _, value in truth]) < 3 * spread.sd).all()
+    assert (spread.sd_z < 0.5 * made.problem.widths).all()
 
 
 def near(predictor: Predictor, seed: int) -> np.ndarray:

@@ -57,7 +57,7 @@ def completed(error: R2S2RError, typed: Sequence[str]) -> str:
     new, old = options_of(shlex.split(command)), options_of(typed)
     new = [_as_typed(one, [other for other in old if _replaces(one, other, error)]) for one in new]
     kept = [one for one in old if not any(_replaces(other, one, error) for other in new)]
-    kept = [one for one in kept if not (one[0] in SINGLE and one[0] in error.where)]
+    kept = [one for one in kept if not (one[0] in (*SINGLE, *FLAGS) and one[0] in error.where)]
     words = [word for name, value in (*kept, *new) for word in ((name,) if value is None else (name, value))]
     return f"{_COMMAND} {shlex.join(words)}".rstrip() + gap + remark
 

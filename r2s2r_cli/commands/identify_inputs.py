@@ -104,12 +104,16 @@ class Asked:
         Raises UsageError, InputError or ArtifactError, as the fit would.
         """
         from r2s2r_cli.stages.identify.free import Mapping
-        from r2s2r_cli.stages.identify.task import free_parameters, require_combination
+        from r2s2r_cli.stages.identify.task import Task, free_parameters, require_combination
 
         robot, runs = self.project.robot(), self.runs()
         request = self.request(runs, settings.train_share)
         require_combination(request)
-        Mapping(robot, free_parameters(robot, runs, request, settings), request.effects, fixed=request.fixed)
+        frees = free_parameters(robot, runs, request, settings)
+        if request.method == "paper" or request.drive == "closed loop":
+            Mapping(robot, frees, request.effects, fixed=request.fixed)
+        else:
+            Task(robot, runs, request, settings).predictor(frees)
 
     def request(self, runs: Sequence[RunData], train_share: float) -> Request:
         """The request, its intervals resolved. Raises UsageError for runs and intervals that do not exist."""

@@ -149,6 +149,11 @@ def test_a_dry_run_checks_what_is_asked_for(estimated: Path) -> None:
         assert result.exit_code == 2, (typed, result.stderr)
         assert result.stderr.splitlines()[-1].startswith(f"hint: r2s2r identify {expected}"), (typed, result.stderr)
     assert invoke("identify", "--free", "friction=2,3..1", "--dry-run").exit_code == 4
+    alone = invoke("identify", "--online", "--dry-run")
+    assert alone.exit_code == 4 and alone.stderr.endswith(
+        "hint: r2s2r identify   # without --online: from robot.toml\n"
+    )
+    assert "cannot be free in command replay" in invoke("identify", "--free", "com.0", "--dry-run").stderr
     assert invoke("identify", "--test", "sample:99", "--dry-run").exit_code == 2
 
 

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData
-from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.identify.conclude import Fitted, concluded, known_before, start_found
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.identify.default_method import loss_words
@@ -50,20 +49,16 @@ class Known:
 def find_online(task: Task) -> Found:
     """The estimate after every run of the training intervals; judged is the last.
 
-    Raises InputError without an earlier identification, and what the default fit raises.
+    Raises what the default fit raises.
     """
-    if task.request.before is None:
-        raise InputError(
-            "there is no earlier identification to go on from", where="--online",
-            expected="30-identify.h5 in an earlier iteration", received="none",
-            hint="r2s2r identify   # without --online: from robot.toml",
-        )  # fmt: skip
+    before = task.request.before
+    assert before is not None  # noqa: S101 - require_combination
     wide = first_free(task)
     order = by_run(task.request.train)
     first = task.predictor(wide)
     known_before(task, first)  # refuses what no run shows
     kept = Kept(task.checkpoint)
-    known, updates = _resumed(kept, known_of(task.request.before))
+    known, updates = _resumed(kept, known_of(before))
     rollouts = first.rollouts + kept.saved.get("rollouts", 0)
     for k in range(len(updates), len(order)):
         frees = tuple(drifted(free, known) for free in wide)
@@ -84,7 +79,7 @@ def find_online(task: Task) -> Found:
     last = Fitted(
         made, (start_found([free.start for free in frees], made),), made.solution.z[None, : len(frees)],
         tuple(kept.steps), f"{loss_words(task)}; run after run, the cost is of the last", None, task.settings.profiles,
-        tuple(updates), _remarks(learned_twice(task.request.before, task.runs, order)),
+        tuple(updates), _remarks(learned_twice(before, task.runs, order)),
     )  # fmt: skip
     return concluded(task, predictor, last)
 

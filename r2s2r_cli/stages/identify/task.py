@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from r2s2r_cli.errors import UsageError
+from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.stages.identify.commands import CommandLog
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.found import ParameterFound
@@ -72,7 +72,8 @@ class Task:
 
 
 def require_combination(request: Request) -> None:
-    """Raises UsageError for a method, drive and --online that do not go together: nothing falls back on another fit."""
+    """Nothing falls back on another fit: raises UsageError for a method, drive and --online that do not go together,
+    InputError for --online without an earlier identification."""
     if request.method == "cma" and request.drive == "closed loop":
         raise UsageError(
             "CMA-ES replays recorded commands only", where="--method cma --drive closed-loop",
@@ -85,6 +86,12 @@ def require_combination(request: Request) -> None:
             expected="--method default --drive replay",
             received=f"--method {request.method}, {request.drive}",
             hint="r2s2r identify --online",
+        )  # fmt: skip
+    if request.online and request.before is None:
+        raise InputError(
+            "there is no earlier identification to go on from", where="--online",
+            expected="30-identify.h5 in an earlier iteration", received="none",
+            hint="r2s2r identify   # without --online: from robot.toml",
         )  # fmt: skip
 
 

@@ -102,6 +102,7 @@ def test_environments_have_links_of_their_own() -> None:
         assert torch.allclose(both.u[k, :count], alone.u[0, :count], rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_derivative_by_the_delay() -> None:
     """Autograd through the late commands against a central difference, between two ticks."""
     robot = subject()

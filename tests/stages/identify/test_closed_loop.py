@@ -146,7 +146,7 @@ def test_too_few_arrivals_say_nothing() -> None:
     assert found.arrivals == 0 and found.camera_delay == 0.05 and not found.bias.any()
 
 
-@pytest.mark.parametrize("delay", [0.2, 0.0])
+@pytest.mark.parametrize("delay", [0.2, pytest.param(0.0, marks=pytest.mark.slow)])
 def test_the_free_run_has_the_delay_of_the_replay(delay: float) -> None:
     """With the delay that command replay found, and what the log shows of the sensors, the controller goes through the
     run in step with the robot; without that delay it does not."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -204,6 +205,24 @@ def test_numbers_of_the_loop_come_back(truth: tuple[tuple[str, float], ...]) -> 
     assert (np.abs(made.values - [value for _, value in truth]) < 3 * spread.sd).all()
     known = ~np.char.startswith([name for name, _ in truth], "attachment")
     assert (spread.sd_z < 0.5 * made.problem.widths)[known].all()
+
+
+@pytest.mark.slow
+def test_an_interrupted_fit_goes_on_bit_by_bit() -> None:
+    """With the costs of two generations told again: the same trace, values and number of simulated windows."""
+    run, kept = crawl(2, values=(("motor_speed", 0.7),)), list[list[list[float]]]()
+
+    def fitted(resume: list[list[float]]) -> tuple[np.ndarray, list[tuple[str, int, float]], int]:
+        predictor, trace = predictor_of("motor_speed", "friction"), list[tuple[str, int, float]]()
+        made = fit_closed(
+            [run], TRAIN, predictor, replace(Recipe(), max_iterations=3), resume=resume,
+            progress=lambda stage, one: trace.append((stage, one.iteration, one.cost)),
+            checkpoint=lambda costs: kept.append([list(one) for one in costs]),
+        )  # fmt: skip
+        return made.values, trace, predictor.rollouts
+
+    whole, again = fitted([]), fitted(kept[1])
+    assert np.array_equal(whole[0], again[0]) and whole[1:] == again[1:]
 
 
 def near(predictor: Predictor, seed: int) -> np.ndarray:

@@ -1,0 +1,56 @@
+"""Capacitances of the sensors as lengths of the cables, by the line of each sensor in robot.toml."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from r2s2r_cli.errors import InputError
+
+if TYPE_CHECKING:
+    from schemas.robot import Robot
+
+NOT_INITIALISED = 0.20e-12
+"""Capacitance [F] that the boards send while their sensor chip is not initialised: no reading."""
+
+
+@dataclass(frozen=True)
+class Lengths:
+    """slope [F/m], offset [F]: of every sensor, (sensor,). cable: that each sensor measures, (sensor,), int64.
+
+    cables: how many there are.
+    """
+
+    slope: np.ndarray
+    offset: np.ndarray
+    cable: np.ndarray
+    cables: int
+
+    @classmethod
+    def of(cls, robot: Robot) -> Lengths:
+        """Of a robot description. Raises InputError where a sensor of a winched cable is missing or not calibrated."""
+        measured = {sensor.cable: sensor for sensor in robot.sensors}
+        for cable in robot.actuated:
+            sensor = measured.get(cable)
+            if sensor is None or not sensor.slope_f_per_m or sensor.offset_f is None:
+                raise InputError(
+                    f"the sensor of cable {cable} is not calibrated", where=f"robot.toml, sensors of cable {cable}",
+                    expected="slope_f_per_m and offset_f", received="neither" if sensor else "no such sensor",
+                    hint="r2s2r calibrate sensors.csv",
+                )  # fmt: skip
+        nan = float("nan")
+        return cls(
+            slope=np.array([sensor.slope_f_per_m or nan for sensor in robot.sensors]),
+            offset=np.array([nan if sensor.offset_f is None else sensor.offset_f for sensor in robot.sensors]),
+            cable=np.array([sensor.cable for sensor in robot.sensors], dtype=np.int64),
+            cables=len(robot.cables),
+        )
+
+    def __call__(self, capacitance: np.ndarray) -> np.ndarray:
+        """Lengths of all cables [m], (..., cable), of capacitances [F], (..., sensor). NaN: no sensor, no reading."""
+        reading = np.where(np.abs(capacitance - NOT_INITIALISED) < 1e-15, np.nan, capacitance)
+        length = np.full((*capacitance.shape[:-1], self.cables), np.nan)
+        length[..., self.cable] = (reading - self.offset) / self.slope
+        return length

@@ -129,7 +129,7 @@ class LinkFacts:
 class RobotLink(Protocol):
     """One robot. A context manager: entering connects and shakes hands, any exit stops the motors and closes.
 
-    Not for several threads, but for `stop`, which any thread and a signal handler may call.
+    Not for several threads, but for `stop` and `emergency_stop`, which any thread may call.
     """
 
     @property
@@ -167,6 +167,17 @@ class RobotLink(Protocol):
 
     def stop(self) -> None:
         """Stop all motors, now. Never raises; may be called at any time and repeatedly."""
+        ...
+
+    def emergency_stop(self) -> None:
+        """Stop all motors and latch it: on the device where its protocol can, in any case here. Never raises.
+
+        Every later `read` and `command` raises SafetyStop until `reset`.
+        """
+        ...
+
+    def reset(self) -> None:
+        """Take the latch off, by intent and by nothing else. Raises LinkError where the device does not do it."""
         ...
 
     def __enter__(self) -> Self:

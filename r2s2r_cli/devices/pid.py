@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class WirePid:
     """The controller of one robot. p, i, d [1 a tick], tolerance [1], min_length, range [m], as in robot.toml.
 
-    actuated: the cables with a motor. total, previous, done: what it remembers between ticks, (actuated,).
+    motors: how many. total, previous, done: what it remembers between ticks, (actuated,).
     """
 
     p: float
@@ -30,7 +30,7 @@ class WirePid:
     tolerance: float
     min_length: float
     range: float
-    actuated: tuple[int, ...]
+    motors: int
     total: np.ndarray = field(init=False)
     previous: np.ndarray = field(init=False)
     done: np.ndarray = field(init=False)
@@ -43,22 +43,22 @@ class WirePid:
         """The controller of a robot description, at a fresh target."""
         pid = robot.pid
         return cls(p=pid.p, i=pid.i, d=pid.d, tolerance=pid.tolerance, min_length=pid.min_length_m,
-                   range=pid.range_m, actuated=robot.actuated)  # fmt: skip
+                   range=pid.range_m, motors=len(robot.actuated))  # fmt: skip
 
     def restart(self) -> None:
         """A new target: nothing summed, nothing done."""
-        n = len(self.actuated)
+        n = self.motors
         self.total, self.previous, self.done = np.zeros(n), np.zeros(n), np.zeros(n, dtype=bool)
 
     def position(self, length: np.ndarray) -> np.ndarray:
-        """Positions [1], 0 short .. 1 long, (actuated,), of lengths of all cables [m], (cable,)."""
-        return (length[list(self.actuated)] - self.min_length) / self.range
+        """Positions [1], 0 short .. 1 long, of lengths [m], (actuated,)."""
+        return (length - self.min_length) / self.range
 
     def tick(self, length: np.ndarray, target: np.ndarray) -> np.ndarray:
         """One control tick: speeds in [-1, 1], +1 reels in, (actuated,).
 
-        length: of all cables as the sensors give them [m], (cable,). A cable whose length is NaN gets 0 and remembers
-        what it did before: without a reading there is no error. target: positions [1], (actuated,).
+        length: of the winched cables as the sensors give them [m], (actuated,). One whose length is NaN gets 0 and
+        remembers what it did before: without a reading there is no error. target: positions [1], (actuated,).
         """
         position = self.position(length)
         seen = np.isfinite(position)

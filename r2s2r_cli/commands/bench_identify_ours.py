@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from copy import copy
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -17,9 +18,9 @@ if TYPE_CHECKING:
     from r2s2r_cli.engine import State
     from r2s2r_cli.stages.identify.data import RunData
     from r2s2r_cli.stages.identify.free import Free, Mapping
+    from r2s2r_cli.stages.identify.offsets import StartSpread
     from r2s2r_cli.stages.identify.predict import Predictor
-    from r2s2r_cli.stages.identify.solve.problem import Evaluation
-    from r2s2r_cli.stages.identify.windows import Window
+    from r2s2r_cli.stages.identify.recipe import Recipe
     from schemas.robot import Robot
 
 VELOCITY, RATE = 0.02, 0.1
@@ -51,14 +52,17 @@ class OurSide:
     def __init__(self, case: Case, predictor: Predictor) -> None:
         from r2s2r_cli.stages.identify.windows import window
 
-        self.case, self.predictor = case, predictor
-        self.frees = _frees(case, predictor.mapping)
+        self.case, self.frees = case, _frees(case, predictor.mapping)
+        self.predictor = _with_frees(predictor, self.frees)
         hard = len(self.frees) > len(NUMBERS)
         draw = np.random.default_rng([case.seed, 6])
         phases = PHASE * draw.uniform(-1.0, 1.0, len(self.frees) - len(NUMBERS))
         self.truth = np.concatenate([case.truth, phases])
-        self.spread = _start_spread(predictor) if hard else None
-        offsets = None if self.spread is None else (self.spread * draw.standard_normal(len(self.spread)))[None]
+        self.spread = _start_spread() if hard else None
+        offsets = None
+        if self.spread is not None:
+            sd = self.spread.sd(predictor.structure)
+            offsets = (sd * draw.standard_normal(len(sd)))[None]
         state = self._at_rest()
         blank = np.zeros((len(case.t) + 1, *case.noise.shape[1:]))
         whole = tuple(range(1, 1 + math.ceil(case.t[-1] / bench_gait.TARGET_S)))
@@ -68,28 +72,31 @@ class OurSide:
         self.window = window(run, whole, state, known=not hard)
 
     def fit(self) -> Fit:
-        """Growing horizon, Levenberg-Marquardt with the loss of `identify`, intervals of `trust.covariance`.
+        """The first round of `identify`, whose starts and noise are those of the case, and its intervals.
 
         The noise is normal, yet a robust loss finds more: where a wrong robot tips over, it does not pull.
 
         Raises NumericalError where the start cannot be simulated.
         """
-        from r2s2r_cli.stages.identify.recipe import Recipe
-        from r2s2r_cli.stages.identify.solve.horizon import solve_growing
+        from r2s2r_cli.stages.identify.fit import first_round
+        from r2s2r_cli.stages.identify.settled import spread_of
         from r2s2r_cli.stages.identify.solve.loss import LOSSES
-        from r2s2r_cli.stages.identify.trust.covariance import covariance
 
-        clock, spent = time.process_time(), [0.0]
-        recipe, length = Recipe(), len(self.window.intervals)
-        horizons = recipe.horizons(length)
-        problems = [(f"{n} intervals", GaitProblem(self, self.window.until(n), spent)) for n in horizons]
-        last = problems[-1][1]
-        loss = LOSSES[recipe.loss]
-        found = solve_growing(problems, last.prior_mean, loss=loss)
-        cluster = np.repeat(self.window.place, last.per_frame)
-        trust = covariance(last, found, self.frees, loss=loss, block=np.arange(len(cluster)) // 3, cluster=cluster)
+        clock, before, recipe = time.process_time(), self.predictor.rollouts, self.recipe()
+        start = np.array([free.start for free in self.frees])
+        found = first_round(self.predictor, [self.window], start, recipe, seed=self.case.seed)
+        trust = spread_of(found.problem, found.solution, LOSSES[recipe.loss], found.posterior)
+        residual = found.solution.residual
         return Fit(estimate=trust.value, low=trust.lower, high=trust.upper, cpu_s=time.process_time() - clock,
-                   rollouts=spent[0], rms_m=NOISE_M * float(np.sqrt(np.mean(found.residual**2))))  # fmt: skip
+                   rollouts=float(self.predictor.rollouts - before),
+                   rms_m=NOISE_M * float(np.sqrt(np.mean(residual**2))))  # fmt: skip
+
+    def recipe(self) -> Recipe:
+        """That of `identify`, with the noise of the case and with what is unknown of its start."""
+        from r2s2r_cli.stages.identify.offsets import StartSpread
+        from r2s2r_cli.stages.identify.recipe import Recipe
+
+        return Recipe(noise=NOISE_M, spread=self.spread or StartSpread())
 
     def _at_rest(self) -> State:
         import torch
@@ -104,46 +111,6 @@ class OurSide:
         return run.at(-1)
 
 
-class GaitProblem:
-    """A window of a case as `stages.identify.solve` sees it (`Problem`): coordinates of the free numbers, then what is
-    unknown of the start. spent: its only number goes up by the rollouts of a whole gait."""
-
-    def __init__(self, side: OurSide, window: Window, spent: list[float]) -> None:
-        self._side, self._window, self._spent = side, window, spent
-        self._observed = window.run.observed[window.frames]
-        self.per_frame = self._observed[0].size
-        self.names = tuple(free.name for free in side.frees)
-        spread = np.zeros(0) if side.spread is None else side.spread
-        self._offsets, self._moves = len(spread), np.flatnonzero(spread)
-        still = np.zeros(len(self._moves))
-        bounds = np.array([free.bounds_z() for free in side.frees])
-        self.lower = np.concatenate([bounds[:, 0], still - np.inf])
-        self.upper = np.concatenate([bounds[:, 1], still + np.inf])
-        self.prior_mean = np.concatenate([[free.to_z(free.start) for free in side.frees], still])
-        self.prior_sd = np.concatenate([[free.prior_sd for free in side.frees], spread[self._moves]])
-
-    def evaluate(self, z: np.ndarray, *, jacobian: bool = True) -> Evaluation:
-        """Residuals in standard deviations of the noise. Raises NumericalError where the simulation is not finite."""
-        from r2s2r_cli.stages.identify.free import slopes_of, values_of
-        from r2s2r_cli.stages.identify.solve.problem import Evaluation
-
-        frees, n = self._side.frees, len(self._side.frees)
-        offsets = None
-        if self._offsets:
-            offsets = np.zeros((1, self._offsets))
-            offsets[0, self._moves] = z[n:]
-        self._spent[0] += len(self._window.intervals) / len(self._side.window.intervals)
-        seen = self._side.predictor.predict([self._window], values_of(frees, z[:n]), offsets, jacobian=jacobian)
-        residual = ((seen.p_WE - self._observed) / NOISE_M).ravel()
-        block = np.arange(len(residual)) // 3
-        if seen.by_value is None:
-            return Evaluation(residual, None, block)
-        columns = [seen.by_value * slopes_of(frees, z[:n])]
-        if seen.by_offset is not None:
-            columns.append(seen.by_offset[..., self._moves])
-        return Evaluation(residual, np.concatenate(columns, axis=-1).reshape(len(residual), -1) / NOISE_M, block)
-
-
 def _frees(case: Case, mapping: Mapping) -> tuple[Free, ...]:
     """The free numbers of the catalogue with the starts and bounds of the case; the widths of their priors stay."""
     own = zip(mapping.frees, case.start, case.lower, case.upper, strict=False)
@@ -151,12 +118,19 @@ def _frees(case: Case, mapping: Mapping) -> tuple[Free, ...]:
     return (*given, *mapping.frees[len(given) :])
 
 
-def _start_spread(predictor: Predictor) -> np.ndarray:
+def _with_frees(predictor: Predictor, frees: tuple[Free, ...]) -> Predictor:
+    """The same compiled simulator with other starts and bounds of the same free numbers."""
+    found = copy(predictor)
+    found.mapping = copy(predictor.mapping)
+    found.mapping.frees = frees
+    return found
+
+
+def _start_spread() -> StartSpread:
     """Standard deviations of the offsets of a start: its pose is known, its velocities are not."""
     from r2s2r_cli.stages.identify.offsets import StartSpread
 
-    spread = StartSpread(position=0.0, tilt=0.0, roll=0.0, rest=0.0, velocity=VELOCITY, tilt_rate=RATE, roll_rate=RATE)
-    return spread.sd(predictor.structure)
+    return StartSpread(position=0.0, tilt=0.0, roll=0.0, rest=0.0, velocity=VELOCITY, tilt_rate=RATE, roll_rate=RATE)
 
 
 def _recorded(case: Case, p_WE: np.ndarray) -> RunData:

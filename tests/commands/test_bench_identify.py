@@ -11,8 +11,10 @@ import pytest
 
 from r2s2r_cli.commands.bench_identify_case import BOUNDS, NOISE_M, NUMBERS, OFF, SPREAD, Case, Fit, make_case
 from r2s2r_cli.commands.bench_identify_mujoco import SysidSide
-from r2s2r_cli.commands.bench_identify_ours import PHASE, GaitProblem, OurSide, predictor_of
+from r2s2r_cli.commands.bench_identify_ours import PHASE, OurSide, predictor_of
 from r2s2r_cli.commands.bench_identify_tally import judged, share, summed_up
+from r2s2r_cli.stages.identify.fit import problem_of
+from r2s2r_cli.stages.identify.solve.population import HELD
 from tests.commands.conftest import document, invoke
 from tests.support.rig_robots import known
 
@@ -55,7 +57,7 @@ def test_at_the_planted_values_each_tool_sees_its_noise() -> None:
     assert theirs.rms(case.truth) == pytest.approx(size, rel=1e-9)
     assert theirs.rms(case.start) > 1.5 * size
     ours = OurSide(case, predictor_of(ROBOT))
-    problem = GaitProblem(ours, ours.window, [0.0])
+    problem = problem_of(ours.predictor, [ours.window], ours.recipe())
     found = problem.evaluate(_coordinates(ours, ours.truth), jacobian=False).residual
     np.testing.assert_allclose(-found * NOISE_M, case.noise.ravel(), atol=1e-12)
     far = problem.evaluate(_coordinates(ours, case.start), jacobian=False).residual
@@ -147,8 +149,8 @@ def test_the_hard_problem_hides_phases_and_velocities() -> None:
     ours = OurSide(_case(), predictor_of(ROBOT, hard=True))
     assert len(ours.truth) == 8
     assert 0 < np.abs(ours.truth[5:]).max() <= PHASE
-    problem = GaitProblem(ours, ours.window, [0.0])
-    assert len(problem.prior_mean) == 8 + 18
+    problem = problem_of(ours.predictor, [ours.window], ours.recipe())
+    assert np.count_nonzero(problem.prior_sd > HELD) == 8 + 18
     assert np.isfinite(problem.prior_sd[8:]).all()
 
 

@@ -47,10 +47,10 @@ def find_closed(task: Task) -> Found:
     first = np.array([free.start for free in problem.frees])
     best = min(fits, key=lambda one: (one.problem.noise > 0, one.solution.cost))
     near = [one.solution.z[: len(first)] for one in fits if one.solution.cost <= best.solution.cost + CLOSE]
-    rows = tuple(start_found(first, _as_fit(one, first)) for one in fits)
+    rows = tuple(start_found(first, _as_fit(one)) for one in fits)
     took, real = best.problem.seconds(best.solution.z)
     made = Fitted(
-        _as_fit(best, first), rows, np.array(near), tuple(kept.steps), LOSS.format(window=task.recipe.window), before,
+        _as_fit(best), rows, np.array(near), tuple(kept.steps), LOSS.format(window=task.recipe.window), before,
         profiles=0,
         remarks=(
             f"in closed loop the training windows take {took:.2f} s, {real:.2f} s in the runs",
@@ -95,6 +95,6 @@ def _fit_of(task: Task, predictor: Predictor, kept: Kept, start: int) -> ClosedF
     )  # fmt: skip
 
 
-def _as_fit(one: ClosedFit, first: np.ndarray) -> Fit:
+def _as_fit(one: ClosedFit) -> Fit:
     """The plane at the minimum stands for the problem: it has all that is asked of one there."""
-    return Fit(cast(CapResiduals, one.surface), one.solution, one.values, None, first[None])
+    return Fit(cast(CapResiduals, one.surface), one.solution, one.values)

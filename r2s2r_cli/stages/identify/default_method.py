@@ -67,12 +67,13 @@ def first_fit(task: Task, predictor: Predictor, kept: Kept) -> Fit:
         done = (number + one.fraction) / rounds
         task.progress(Step("fit", int(1000 * done), 1000, one.cost))
 
-    def hold(number: int, values: np.ndarray, one: SolverCheckpoint) -> None:
-        kept.hold(round=number, values=values.tolist(), solver=one.to_dict())
+    def hold(number: int, values: np.ndarray, one: SolverCheckpoint | None) -> None:
+        kept.hold(round=number, values=values.tolist(), solver=None if one is None else one.to_dict())
 
     saved, resume = kept.saved, None
     if saved:
-        resume = saved["round"], np.array(saved["values"]), SolverCheckpoint.from_dict(saved["solver"])
+        solver = None if saved["solver"] is None else SolverCheckpoint.from_dict(saved["solver"])
+        resume = saved["round"], np.array(saved["values"]), solver
         predictor.rollouts = saved["rollouts"]
     return fit(
         task.runs, task.request.train, predictor, task.recipe, seed=task.request.seed, progress=told, checkpoint=hold,
@@ -95,11 +96,11 @@ def _other_starts(task: Task, fitted: Fit) -> tuple[tuple[StartFound, ...], np.n
     def told(one: SolverProgress) -> None:
         task.progress(Step("starts", int(1000 * one.fraction), 1000, one.cost))
 
-    trials, z0s = more_starts(fitted, task.recipe, settings.starts - 1, task.request.seed, told)
+    others = more_starts(fitted, task.recipe, settings.starts - 1, task.request.seed, told)
     found = [own]
-    for solution, index in zip(trials.solutions, trials.order, strict=True):
-        first, last = (values_of(frees, z[:n]) for z in (z0s[index], solution.z))
+    for z0, solution in others:
+        first, last = (values_of(frees, z[:n]) for z in (z0, solution.z))
         found.append(StartFound(first, last, solution.cost, solution.iterations, solution.message))
     close = fitted.solution.cost + CLOSE_SHARE * len(fitted.solution.residual)
-    near = [fitted.solution, *(one for one in trials.solutions if one.cost <= close)]
+    near = [fitted.solution, *(one for _, one in others if one.cost <= close)]
     return tuple(found), np.array([one.z[:n] for one in near])

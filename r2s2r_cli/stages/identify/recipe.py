@@ -22,9 +22,10 @@ class Recipe:
     each length in `short`, from every interval on, that start where the filter says with the parameters of the round
     before, as test intervals will; these start states are not free, and the parameters learn to predict from them.
 
-    noise [m]: see CapResiduals. key_only: compare key frames only. max_iterations, filtered_iterations: of the last
-    horizon of the first, and of each later round. loss: name in solve.LOSSES. belief: of the filter. step [s]: of the
-    engine. held: free parameters that stay at their starts, since the training intervals do not show them.
+    noise [m]: see CapResiduals. key_only: compare key frames only. max_iterations: of the last horizon of the first
+    round; cooled_generations: of the population of each later one. loss: name in solve.LOSSES. belief: of the filter.
+    step [s]: of the engine. held: free parameters that stay at their starts, since the training intervals do not show
+    them.
     """
 
     window: int = 12
@@ -33,7 +34,7 @@ class Recipe:
     noise: float = 4e-3
     key_only: bool = False
     max_iterations: int = 14
-    filtered_iterations: int = 6
+    cooled_generations: int = 10
     loss: str = "student_t"
     belief: Filter = field(default_factory=Filter)
     spread: StartSpread = field(default_factory=StartSpread)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from r2s2r_cli.stages.identify.candidates import predict_candidates
 from r2s2r_cli.stages.identify.free.base import slopes_of, values_of
 from r2s2r_cli.stages.identify.offsets import StartSpread, count
 from r2s2r_cli.stages.identify.predict import Prediction, Predictor
@@ -77,6 +78,11 @@ class CapResiduals:
         self.block = np.repeat(np.arange(self._observed[..., 0].size), 3)
         self._width = n
 
+    @property
+    def exact(self) -> bool:
+        """Whether residuals are weighed with the measured noise alone."""
+        return bool(np.array_equal(self._sd, self._noise))
+
     def misfit(self, z: np.ndarray) -> float:
         """Median size of the residuals over the measured noise: 1 where the model is exact and the noise normal."""
         square = ((self.predict(z).p_WE[self.kept] - self._observed) / self._noise) ** 2
@@ -92,6 +98,14 @@ class CapResiduals:
         """End caps at all frames of the windows."""
         values, offsets = self.split(z)
         return self.predictor.predict(self.windows, values, offsets, jacobian=jacobian)
+
+    def residuals(self, z: np.ndarray) -> np.ndarray:
+        """Residuals (k, m) at points (k, unknowns), as `evaluate` has them; nan where nothing finite comes out."""
+        n = self._width
+        values = np.stack([values_of(self.frees, one[:n]) for one in z])
+        offsets = z[:, n:].reshape(len(z), len(self.windows), self.offsets) if self.offsets else None
+        caps = predict_candidates(self.predictor, self.windows, values, offsets)[:, self.kept]
+        return np.asarray(((caps - self._observed) / self._sd).reshape(len(z), -1))
 
     def evaluate(self, z: np.ndarray, *, jacobian: bool = True) -> Evaluation:
         """Residuals (simulated - observed) / sd at z. Raises NumericalError where nothing finite comes out."""

@@ -10,10 +10,11 @@ import numpy as np
 from r2s2r_cli.stages.identify.fit import Fit
 from r2s2r_cli.stages.identify.found import ParameterFound, ProfileFound
 from r2s2r_cli.stages.identify.free.base import values_of
+from r2s2r_cli.stages.identify.settled import spread_of
 from r2s2r_cli.stages.identify.solve.loss import LOSSES
 from r2s2r_cli.stages.identify.solve.problem import Evaluation
 from r2s2r_cli.stages.identify.solve.record import names_on_bound
-from r2s2r_cli.stages.identify.trust.covariance import Covariance, covariance
+from r2s2r_cli.stages.identify.trust.covariance import Covariance
 from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, Trust, identifiability
 from r2s2r_cli.stages.identify.trust.profile import profile
 from r2s2r_cli.stages.identify.trust.redraw import redraw_linear, spans
@@ -35,7 +36,7 @@ def sureness(fitted: Fit, others: np.ndarray, *, loss: str, seed: int) -> Surene
     """Of a finished fit. others: parameters (k, p), z, of other fits that explain the data about as well."""
     problem, solution, frees = fitted.problem, fitted.solution, fitted.problem.frees
     robust, group = LOSSES[loss], problem.cluster
-    spread = covariance(problem, solution, frees, loss=robust, block=problem.block, cluster=group)
+    spread = spread_of(problem, solution, robust, fitted.posterior)
     after = identifiability(
         problem, solution.z, frees,
         evaluation=Evaluation(solution.residual, solution.jacobian, problem.block), weight=solution.weight,

@@ -68,20 +68,18 @@ def test_planted_values_come_back_from_a_known_start() -> None:
     assert (sd < 0.02 * truth()).all()
     assert fitted.solution.reason.converged
     assert len(fitted.solution.z) == len(TRUTH)
-    np.testing.assert_array_equal(fitted.first, [list(OFF.values())])
     np.testing.assert_allclose(fitted.values, value)
     elsewhere = known_fit(planted(0), begin=1.1 * truth())
-    assert (np.abs(elsewhere.values - value) < 0.2 * sd).all()
-    np.testing.assert_allclose(elsewhere.first, [1.1 * truth()])
+    assert (np.abs(elsewhere.values - value) < 0.5 * sd).all()
 
 
 class Interrupted(Exception):
     """Control and C."""
 
 
-def interrupted(run: Callable[..., Fit], after: int) -> tuple[int, np.ndarray, Checkpoint]:
+def interrupted(run: Callable[..., Fit], after: int) -> tuple[int, np.ndarray, Checkpoint | None]:
     """What was saved last when a fit was interrupted after so many iterations, as it comes back from a file."""
-    saved: list[tuple[int, np.ndarray, Checkpoint]] = []
+    saved: list[tuple[int, np.ndarray, Checkpoint | None]] = []
     told = 0
 
     def stop(number: int, rounds: int, one: Progress) -> None:
@@ -97,14 +95,15 @@ def interrupted(run: Callable[..., Fit], after: int) -> tuple[int, np.ndarray, C
     return (
         number,
         np.array(json.loads(json.dumps(values.tolist()))),
-        Checkpoint.from_dict(json.loads(json.dumps(one.to_dict()))),
+        one and Checkpoint.from_dict(json.loads(json.dumps(one.to_dict()))),
     )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("after", [3, 8])
+@pytest.mark.parametrize("after", [2, 5, 9])
 def test_an_interruption_changes_no_bit(after: int) -> None:
-    """Resumed from the last checkpoint, early or late in the growing horizon, a fit ends where it would have ended."""
+    """Resumed from the last checkpoint, early or late in the growing horizon, or while a population cools, a fit ends
+    where it would have ended."""
     whole = known_fit(planted(0))
     resumed = known_fit(planted(0), resume=interrupted(lambda **tell: known_fit(planted(0), **tell), after))
     np.testing.assert_array_equal(resumed.solution.z, whole.solution.z)
@@ -115,44 +114,42 @@ def test_an_interruption_changes_no_bit(after: int) -> None:
 
 @pytest.mark.slow
 def test_progress_tells_of_every_horizon() -> None:
-    """Horizons and iterations in their order; within a horizon the cost falls, and a checkpoint goes with each."""
-    told: list[tuple[int, int, Progress]] = []
-    saved: list[Checkpoint] = []
+    """Horizons and iterations in their order; within a horizon the cost falls; derivatives have checkpoints."""
+    told: list[Progress] = []
+    saved: list[Checkpoint | None] = []
     fitted = known_fit(
-        planted(0), progress=lambda number, rounds, one: told.append((number, rounds, one)),
+        planted(0), progress=lambda number, rounds, one: told.append(one),
         checkpoint=lambda number, values, one: saved.append(one),
     )  # fmt: skip
-    assert {number for number, _, _ in told} == {0}
-    names = [one.stage_name for _, _, one in told]
-    assert list(dict.fromkeys(names)) == ["1 intervals", "2 intervals", "4 intervals", "all"]
+    names = [one.stage_name for one in told]
+    assert list(dict.fromkeys(names))[:4] == [
+        "1 intervals",
+        "2 intervals",
+        "4 intervals, population",
+        "all, population",
+    ]
     for name in set(names):
-        costs = [one.cost for _, _, one in told if one.stage_name == name]
+        costs = [one.cost for one in told if one.stage_name == name]
         assert costs == sorted(costs, reverse=True)
-    fractions = [one.fraction for _, _, one in told]
-    assert fractions == sorted(fractions)
-    assert len(saved) == len(told)
-    assert told[-1][2].cost == pytest.approx(fitted.solution.cost)
+    assert saved[0] is None
+    assert len(saved) == 1 + sum("population" not in name for name in names)
+    assert fitted.solution.cost < told[-1].cost + len(TRUTH)
 
 
 @pytest.mark.slow
 def test_other_starts_reach_the_same_minimum() -> None:
-    """Three starts, drawn by the seed within a factor of 1.5; all end within half a unit of cost. `more_starts` draws
-    others for a fit that is finished."""
-    fitted = known_fit(planted(0), count=3, seed=2)
-    assert fitted.first.shape == (3, len(TRUTH))
-    np.testing.assert_allclose(fitted.first[0], list(OFF.values()))
-    ratio = np.log(fitted.first[1:, :2] / fitted.first[0, :2])
-    assert (np.abs(ratio) < 0.4 + 1e-9).all()
-    assert np.abs(ratio).min() > 1e-3
-    assert fitted.trials is not None
-    assert fitted.trials.close == 3
-    again = known_fit(planted(0), count=3, seed=2)
-    np.testing.assert_array_equal(again.first, fitted.first)
+    """`more_starts` draws others by the seed within a factor of 1.5, for a fit that is finished; they end within two
+    units of its cost."""
     one = known_fit(planted(0))
-    trials, z0s = more_starts(one, RECIPE, 2, 5, lambda step: None)
-    assert len(z0s) == 2
-    assert not np.allclose(z0s, one.problem.z0)
-    assert trials.best.cost == pytest.approx(one.solution.cost, abs=0.5)
+    trials = more_starts(one, RECIPE, 2, 5, lambda step: None)
+    assert len(trials) == 2
+    for z0, solution in trials:
+        ratio = z0[:2] - one.problem.z0[:2]
+        assert (np.abs(ratio) < 0.4 + 1e-9).all()
+        assert np.abs(ratio).min() > 1e-3
+        assert solution.cost == pytest.approx(one.solution.cost, abs=2.0)
+    again = more_starts(one, RECIPE, 2, 5, lambda step: None)
+    np.testing.assert_array_equal(again[1][1].z, trials[1][1].z)
 
 
 @pytest.mark.slow

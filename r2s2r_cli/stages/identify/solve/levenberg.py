@@ -28,6 +28,8 @@ FASTEST = 0.2
 """Of the damping, after a step that came out as predicted. Nielsen's 1/3 took about one Jacobian more in ten."""
 TOO_SHORT = 0.01
 """Share of `step_sd`: a refused step as short as that could not have mattered."""
+IDLE = 3
+"""Steps in a row that gain no more than the tolerance, which damping keeps short: the cost is rough there."""
 ROUNDING = 1e-15
 """Predicted relative decrease of the cost that double precision cannot see."""
 
@@ -117,12 +119,14 @@ def _iterate(
         # A short step says that the minimum is near only where it was not the damping that made it short.
         free = damping <= 1.0
         small = state.small_steps + 1 if free and length <= step_sd else 0
-        still = free and at.cost - new.cost <= tolerance * at.cost and predicted <= tolerance * at.cost
-        reason_now = Reason.COST if still else Reason.STEP if small >= 2 else None
+        gains_little = at.cost - new.cost <= tolerance * at.cost
+        idle = state.idle_steps + 1 if gains_little else 0
+        still = gains_little and free and predicted <= tolerance * at.cost
+        reason_now = Reason.COST if still else Reason.STEP if small >= 2 else Reason.STUCK if idle >= IDLE else None
         damping = max(damping * max(FASTEST, 1.0 - (2.0 * gain - 1.0) ** 3), LEAST_DAMPING)
         costs = (*state.costs, new.cost)
         z_now = tuple(new.z.tolist())
-        return State(z_now, damping, 2.0, state.iteration + 1, small, costs, counts, reason_now), new, length
+        return State(z_now, damping, 2.0, state.iteration + 1, small, costs, counts, reason_now, idle), new, length
     return replace(state, damping=damping, growth=growth, counts=counts, reason=Reason.STUCK), at, 0.0
 
 

@@ -20,6 +20,7 @@ class Reason(StrEnum):
     GRADIENT = "gradient"
     STUCK = "stuck"
     ITERATIONS = "iterations"
+    COOLED = "cooled"
 
     @property
     def sentence(self) -> str:
@@ -29,7 +30,7 @@ class Reason(StrEnum):
     @property
     def converged(self) -> bool:
         """True where more iterations would not change the answer."""
-        return self in (Reason.COST, Reason.STEP, Reason.GRADIENT)
+        return self in (Reason.COST, Reason.STEP, Reason.GRADIENT, Reason.COOLED)
 
 
 _SENTENCES = {
@@ -38,6 +39,7 @@ _SENTENCES = {
     Reason.GRADIENT: "Converged: the gradient leaves no step worth a share of a standard deviation.",
     Reason.STUCK: "Stopped: no step along the derivatives lowers the cost, which has a kink or is rough here.",
     Reason.ITERATIONS: "Stopped: the number of iterations allowed is used up.",
+    Reason.COOLED: "Converged: candidates drawn as wide as the standard deviations lower the cost no further.",
 }
 
 
@@ -87,6 +89,7 @@ class State:
     costs: tuple[float, ...] = ()
     counts: Counts = Counts()
     reason: Reason | None = None
+    idle_steps: int = 0
 
 
 @dataclass(frozen=True)

@@ -82,6 +82,7 @@ def covariance(
     cluster: np.ndarray | None = None,
     level: float = 0.95,
     least: float = 1.0,
+    drawn: np.ndarray | None = None,
 ) -> Covariance:
     """Posterior covariance at a solution, in the form bread * meat * bread (Huber 1967, White 1982).
 
@@ -93,7 +94,8 @@ def covariance(
     block: as in Evaluation, needed with a robust loss. cluster: (m,) int, windows, or segments where windows are few:
     residuals in different ones are independent, but for a start that they share. least: inflation is not below (noise
     may be over-estimated). Intervals are quantiles of Student's t in z, mapped to units and cut at the bounds: not
-    symmetric for log and logit.
+    symmetric for log and logit. drawn: (n, n), of the unknowns, as candidates showed it (`trust.posterior`): where they
+    show more than the curvature, they are believed.
     """
     p = len(problem.names)
     parts = parts_of(problem, solution, loss, block)
@@ -106,6 +108,8 @@ def covariance(
     if found is not None and found.count >= max(MANY, 2 * p):
         meat, dof = sandwich(found, bread, parts.information)
         total, how = _no_less(bread @ (meat + fixed) @ bread, total), f"scores of {found.count} windows"
+    if drawn is not None:
+        total = _no_less(total, drawn[:p, :p])
     unknown = _unknown(parts.curvature, widths(problem, frees))
     total, naive = (_blank(one, unknown) for one in (total, naive))
     quantile = _quantile(level, dof)

@@ -27,6 +27,17 @@ class Formula:
     block_size: int = 1
     calls: list[bool] = field(default_factory=list)
 
+    @property
+    def block(self) -> np.ndarray:
+        """Which robust weight each residual shares."""
+        return np.arange(len(self.f(self.prior_mean))) // self.block_size
+
+    def residuals(self, z: np.ndarray) -> np.ndarray:
+        """Of many points (k, n), nan where `f` gives nan."""
+        assert np.all(z >= self.lower)
+        assert np.all(z <= self.upper)
+        return np.stack([self.f(one) for one in z])
+
     def evaluate(self, z: np.ndarray, *, jacobian: bool = True) -> Evaluation:
         """Raises NumericalError where `f` gives nan, as the simulation does."""
         assert np.all(z >= self.lower)

@@ -1,0 +1,105 @@
+"""Many candidates for the parameters through the engine at once: end caps of all windows, without derivatives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from r2s2r_cli.stages.identify.commands import CommandLog
+from r2s2r_cli.stages.identify.offsets import displaced
+from r2s2r_cli.stages.identify.predict import STRIDE, Predictor, alike
+from r2s2r_cli.stages.identify.windows import Window
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+MOST = 256
+"""Simulations in one batch: beyond, their stored states fill the memory and nothing gets faster."""
+
+
+def predict_candidates(
+    predictor: Predictor, windows: Sequence[Window], values: np.ndarray, offsets: np.ndarray | None = None
+) -> np.ndarray:
+    """End caps (k, F, cap, 3) [m] at the compared frames of all windows, one after the other, at parameter values
+    (k, n); start states moved by offsets (k, W, offset), None: not moved.
+
+    The same as `Predictor.predict` of each, but what leaves the finite numbers is nan and raises nothing: one bad
+    candidate does not spoil the others.
+    """
+    parts: list[np.ndarray | None] = [None] * len(windows)
+    for group in alike(windows):
+        own = [windows[k] for k in group]
+        together = max(1, MOST // len(group))
+        chunks = []
+        for first in range(0, len(values), together):
+            some = slice(first, first + together)
+            moved = None if offsets is None else offsets[some][:, group]
+            chunks.append(_together(predictor, own, values[some], moved))
+        for place, k in enumerate(group):
+            parts[k] = np.concatenate([chunk[place] for chunk in chunks])
+    return np.concatenate([part for part in parts if part is not None], axis=1)
+
+
+def _together(
+    predictor: Predictor, windows: Sequence[Window], values: np.ndarray, offsets: np.ndarray | None
+) -> list[np.ndarray]:
+    """End caps (k, frame, cap, 3) of each of some windows of about the same length."""
+    import torch
+
+    from r2s2r_cli.engine.flat import pack_parameters, pack_state, unpack_state
+
+    structure, step, k = predictor.structure, predictor.step, len(values)
+    theta = predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64)).map(
+        lambda x: x.expand(k, *x.shape[1:]).repeat_interleave(len(windows), dim=0)
+    )
+    s0 = torch.cat([pack_state(structure, window.state) for window in windows]).repeat(k, 1)
+    if offsets is not None:
+        s0 = displaced(structure, s0, torch.as_tensor(offsets.reshape(len(s0), -1)))
+    duration = max(window.duration for window in windows)
+    rows = STRIDE * (math.ceil(duration / step / STRIDE) + 1)
+    u = _commands(predictor, windows, values, rows)
+    predictor.rollouts += len(s0)
+    n = predictor.simulator.substeps(theta, unpack_state(structure, s0), step)
+    with torch.no_grad():
+        flat = predictor.simulator.advance(
+            s0, u, pack_parameters(structure, theta), h=step / n, hold=n, every=STRIDE * n
+        )
+        return [_caps(predictor, flat[place :: len(windows)], window, values) for place, window in enumerate(windows)]
+
+
+def _commands(predictor: Predictor, windows: Sequence[Window], values: np.ndarray, rows: int) -> Tensor:
+    """Commands (k W, row, actuated) of each candidate with its own delay."""
+    import torch
+
+    seen = [predictor.mapping.observation(value) for value in values]
+    delays = np.array([one.command_delay + one.camera_delay for one in seen])
+    logs = {id(window.run): CommandLog(window.run) for window in windows}
+    made = {
+        (place, delay): logs[id(window.run)].rows(window.start, rows, step=predictor.step, delay=delay)[0]
+        for place, window in enumerate(windows)
+        for delay in set(delays.tolist())
+    }
+    return torch.as_tensor(np.stack([made[place, delay] for delay in delays.tolist() for place in range(len(windows))]))
+
+
+def _caps(predictor: Predictor, flat: Tensor, window: Window, values: np.ndarray) -> np.ndarray:
+    """End caps (k, frame, cap, 3) at the frames of a window, from its stored states (k, stored, NS), as seen."""
+    import torch
+
+    from r2s2r_cli.engine import end_caps
+    from r2s2r_cli.engine.flat import unpack_state
+    from r2s2r_cli.engine.hooks import effective
+
+    at = torch.as_tensor((window.run.t[window.frames] - window.start) / (predictor.step * STRIDE))
+    low = at.floor().long()
+    share = (at - low)[None, :, None]
+    states = flat[:, low] * (1 - share) + flat[:, low + 1] * share
+    k, frames = states.shape[:2]
+    theta = effective(predictor.structure, predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64)))
+    theta = theta.map(lambda x: x.expand(k, *x.shape[1:]).repeat_interleave(frames, dim=0))
+    caps = end_caps(theta, unpack_state(predictor.structure, states.flatten(0, 1))).unflatten(0, (k, frames)).numpy()
+    caps[..., 2] += np.array([predictor.mapping.observation(value).ground_height for value in values])[:, None, None]
+    return np.asarray(caps)

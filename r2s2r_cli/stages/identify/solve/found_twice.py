@@ -1,0 +1,73 @@
+"""Cooling over growing horizons, again and again until the best cost is found twice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from r2s2r_cli.stages.identify.solve.loss import Loss
+from r2s2r_cli.stages.identify.solve.population import Cooled, Cooling, Population, cool
+
+AGREE = 3.0
+"""[nats] Costs of two ways that ended in the same place, or in one as likely."""
+EASY = 6
+"""A first way that took at most so many generations at the end, and was not rough there, needs no second."""
+ROUGH = 1.5
+"""Temperature of the last draw beyond which a cost is rough on the scale of its own standard deviations."""
+HOTTER = 1.5
+"""Each way begins so much hotter than the one before."""
+COOLING = Cooling()
+CHANCES = 6
+"""Ways, at most."""
+
+
+@dataclass(frozen=True)
+class Ways:
+    """best: where the best way ended. costs: of all ways at the end. evaluations: of all, of points at any horizon."""
+
+    best: Cooled
+    costs: tuple[float, ...]
+    evaluations: int
+
+    @property
+    def twice(self) -> bool:
+        """Whether a second way ended at about the best cost."""
+        return sum(cost < min(self.costs) + AGREE for cost in self.costs) > 1
+
+
+def cool_growing(
+    stages: Sequence[Population],
+    z0: np.ndarray,
+    normal: np.ndarray,
+    *,
+    loss: Loss,
+    seed: int = 0,
+    cooling: Cooling = COOLING,
+    chances: int = CHANCES,
+    told: Callable[[int, int, int, float], None] | None = None,
+) -> Ways:
+    """Cool each of the stages, problems over the same unknowns, short horizon first, from the one before.
+
+    A cost that is rough has minima beside the best; which one a way ends in is chance. So ways are begun anew from z0
+    with other draws until two end within `AGREE` of the best, at most `chances`; unless the first was `EASY`. told is
+    called with the number of the way, the name of the stage and the cost after each stage. Raises as `cool`.
+    """
+    ends: list[Cooled] = []
+    spent = 0
+    for chance in range(chances):
+        z, curvature = z0, normal
+        for number, problem in enumerate(stages):
+            own = replace(cooling, hottest=cooling.hottest * HOTTER**chance)
+            heard = None if told is None else partial(told, chance, number)
+            own_seed = 1000 * seed + 100 * chance + number
+            at = cool(problem, z, curvature, loss=loss, seed=own_seed, cooling=own, told=heard)
+            z, curvature, spent = at.z, at.normal, spent + at.evaluations
+        ends.append(at)
+        ways = Ways(min(ends, key=lambda one: one.cost), tuple(one.cost for one in ends), spent)
+        easy = chance == 0 and at.generations <= EASY and at.rough <= ROUGH
+        if easy or ways.twice:
+            break
+    return ways

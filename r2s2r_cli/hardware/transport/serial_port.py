@@ -1,0 +1,93 @@
+"""A serial port (or a pty, or another URL that pyserial knows) as a stream of lines."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import time
+from typing import Any
+
+from r2s2r_cli.hardware.transport.base import WRITE_TIMEOUT, Address, Message
+from r2s2r_cli.hardware.transport.gone import not_taken, port_errors
+from r2s2r_cli.hardware.transport.lines import LineBuffer
+from r2s2r_cli.hardware.transport.name import PortName
+
+BAUD = 115200
+_POLL = 0.02
+"""[s] between looks where the port cannot be waited for (Windows, loop://)."""
+
+
+class SerialPort:
+    """Opened for this process alone. DTR and RTS are left as they are: a pty has none, a board may reset on them."""
+
+    def __init__(self, name: PortName) -> None:
+        self.name = name.text
+        self._url = "://" in name.text
+        self._port: Any = None
+        self._lines = LineBuffer()
+        self._overlong = 0
+
+    @property
+    def overlong(self) -> int:
+        """Lines thrown away because they did not end, since this object was made."""
+        return self._overlong + self._lines.overlong
+
+    def open(self) -> None:
+        """Raises LinkError: no such port, no permission, held by another program."""
+        import serial
+
+        self.close()
+        self._overlong, self._lines = self.overlong, LineBuffer()
+        options: dict[str, Any] = {"baudrate": BAUD, "timeout": 0, "write_timeout": WRITE_TIMEOUT}
+        if not self._url:
+            options["exclusive"] = True
+        with port_errors(self.name, "opening"):
+            self._port = serial.serial_for_url(self.name, **options)
+            self._port.reset_input_buffer()
+
+    def receive(self, timeout: float) -> Message | None:
+        """The next complete line. Raises LinkError where the plug is out."""
+        end = time.monotonic() + timeout
+        while (line := self._lines.take()) is None:
+            left = end - time.monotonic()
+            data = self._bytes(max(left, 0.0))
+            self._lines.feed(data)
+            if not data and left <= 0:
+                return None
+        return Message(line, time.monotonic())
+
+    def _bytes(self, timeout: float) -> bytes:
+        with port_errors(self.name, "reading"):
+            number = self._number()
+            if number is None:
+                data = bytes(self._port.read(4096))
+                if not data and timeout > 0:
+                    time.sleep(min(timeout, _POLL))
+                return data
+            if not select.select([number], [], [], timeout)[0]:
+                return b""
+            # Readable and nothing to read is how a hang-up looks; pyserial raises in `read`, which must be called.
+            return bytes(self._port.read(max(1, self._port.in_waiting)))
+
+    def _number(self) -> int | None:
+        """The file descriptor, where it can be waited for."""
+        with contextlib.suppress(AttributeError, OSError):
+            return int(self._port.fileno())
+        return None
+
+    def send(self, data: bytes, to: Address | None = None) -> None:
+        """Raises LinkError where the robot does not read within the time-out, or the port is gone."""
+        import serial
+
+        with port_errors(self.name, "writing"):
+            try:
+                self._port.write(data)
+            except serial.SerialTimeoutException:
+                raise not_taken(self.name, WRITE_TIMEOUT) from None
+
+    def close(self) -> None:
+        """Never raises."""
+        port, self._port = self._port, None
+        if port is not None:
+            with contextlib.suppress(Exception):  # whatever is wrong with it, it is not ours any more
+                port.close()

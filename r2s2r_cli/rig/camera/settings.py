@@ -174,14 +174,10 @@ class CameraSettings(Frozen):
 
     def ideal(self) -> CameraSettings:
         """The same camera without noise, loss, latency or faults."""
-        return self.model_copy(
-            update={
-                "depth": DepthNoise(
-                    sd_per_m=0, lateral_px=0, disparity_step_px=0, flying_share=0, edge_hole_share=0, hole_share=0,
-                    misregistration_px=(0, 0),
-                ),
-                "color": ColorNoise(sd=0, exposure_s=0, exposure_drift=0),
-                "clock": Clock(rate_hz=self.clock.rate_hz, origin_s=0, drift_ppm=0, jitter_s=0, latency_s=0, lost_share=0),
-                "faults": Faults(),
-            }
+        depth = DepthNoise(
+            sd_per_m=0, lateral_px=0, disparity_step_px=0, flying_share=0, edge_hole_share=0, hole_share=0,
+            misregistration_px=(0, 0),
         )  # fmt: skip
+        clock = Clock(rate_hz=self.clock.rate_hz, origin_s=0, drift_ppm=0, jitter_s=0, latency_s=0, lost_share=0)
+        color = ColorNoise(sd=0, exposure_s=0, exposure_drift=0)
+        return self.model_copy(update={"depth": depth, "color": color, "clock": clock, "faults": Faults()})

@@ -1,1 +1,1 @@
-"""RGB-D cameras: one interface (`base.Camera`), and what can stand behind it."""
+"""RGB-D cameras: one interface (`devices.camera.Camera`), and what can stand behind it."""

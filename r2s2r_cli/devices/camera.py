@@ -1,12 +1,24 @@
-"""What every camera gives: registered colour and depth with two stamps, and how it is opened, read and closed."""
+"""A camera as `record` and `doctor` see it: what every one gives, how it is opened, read and closed, and its errors."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
+
+from r2s2r_cli.errors import HardwareError
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+
+class CameraError(HardwareError):
+    """The camera cannot be had, is gone, or sends what cannot be understood."""
+
+
+class CameraEnded(CameraError):
+    """A camera that plays back has no more frames."""
 
 
 @dataclass(frozen=True)
@@ -61,11 +73,11 @@ class Camera(Protocol):
         """Frames a second that the camera promises."""
 
     def open(self) -> None:
-        """Connect. Raises HardwareError that names the camera and the next step."""
+        """Connect. Raises CameraError that names the camera and the next step."""
 
     def read(self, timeout_s: float = 1.0) -> Frame | None:
-        """The next frame; None where none came in time. Raises HardwareError where the camera is gone, or has no more
-        (`CameraEnded`)."""
+        """The next frame; None where none came in time. Raises CameraError where the camera is gone, CameraEnded
+        where a recording has no more."""
 
     def close(self) -> None:
         """Let go. May be called more than once."""
@@ -79,24 +91,30 @@ class Camera(Protocol):
         """Close."""
 
 
-class Closing:
-    """Makes a camera a context manager, given `open` and `close`."""
+@dataclass(frozen=True)
+class FeedStatistics:
+    """Counts since the feed began. received: frames that came. lost: numbers of the camera that never came. repeated:
+    frames equal to the one before, to the last bit of depth. overrun: frames thrown away here because nobody took them.
+    late_s: longest time between two frames [s]. silent_s: time since the last one [s]."""
 
-    def open(self) -> None:
-        """See `Camera.open`."""
-        raise NotImplementedError
+    received: int = 0
+    lost: int = 0
+    repeated: int = 0
+    overrun: int = 0
+    late_s: float = 0.0
+    silent_s: float = 0.0
+
+
+class CameraFeed(Protocol):
+    """Frames of an open camera, read in a thread of their own."""
+
+    @property
+    def statistics(self) -> FeedStatistics:
+        """What came so far, and what did not."""
+
+    def frames(self) -> list[Frame]:
+        """What has come since the last call, in order; never waits. Raises CameraError once the camera is gone and
+        all of its frames were taken."""
 
     def close(self) -> None:
-        """See `Camera.close`."""
-        raise NotImplementedError
-
-    def __enter__(self) -> Self:
-        """Open."""
-        self.open()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close."""
-        self.close()
+        """Stop reading. The camera stays open."""

@@ -28,6 +28,25 @@ class CalibrateSettings(Frozen):
     """A recalibration that moves a length by more than this is reported as a swapped sensor."""
 
 
+class RecordSettings(Frozen):
+    """Settings of `record`."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
+    rest_s: Annotated[float, Field(strict=True, ge=0, le=600)] = 2.0
+    """How long the robot is held in its rest shape (all cables long), before and after every run [s]."""
+    stale_s: Annotated[float, Field(strict=True, gt=0, le=10)] = 0.2
+    """A sensor that was not heard for longer than this [s] stops the robot."""
+    time_limit_s: Annotated[float, Field(strict=True, gt=0, le=86400)] = 3600.0
+    """Longest run [s]; beyond it the robot is stopped."""
+    color: Literal["jpeg", "png"] = "jpeg"
+    """How colour is kept: JPEG of jpeg_quality, or PNG, which loses nothing and takes twice the room. Depth is always PNG."""
+    jpeg_quality: Annotated[int, Field(strict=True, ge=50, le=100)] = 95
+    """Quality of the JPEG colour."""
+    camera_gone_s: Annotated[float, Field(strict=True, gt=0, le=60)] = 2.0
+    """A camera without a frame for longer than this [s] stops the robot."""
+
+
 class SimulateSettings(Frozen):
     """Settings of `simulate`."""
 
@@ -73,6 +92,7 @@ class RunConfig(Frozen):
 
     imports: ImportSettings = Field(default=ImportSettings(), alias="import")
     calibrate: CalibrateSettings = CalibrateSettings()
+    record: RecordSettings = RecordSettings()
     estimate: EstimateSettings = EstimateSettings()
     simulate: SimulateSettings = SimulateSettings()
     identify: IdentifySettings = IdentifySettings()

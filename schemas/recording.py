@@ -44,6 +44,11 @@ RUN = GroupSpec(
                       description="radius of the winches"),
         AttributeSpec(name="recovered", type="bool", required=False,
                       description="true: sealed by `r2s2r recover` after a crash"),
+        AttributeSpec(name="clock", type="str", required=False, choices=("host", "board"),
+                      description="what t counts: the host's clock; of a robot in lock-step, the board's"),
+        AttributeSpec(name="repeat", type="int", required=False, description="which repeat of its policy this run is, from 1"),
+        AttributeSpec(name="rest", type="float", unit="s", required=False,
+                      description="time held in the rest shape (all cables long) before and after the policy"),
     ),
 )  # fmt: skip
 
@@ -93,6 +98,9 @@ SENSORS = GroupSpec(
           nan_means="not received"),
         column("length", "float64", ("t_sensor", "sensor"), "m", "length as the source's own calibration gave it",
           required=False, nan_means="not received"),
+        column("t_board", "float64", ("t_sensor",), "s", "clock of the board that sent the sample, of unknown origin",
+          required=False, nan_means="the protocol has none"),
+        column("board", "int64", ("t_sensor",), "index", "board that sent the sample, -1: all at once", required=False),
         column("cable", "int64", ("sensor",), "index", "cable that each sensor measures", required=False),
     ),
 )  # fmt: skip
@@ -143,8 +151,9 @@ CAMERA = GroupSpec(
     datasets=(
         column("t", "float64", ("t_color",), "s", "time of the colour frame", required=False),
         column("color", "blobs", ("t_color",), "byte", "encoded colour images (PNG or JPEG)", required=False),
-        column("source_frame", "int64", ("t_color",), "index", "number of the colour frame in the source",
+        column("source_frame", "int64", ("t_color",), "index", "number of the colour frame in the source; a gap is a lost one",
           required=False),
+        column("t_device", "float64", ("t_color",), "s", "clock of the camera, of unknown origin", required=False),
         column("t_depth", "float64", ("t_depth",), "s", "time of the depth frame", required=False),
         column("depth", "blobs", ("t_depth",), "byte", "encoded 16-bit depth images (PNG)", required=False),
         column("pair", "int64", ("t_color",), "index", "depth frame that belongs to each colour frame, -1 none",
@@ -161,6 +170,27 @@ CAMERA_POSE = GroupSpec(
         column("t", "float64", ("t_pose",), "s", "time since the start of the run"),
         column("p_WC", "float64", ("t_pose", "xyz"), "m", "camera position", frame="W"),
         column("q_WC", "float64", ("t_pose", "quat"), "1", "camera orientation, xyzw", frame="W"),
+    ),
+)  # fmt: skip
+
+LINK = GroupSpec(
+    path="runs/{run}/link",
+    description="health of the link to the robot, about once a second; counts since the run began",
+    attributes=(
+        AttributeSpec(name="protocol", type="str", description="how host and robot talk"),
+        AttributeSpec(name="port", type="str", description="device or address"),
+        AttributeSpec(name="stops_by_itself", type="bool",
+                      description="true: the device stops its motors when the host falls silent"),
+    ),
+    datasets=(
+        column("t", "float64", ("t_link",), "s", "time since the start of the run"),
+        column("received", "int64", ("t_link",), "count", "samples received"),
+        column("lost", "int64", ("t_link",), "count", "samples that never came, by their sequence numbers"),
+        column("repeated", "int64", ("t_link",), "count", "samples that came twice"),
+        column("corrupt", "int64", ("t_link",), "count", "lines that were thrown away: checksum, form or range"),
+        column("late", "int64", ("t_link",), "count", "control ticks more than half a period late"),
+        column("latency", "float64", ("t_link",), "s", "from a command to its answer, the last one",
+          nan_means="the protocol cannot tell"),
     ),
 )  # fmt: skip
 
@@ -181,7 +211,7 @@ RECORDING = ArtifactSpec(
     filename="10-record.h5",
     level="iteration",
     groups=(
-        RUN, CAPS, COMMANDS, SENSORS, MOTORS, IMU, CAMERA, CAMERA_POSE, MOCAP, INTERVALS, SEGMENTS,
+        RUN, CAPS, COMMANDS, SENSORS, MOTORS, IMU, LINK, CAMERA, CAMERA_POSE, MOCAP, INTERVALS, SEGMENTS,
         policy_group("runs/{run}/policy"),
     ),
 )  # fmt: skip

@@ -1,6 +1,7 @@
 """Target intervals and segments, as tables inside a run.
 
-Frames are counted among the kept frames of `caps`; in a run without caps, among the kept frames of `commands`.
+Frames are counted among the kept frames of `caps`; in an imported run without caps, among the kept frames of `commands`;
+in a run that `record` made, they are the rows of `commands`: control ticks, all of which count.
 """
 
 from __future__ import annotations

@@ -6,11 +6,12 @@ from array import array
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
-from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Rows, Value
+from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Rows, Scalar, Value
 from r2s2r_cli.errors import ArtifactError
 from r2s2r_cli.store.atomic import keep_beside
 from r2s2r_cli.store.header import read_header
@@ -39,6 +40,19 @@ class Sealed:
 
 
 @dataclass(frozen=True)
+class Late:
+    """What is known of a recording only when it has ended.
+
+    wall_s, report, drawings: of its provenance. attributes: by group path, added to those of the head.
+    """
+
+    wall_s: float
+    report: Mapping[str, Any]
+    drawings: tuple[str, ...] = ()
+    attributes: Mapping[str, Mapping[str, Scalar]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Rowset:
     """Where the whole rows of one stream lie in the journal; 8 bytes a row, runs can be long."""
 
@@ -48,8 +62,10 @@ class Rowset:
         return len(self.offsets)
 
 
-def seal(journal: Path, target: Path, *, recovered: bool = False) -> Sealed:
-    """Write the artifact of a closed journal, then remove the journal.
+def seal(journal: Path, target: Path, *, recovered: bool = False, late: Late | None = None) -> Sealed:
+    """Write the artifact of a closed journal, then remove the journal. late: what its head could not know.
+
+    A run without a single row (it was never begun) is left out.
 
     Nothing is lost on failure: the journal stays until the artifact is verified under its name. A journal without a
     single whole row leaves no artifact.
@@ -58,7 +74,7 @@ def seal(journal: Path, target: Path, *, recovered: bool = False) -> Sealed:
     """
     with unwatched(journal):
         head, start = read_head(journal)
-        provenance = _provenance(journal, head)
+        provenance = _with_late(_provenance(journal, head), late)
         rows, end, lost = _survey(journal, head, start)
         torn = journal.stat().st_size - end
         counts = {head.streams[n].key: len(r) for n, r in sorted(rows.items())}
@@ -76,9 +92,17 @@ def seal(journal: Path, target: Path, *, recovered: bool = False) -> Sealed:
                     hint=f"mv -n '{target}' '{target}.old' && r2s2r recover '{journal}'",
                 )
         else:
-            header = write_artifact(target, _current(journal, head, rows, recovered), provenance)
+            header = write_artifact(target, _current(journal, head, rows, recovered, late), provenance)
         _remove(journal, keep=lost > 0)
         return Sealed(header, counts, torn, lost)
+
+
+def _with_late(provenance: Provenance, late: Late | None) -> Provenance:
+    if late is None:
+        return provenance
+    return provenance.model_copy(
+        update={"wall_s": round(late.wall_s, 3), "report": dict(late.report), "drawings": tuple(late.drawings)}
+    )
 
 
 def _survey(journal: Path, head: JournalHead, start: int) -> tuple[dict[int, Rowset], int, int]:
@@ -113,11 +137,15 @@ def _sealed_before(
     target: Path, provenance: Provenance, head: JournalHead, rows: Mapping[int, Rowset]
 ) -> Header | None:
     """The header of the artifact that an earlier, killed attempt made of the same journal; None for another one."""
-    if read_header(target).provenance != provenance:
+    if _with_late(read_header(target).provenance, _NOTHING_LATE) != _with_late(provenance, _NOTHING_LATE):
         return None
     header = checked_header(target)
     expected = {f"{head.streams[n].path}/{f.name}": len(r) for n, r in rows.items() for f in head.streams[n].fields}
     return header if all(length(target, path) == count for path, count in expected.items()) else None
+
+
+_NOTHING_LATE = Late(0.0, {})
+"""Puts aside what two seals of one journal may differ in."""
 
 
 def _remove(journal: Path, *, keep: bool) -> None:
@@ -126,11 +154,17 @@ def _remove(journal: Path, *, keep: bool) -> None:
     journal.unlink()
 
 
-def _current(journal: Path, head: JournalHead, rows: Mapping[int, Rowset], recovered: bool) -> ArtifactData:
+def _current(
+    journal: Path, head: JournalHead, rows: Mapping[int, Rowset], recovered: bool, late: Late | None
+) -> ArtifactData:
     groups: dict[str, Group] = {}
+    begun = {_run_of(head.streams[n].path) for n in rows}
     for path, attributes in head.groups.items():
-        extra = {"recovered": True} if recovered and path.count("/") == 1 else {}
-        groups[path] = Group({}, {**attributes, **extra})
+        if _run_of(path) not in begun:
+            continue
+        extra: dict[str, Scalar] = {"recovered": True} if recovered and path.count("/") == 1 else {}
+        told = late.attributes.get(path, {}) if late is not None else {}
+        groups[path] = Group({}, {**attributes, **extra, **told})
     for number, stream in enumerate(head.streams):
         if number in rows:
             values = {column.name: _value(journal, stream, column, rows[number]) for column in stream.fields}
@@ -139,6 +173,11 @@ def _current(journal: Path, head: JournalHead, rows: Mapping[int, Rowset], recov
     for _, step in chain(head.kind, head.schema_version):
         groups = dict(step(groups))
     return ArtifactData(head.kind, groups)
+
+
+def _run_of(path: str) -> str:
+    """`runs/walk` of `runs/walk/camera`; what lies elsewhere is its own."""
+    return "/".join(path.split("/")[:2])
 
 
 def _value(journal: Path, stream: Stream, column: Field, rows: Rowset) -> Value:

@@ -1,0 +1,75 @@
+"""What is to be recorded: which policies, how often, under which names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Items
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.artifact import Scalar
+from r2s2r_cli.errors import UsageError
+from r2s2r_cli.stages.simulate.policies import Sequence
+from schemas.policy import PolicyFile
+from schemas.robot import Robot
+
+REPEATS_MAX = 1000
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """One run to record. repeat: which of its policy, from 1. rest: time in the rest shape before and after [s]."""
+
+    name: str
+    policy: PolicyFile
+    repeat: int
+    rest: float
+
+
+def plans(policies: Items[PolicyFile], *, repeats: int, rest: float) -> tuple[RunPlan, ...]:
+    """Every policy `repeats` times, named `<policy>`, or `<policy>-<repeat>` where there are several.
+
+    The repeats of one policy do not follow each other: slow drift of the robot then looks like what it is, and not like
+    a difference between policies. Raises UsageError where two runs would have one name.
+    """
+    if not 1 <= repeats <= REPEATS_MAX:
+        raise UsageError("this is no number of repeats", where="--repeats", expected=f"1 to {REPEATS_MAX}",
+                         received=str(repeats), hint="r2s2r record gait.toml --repeats 3 --port ...")  # fmt: skip
+    found = [
+        RunPlan(policy.name if repeats == 1 else f"{policy.name}-{number}", policy, number, rest)
+        for number in range(1, repeats + 1)
+        for policy in policies
+    ]
+    names = [plan.name for plan in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise UsageError(
+                "two runs would have the same name", where="r2s2r record", expected="a name for each", received=name,
+                hint="change name in one of the policies, or record one at a time",
+            )  # fmt: skip
+    return tuple(found)
+
+
+def with_rest(sequence: Sequence, *, rest: float, timeout: float) -> Sequence:
+    """The same with the rest shape (all cables long) before and after, each held for `rest` [s]; 0: without."""
+    if rest <= 0:
+        return sequence
+    long = np.ones((1, sequence.target.shape[1]))
+    return Sequence(
+        np.concatenate([long, sequence.target, long]),
+        np.concatenate([[rest], sequence.hold, [rest]]),
+        np.concatenate([[timeout], sequence.timeout, [timeout]]),
+    )
+
+
+def run_attributes(plan: RunPlan, robot: Robot, *, origin: str, source: str, lock_step: bool) -> dict[str, Scalar]:
+    """Attributes of the group of the run, as they are known before it. origin: robot or rig."""
+    pid = robot.pid
+    return {
+        "origin": origin, "nature": "simulated" if origin == "rig" else "measured", "source": source,
+        "robot": robot.name, "pid_min_length": pid.min_length_m, "pid_range": pid.range_m,
+        "pid_tolerance": pid.tolerance, "pid_p": pid.p, "pid_i": pid.i, "pid_d": pid.d,
+        "motor_speed": float(np.mean([motor.speed for motor in robot.motors])),
+        "winch_radius": float(np.mean([motor.winch_radius_m for motor in robot.motors])),
+        "clock": "board" if lock_step else "host", "repeat": plan.repeat, "rest": plan.rest,
+    }  # fmt: skip

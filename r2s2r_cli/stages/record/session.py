@@ -1,0 +1,144 @@
+"""A recording: all its runs one after the other, and what is to be said about each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from r2s2r_cli.devices.link import RobotLink
+from r2s2r_cli.errors import R2S2RError
+from r2s2r_cli.stages.record.camera import Feed, Frame, Pictures
+from r2s2r_cli.stages.record.plan import RunPlan
+from r2s2r_cli.stages.record.run import RunLoop, Watch
+from r2s2r_cli.stages.record.writer import Sink, Writer
+from schemas.config import RecordSettings
+from schemas.results_record import CameraCounts, RecordReport, RecordRun
+from schemas.robot import Robot
+
+CONTROL_SHARE, CAMERA_SHARE = 0.95, 0.98
+"""Of control ticks on time and of frames that were kept: below it the report warns."""
+_SILENT = 0.02
+"""Share of the control ticks without a reading of a sensor beyond which the report warns."""
+
+
+@dataclass
+class Session:
+    """The runs to record, and what became of them: of every run that was begun there is a report, whatever ended it.
+
+    started: wall clock of each run that was begun [unix s].
+    """
+
+    plans: Sequence[RunPlan]
+    robot: Robot
+    link: RobotLink
+    settings: RecordSettings
+    feed: Feed | None = None
+    wall_clock: Callable[[], float] = lambda: float("nan")
+    watch: Watch = lambda now: None
+    runs: list[RecordRun] = field(default_factory=list)
+    started: dict[str, float] = field(default_factory=dict)
+
+    def record(self, sink: Sink) -> None:
+        """All runs. sink: takes their rows. The link is open, and stopped at the end of every run.
+
+        Raises HardwareError (link, camera, disk, a duty of the host), after the motors were told to stop; what was
+        recorded is with the sink. InputError for a policy of another robot or a robot that is not calibrated.
+        """
+        for plan in self.plans:
+            with Writer(sink, lossless=self.link.facts.lock_step) as writer:
+                self._one(plan, writer)
+
+    def report(self) -> RecordReport:
+        """What was recorded so far."""
+        facts = self.link.facts
+        begun = {run.run for run in self.runs}
+        return RecordReport(
+            port=facts.port, protocol=facts.protocol, stops_by_itself=facts.watchdog is not None,
+            clock="board" if facts.lock_step else "host", runs=tuple(self.runs),
+            not_begun=tuple(plan.name for plan in self.plans if plan.name not in begun),
+        )  # fmt: skip
+
+    def _one(self, plan: RunPlan, writer: Writer) -> None:
+        loop = RunLoop(plan, self.robot, self.link, writer, self.watch)
+        self.started[plan.name] = self.wall_clock()
+        pictures = None
+        ended = "complete"
+        try:
+            with ExitStack() as stack:
+                stack.callback(self.link.stop)
+                if self.feed is not None:
+                    stamp = _stamp(loop, lock_step=self.link.facts.lock_step)
+                    pictures = Pictures(self.feed, writer, f"runs/{plan.name}/camera", self.settings, stamp)
+                    stack.enter_context(pictures)
+                loop.run(pictures)
+        except BaseException as error:
+            self.link.stop()
+            ended = error.what if isinstance(error, R2S2RError) else "interrupted"
+            raise
+        finally:
+            try:
+                loop.finish()
+            finally:
+                self.runs.append(_report(loop, pictures, ended))
+
+
+def _stamp(loop: RunLoop, *, lock_step: bool) -> Callable[[Frame], float]:
+    """From a frame to its time in the run [s]: when it came; in lock-step by the camera's clock, set at its first one."""
+    start = loop.link.now() - loop.elapsed()
+    if not lock_step:
+        return lambda frame: frame.t_host - start
+    shift: list[float] = []
+
+    def stamp(frame: Frame) -> float:
+        if not shift:
+            shift.append(loop.elapsed() - frame.t_device)
+        return frame.t_device + shift[0]
+
+    return stamp
+
+
+def _report(loop: RunLoop, pictures: Pictures | None, ended: str) -> RecordRun:
+    tally, now = loop.tally, loop.link.statistics
+    camera = None
+    if pictures is not None:
+        rate = pictures.written / loop.t if loop.t > 0 else None
+        camera = CameraCounts(frames=pictures.written, lost=pictures.lost, rate_hz=rate)
+    done = RecordRun(
+        run=loop.plan.name, policy=loop.plan.policy.name, repeat=loop.plan.repeat, ended=ended, targets=loop.targets,
+        targets_done=loop.steps.index, timed_out=tuple(loop.timed_out), duration_s=loop.t, ticks=tally.ticks,
+        rate_hz=tally.rate, late=tally.late, samples=tally.samples, lost=tally.since("lost", now),
+        repeated=tally.since("repeated", now), reordered=tally.since("reordered", now),
+        corrupt=now.corrupt - tally.before.corrupt, gap_max_s=tally.gap_max, latency_median_s=now.latency_median,
+        latency_p99_s=now.latency_p99, clock_drift=now.clock_drift, clock_jumps=tally.jumps,
+        silent_share=tuple((tally.silent / max(1, tally.ticks)).tolist()), voltage_first_v=tally.voltage_first,
+        voltage_last_v=tally.voltage_last, camera=camera,
+    )  # fmt: skip
+    return done.model_copy(update={"warnings": tuple(_warnings(done, loop.link.facts.watchdog is not None))})
+
+
+def _warnings(run: RecordRun, stops_by_itself: bool) -> list[str]:
+    found = []
+    if not run.complete:
+        left = "" if stops_by_itself else "; the protocol cannot guarantee that the motors stopped"
+        found.append(f"ended at target {run.targets_done + 1} of {run.targets}: {run.ended}{left}")
+    if run.timed_out:
+        numbers = ", ".join(map(str, run.timed_out))
+        found.append(f"targets given up after their time-out, not all cables were done: {numbers}")
+    if run.late > (1 - CONTROL_SHARE) * max(run.ticks, 1):
+        found.append(f"{run.late} of {run.ticks} control ticks came more than half a period late")
+    if run.lost:
+        found.append(f"{run.lost} of {run.lost + run.samples} samples were lost on the way")
+    if run.corrupt:
+        found.append(f"{run.corrupt} lines were corrupt and thrown away")
+    if run.clock_jumps:
+        found.append(f"a board's clock jumped {run.clock_jumps} times: the stamps of the runs are the host's")
+    silent = [f"{i} ({share:.0%})" for i, share in enumerate(np.array(run.silent_share)) if share > _SILENT]
+    if silent:
+        found.append(f"sensors without a reading: {', '.join(silent)} of the control ticks")
+    camera = run.camera
+    if camera is not None and camera.lost > (1 - CAMERA_SHARE) * max(camera.frames + camera.lost, 1):
+        found.append(f"{camera.lost} of {camera.frames + camera.lost} camera frames were lost")
+    return found

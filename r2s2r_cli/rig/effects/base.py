@@ -1,16 +1,17 @@
 """What a law of the rig can reach, and the places in a step where it can act.
 
 Order within a step: `command` (what reaches the drivers), `volts`, `turn` (shaft speed), `radius` (of the spool),
-`rest` (rest length that acts), `force` and `friction` (before MuJoCo's step). `sense` acts when a sensor is read,
-`see` when the camera looks. A law that changes the model for good does so once, in its constructor.
+`rest` (rest length that acts), `force` and `friction` (before MuJoCo's step). `sense` acts when a sensor is read. A law
+that changes the model for good does so once, when it is made; one of the camera changes the camera's table.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from r2s2r_cli.rig.camera.settings import CameraSettings
 from r2s2r_cli.rig.model.options import Options
 from r2s2r_cli.rig.model.sim import MujocoSim
 from r2s2r_cli.rig.section import Section
@@ -25,23 +26,6 @@ class Scene:
     sim: MujocoSim
     r: np.ndarray
     rng: np.random.Generator
-
-
-@dataclass(frozen=True)
-class View:
-    """How the camera differs, for one frame, from what its table says: turned by R_CC (3, 3) and moved by p_CC [m],
-    (3,), both in the axes of frame C; depth times `scale`; the scene as it was `delay` [s] ago; `lost`: this frame
-    never comes."""
-
-    p_CC: np.ndarray
-    R_CC: np.ndarray
-    scale: float = 1.0
-    delay: float = 0.0
-    lost: bool = False
-
-
-STRAIGHT = View(np.zeros(3), np.eye(3))
-"""The camera is what its table says."""
 
 
 class Law:
@@ -78,10 +62,6 @@ class Law:
         """Lengths that the sensors are stretched to [m], (cable,)."""
         return length
 
-    def see(self, t: float, view: View) -> View:
-        """How the camera stands for the frame at time t; called once a frame."""
-        return view
-
 
 class EffectSection(Section):
     """The table of one effect: its numbers, and how to make its law."""
@@ -90,9 +70,13 @@ class EffectSection(Section):
         """Options of the model, where the effect is one."""
         return options
 
+    def seen(self, camera: CameraSettings) -> CameraSettings:
+        """Settings of the camera, where the effect is one of its own."""
+        return camera
+
     def law(self, scene: Scene) -> Law:
-        """The law at work on a robot."""
-        raise NotImplementedError
+        """The law at work on a robot; by default one that uses no hook."""
+        return Law()
 
 
 def overrides(law: Law, hook: str) -> bool:
@@ -103,8 +87,3 @@ def overrides(law: Law, hook: str) -> bool:
 def per(values: tuple[float, ...], n: int, fill: float) -> np.ndarray:
     """Numbers of a table, one an element; missing ones at the end are `fill`."""
     return np.array((*values, *(fill,) * n)[:n], dtype=float)
-
-
-def with_delay(view: View, delay: float) -> View:
-    """The view, later."""
-    return replace(view, delay=view.delay + delay)

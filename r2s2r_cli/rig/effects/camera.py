@@ -2,106 +2,60 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-import numpy as np
-
-from r2s2r_cli.rig.effects.base import EffectSection, Law, Scene, View, with_delay
-from r2s2r_cli.rig.section import NonNegative, Positive, Share, Vector3
+from r2s2r_cli.rig.camera.settings import CameraSettings
+from r2s2r_cli.rig.effects.base import EffectSection
+from r2s2r_cli.rig.section import NonNegative, Real, Share, Vector3
 
 
 class CameraPose(EffectSection):
-    """The camera was knocked: it is turned and moved against what its table says."""
+    """The camera is knocked: moved, and turned about its own axes."""
 
     turn_rad: Vector3 = (0.0, 0.0, 0.0)
-    """Rotation vector in the axes of frame C [rad]."""
+    """Angles about the axes of frame C [rad]."""
     by_m: Vector3 = (0.0, 0.0, 0.0)
-    """In the axes of frame C [m]."""
+    """In frame W [m]."""
     at_s: NonNegative = 0.0
     """When it happens [s]."""
 
-    def law(self, scene: Scene) -> Law:
+    def seen(self, camera: CameraSettings) -> CameraSettings:
         """A jump in time, where the catalogue has a constant."""
-        return _Knock(self)
-
-
-class _Knock(Law):
-    def __init__(self, p: CameraPose) -> None:
-        self._p, self._turn, self._by = p, turn(np.array(p.turn_rad)), np.array(p.by_m)
-
-    def see(self, t: float, view: View) -> View:
-        return replace(view, p_CC=self._by, R_CC=self._turn) if t >= self._p.at_s else view
+        return camera.model_copy(update={"turn_rad": self.turn_rad, "shift_m": self.by_m, "knocked_at_s": self.at_s})
 
 
 class CameraScale(EffectSection):
-    """Every depth is too large by a factor."""
+    """Depth and focal length are not what the camera states."""
 
-    factor: Positive = 1.02
+    depth_error: Real = 0.02
+    """Depths are 1 + this of the true ones."""
+    focal_error: Real = 0.0
+    """Focal lengths are 1 + this of the stated ones."""
 
-    def law(self, scene: Scene) -> Law:
-        """A constant factor on depth; the colour picture is right."""
-        return _Scale(self.factor)
-
-
-class _Scale(Law):
-    def __init__(self, factor: float) -> None:
-        self._factor = factor
-
-    def see(self, t: float, view: View) -> View:
-        return replace(view, scale=view.scale * self._factor)
+    def seen(self, camera: CameraSettings) -> CameraSettings:
+        """Depth and width can go wrong each on its own, where the catalogue has one factor."""
+        return camera.model_copy(update={"depth_error": self.depth_error, "focal_error": self.focal_error})
 
 
 class CameraDelay(EffectSection):
     """Stamps are late: a frame shows the scene as it was earlier than its stamp says."""
 
-    delay_s: NonNegative = 0.08
-    jitter_s: NonNegative = 0.0
-    """Further delay, exponential with this mean, drawn for every frame [s]."""
+    delay_s: Real = 0.08
 
-    def law(self, scene: Scene) -> Law:
-        """A delay a frame."""
-        return _Late(self, scene.rng)
-
-
-class _Late(Law):
-    def __init__(self, p: CameraDelay, rng: np.random.Generator) -> None:
-        self._p, self._rng = p, rng
-
-    def see(self, t: float, view: View) -> View:
-        return with_delay(view, self._p.delay_s + (self._rng.exponential(self._p.jitter_s) if self._p.jitter_s else 0))
+    def seen(self, camera: CameraSettings) -> CameraSettings:
+        """Of the stamp alone; when a frame arrives stays as it is."""
+        clock = camera.clock.model_copy(update={"stamp_delay_s": self.delay_s})
+        return camera.model_copy(update={"clock": clock})
 
 
 class Dropout(EffectSection):
-    """Frames never come: in bursts."""
+    """Frames never come, and depth has more holes."""
 
-    share: Share = 0.2
-    """Of all frames."""
-    burst: Positive = 4.0
-    """Mean number of frames that are missing at a stretch."""
+    frames: Share = 0.2
+    """Part of the frames that are lost."""
+    pixels: Share = 0.2
+    """Part of the pixels without depth, in blobs."""
 
-    def law(self, scene: Scene) -> Law:
-        """Two states with given odds of a change (Gilbert), where the catalogue has independent frames."""
-        return _Bursts(self, scene.rng)
-
-
-class _Bursts(Law):
-    def __init__(self, p: Dropout, rng: np.random.Generator) -> None:
-        self._rng = rng
-        self._end = min(1.0 / p.burst, 1.0)
-        self._begin = min(p.share / max(1.0 - p.share, 1e-9) * self._end, 1.0)
-        self._lost = False
-
-    def see(self, t: float, view: View) -> View:
-        u = self._rng.random()
-        self._lost = u >= self._end if self._lost else u < self._begin
-        return replace(view, lost=view.lost or self._lost)
-
-
-def turn(v: np.ndarray) -> np.ndarray:
-    """Rotation matrix (3, 3) of a rotation vector [rad]."""
-    angle = float(np.linalg.norm(v))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = v / angle
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K)
+    def seen(self, camera: CameraSettings) -> CameraSettings:
+        """Loss in the camera; the catalogue loses caps."""
+        clock = camera.clock.model_copy(update={"lost_share": self.frames})
+        depth = camera.depth.model_copy(update={"hole_share": min(self.pixels, 0.9)})
+        return camera.model_copy(update={"clock": clock, "depth": depth})

@@ -8,6 +8,7 @@ import numpy as np
 
 from r2s2r_cli.rig.effects.base import EffectSection, Law, Scene, per
 from r2s2r_cli.rig.model.options import Options
+from r2s2r_cli.rig.model.sim import MujocoSim
 from r2s2r_cli.rig.section import NonNegative, Positive, Real
 
 
@@ -25,8 +26,6 @@ class RollingResistance(EffectSection):
         ground = model.geom("ground").id
         model.geom_condim[ground] = 6
         model.geom_friction[ground, 1:] = self.turning_m, self.rolling_m
-        for cap in cap_geoms(scene):
-            model.geom_friction[cap, 1:] = self.turning_m, self.rolling_m
         return Law()
 
 
@@ -42,10 +41,6 @@ class SoftGround(EffectSection):
         """MuJoCo's soft constraint, softer: a spring that hardens with depth."""
         return replace(options, contact_time_s=self.time_s, impedance=(0.3, 0.95, self.depth_m))
 
-    def law(self, scene: Scene) -> Law:
-        """All of it is in the options."""
-        return Law()
-
 
 class CapRadius(EffectSection):
     """Caps are smaller or larger than `robot.toml` says: worn rubber."""
@@ -56,12 +51,14 @@ class CapRadius(EffectSection):
     def law(self, scene: Scene) -> Law:
         """Radii of the MuJoCo spheres; at least a tenth of the radius is left."""
         model = scene.sim.model
-        for cap, by in zip(cap_geoms(scene), per(self.by_m, scene.robot.n_caps, 0.0), strict=True):
+        for cap, by in zip(
+            cap_geoms(scene.sim, scene.robot.n_caps), per(self.by_m, scene.robot.n_caps, 0.0), strict=True
+        ):
             size = model.geom_size[cap, 0]
             model.geom_size[cap, 0] = model.geom_rbound[cap] = max(size + by, size / 10)
         return Law()
 
 
-def cap_geoms(scene: Scene) -> np.ndarray:
+def cap_geoms(sim: MujocoSim, n_caps: int) -> np.ndarray:
     """Ids of the caps' geoms, in the order of the caps."""
-    return np.array([scene.sim.model.geom(f"cap{i}").id for i in range(scene.robot.n_caps)])
+    return np.array([sim.model.geom(f"cap{i}").id for i in range(n_caps)])

@@ -35,7 +35,7 @@ class FrictionField(EffectSection):
 
 class _Field(Law):
     def __init__(self, p: FrictionField, scene: Scene) -> None:
-        self._p, self._data, self._geoms = p, scene.sim.data, cap_geoms(scene)
+        self._p, self._data, self._geoms = p, scene.sim.data, cap_geoms(scene.sim, scene.robot.n_caps)
 
     def friction(self, mu: np.ndarray) -> np.ndarray:
         xy = self._data.geom_xpos[self._geoms, :2]
@@ -81,7 +81,7 @@ class Stribeck(EffectSection):
 
 class _Slide(Law):
     def __init__(self, p: Stribeck, scene: Scene) -> None:
-        self._p, self._data, self._geoms = p, scene.sim.data, cap_geoms(scene)
+        self._p, self._data, self._geoms = p, scene.sim.data, cap_geoms(scene.sim, scene.robot.n_caps)
         self._dt = scene.sim.model.opt.timestep
         self._before: np.ndarray | None = None
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
+from r2s2r_cli.rig.camera.settings import CameraSettings
 from r2s2r_cli.rig.effects.base import EffectSection, Law, Scene
 from r2s2r_cli.rig.effects.contact import cap_geoms
 from r2s2r_cli.rig.model.options import Options
@@ -24,14 +25,17 @@ class GroundSlope(EffectSection):
 
     def options(self, options: Options) -> Options:
         """A turned plane, where the catalogue turns gravity."""
+        return replace(options, ground_normal=self.normal())
+
+    def seen(self, camera: CameraSettings) -> CameraSettings:
+        """The floor is seen as it lies."""
+        return camera.model_copy(update={"floor_normal": self.normal()})
+
+    def normal(self) -> Vector3:
+        """Of the floor, frame W."""
         x, y, z = 0.0, -math.sin(self.angle_x_rad), math.cos(self.angle_x_rad)
         a = self.angle_y_rad
-        normal = (math.cos(a) * x + math.sin(a) * z, y, math.cos(a) * z - math.sin(a) * x)
-        return replace(options, ground_normal=normal)
-
-    def law(self, scene: Scene) -> Law:
-        """All of it is in the options."""
-        return Law()
+        return (math.cos(a) * x + math.sin(a) * z, y, math.cos(a) * z - math.sin(a) * x)
 
 
 class TetherDrag(EffectSection):
@@ -96,7 +100,7 @@ class ViscousContact(EffectSection):
 
 class _Sticky(Law):
     def __init__(self, p: ViscousContact, scene: Scene) -> None:
-        self._c, self._sim, self._geoms = p.drag_n_s_per_m, scene.sim, cap_geoms(scene)
+        self._c, self._sim, self._geoms = p.drag_n_s_per_m, scene.sim, cap_geoms(scene.sim, scene.robot.n_caps)
         model = scene.sim.model
         self._body = model.geom_bodyid[self._geoms]
         self._r = model.geom_size[self._geoms, 0]

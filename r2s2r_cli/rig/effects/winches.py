@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from r2s2r_cli.rig.effects.base import EffectSection, Law, Scene, per
@@ -75,7 +77,7 @@ class Moved(Section):
     """An end of a cable that is tied elsewhere."""
 
     cable: Index
-    end: Index
+    end: Literal[0, 1] = 0
     """0 or 1: which of its two caps."""
     by_m: Vector3
     """In the rod's frame R [m]."""

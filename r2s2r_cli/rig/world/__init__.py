@@ -4,7 +4,6 @@
 docs/reference/world.md.
 """
 
-from r2s2r_cli.rig.world.camera import Camera as Camera, CameraNoise as CameraNoise, Occluder as Occluder
 from r2s2r_cli.rig.world.device import Boards as Boards, Inertial as Inertial, Sensors as Sensors
 from r2s2r_cli.rig.world.faults import Fault as Fault, Timed as Timed, Wire as Wire
 from r2s2r_cli.rig.world.file import Floor as Floor, Start as Start, World as World, load_world as load_world

@@ -83,18 +83,6 @@ class CableTorn(Timed):
     cable: Index
 
 
-class CameraGone(Timed):
-    """The camera's connection is closed and refused."""
-
-    kind: Literal["camera_gone"]
-
-
-class CameraFrozen(Timed):
-    """The camera sends its last picture again and again."""
-
-    kind: Literal["camera_frozen"]
-
-
 class LinkGone(Timed):
     """The cable is pulled: the port is closed and refused."""
 
@@ -109,7 +97,7 @@ class LinkStalled(Timed):
 
 Fault = Annotated[
     SensorStuck | SensorFrozen | SensorJump | BoardSilent | BoardReset | ClockJump | MotorDead | CableTorn
-    | CameraGone | CameraFrozen | LinkGone | LinkStalled,
+    | LinkGone | LinkStalled,
     Field(discriminator="kind"),
 ]  # fmt: skip
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.rig.camera.settings import CameraSettings
 from r2s2r_cli.rig.effects.parameters import Effects
 from r2s2r_cli.rig.section import Index, NonNegative, Positive, Real, Section, Vector2
-from r2s2r_cli.rig.world.camera import Camera
 from r2s2r_cli.rig.world.device import Boards, Inertial, Sensors
 from r2s2r_cli.rig.world.faults import Fault, Wire
 
@@ -50,12 +50,20 @@ class World(Section):
     boards: Boards = Boards()
     sensors: Sensors = Sensors()
     inertial: Inertial = Inertial()
-    camera: Camera = Camera()
+    camera: CameraSettings = CameraSettings()
+    """What the camera is said to be; effects may have changed it (`seen`)."""
     effects: Effects = Effects()
     """`[effects.<id>]`: which unmodelled laws hold, and how strongly. Left out: none."""
     faults: tuple[Fault, ...] = ()
     """`[[faults]]`: what breaks, and when."""
     wire: Wire = Wire()
+
+    def seen(self) -> CameraSettings:
+        """The camera as it really is: its table with the effects of the camera and of the floor in it."""
+        camera = self.camera
+        for _, effect in self.effects.present():
+            camera = effect.seen(camera)
+        return camera
 
 
 def load_world(path: Path) -> World:

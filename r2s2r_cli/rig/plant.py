@@ -1,0 +1,219 @@
+"""The robot itself: MuJoCo's bodies and cables, winches, and the laws of the world file. No electronics, no clocks."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from r2s2r_cli.errors import UsageError
+from r2s2r_cli.rig.effects.base import Law, Scene, overrides
+from r2s2r_cli.rig.effects.cables import Cords
+from r2s2r_cli.rig.effects.contact import cap_geoms
+from r2s2r_cli.rig.model.frames import Pose, quaternion, rest_pose, rotation
+from r2s2r_cli.rig.model.mjcf_text import ground_rotation
+from r2s2r_cli.rig.model.options import STIFF, Options
+from r2s2r_cli.rig.model.sim import MujocoSim, Reading
+from r2s2r_cli.rig.winches import Winches
+from r2s2r_cli.rig.world.faults import CableTorn, MotorDead
+from r2s2r_cli.rig.world.file import World
+from schemas.robot import Robot
+
+_ROUNDING = 1e-6
+"""Part of a step by which a time may miss it: times are sums of rounded numbers."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is, as nobody outside the rig may know it; frame W, z against gravity, at one instant.
+
+    t [s]. p_WE: end caps [m], (cap, 3). p_WR, q_WR (xyzw), v_WR, w_R: middles of the rods [m], attitudes, velocities
+    [m/s], angular velocities in rod axes [rad/s], (rod, 3 or 4). length: distance of cap centres [m], tension [N],
+    (cable,). rest: rest lengths that the winches have set [m], angle: of their shafts [rad], (actuated,). force: of the
+    ground on the caps [N], (cap, 3), in the last step. contact: caps that it touches, (cap,). battery: share of its
+    voltage.
+    """
+
+    t: float
+    p_WE: np.ndarray
+    p_WR: np.ndarray
+    q_WR: np.ndarray
+    v_WR: np.ndarray
+    w_R: np.ndarray
+    length: np.ndarray
+    tension: np.ndarray
+    rest: np.ndarray
+    angle: np.ndarray
+    force: np.ndarray
+    contact: np.ndarray
+    battery: float
+
+
+class Plant:
+    """A robot in its world, at rest at time 0. Same robot, world and duties, same motion, to the last bit.
+
+    Raises InputError for a robot that MuJoCo cannot model, UsageError for a world that names what the robot lacks.
+    """
+
+    def __init__(self, robot: Robot, world: World) -> None:
+        _check(robot, world)
+        self.robot, self.world = robot, world
+        options = _options(world)
+        self.sim = MujocoSim(robot, options)
+        self.winches = Winches(robot)
+        self._n = len(robot.actuated)
+        self._h = float(self.sim.model.opt.timestep)
+        self._zero = rest_pose(robot).rest
+        self._pose = _placed(rest_pose(robot), world, options)
+        self.sim.reset(self._pose)
+        self.laws = self._laws()
+        self._force = tuple(law for law in self.laws if overrides(law, "force"))
+        self._friction = tuple(law for law in self.laws if overrides(law, "friction"))
+        self._sense = tuple(law for law in self.laws if overrides(law, "sense"))
+        self.winches.use(self.laws)
+        self._ground, self._caps = int(self.sim.model.geom("ground").id), self._cap_geoms()
+        self._cap_of = {int(geom): i for i, geom in enumerate(self._caps)}
+        self._mu = np.full(len(self._caps), self.sim.model.geom_friction[self._ground, 0])
+        if self._friction:
+            self._own_friction()
+        self._dead = [fault for fault in world.faults if isinstance(fault, MotorDead)]
+        self._torn = [fault for fault in world.faults if isinstance(fault, CableTorn)]
+        mujoco.mj_forward(self.sim.model, self.sim.data)
+        self._t = -world.start.settle_s
+        """Time of the plant; MuJoCo's own starts at the settling and would be a sum of rounded steps."""
+        self._steps, self._begin = 0, self._t
+        self.advance(world.start.settle_s, np.zeros(len(robot.motors)))
+
+    @property
+    def t(self) -> float:
+        """The rig's time [s]."""
+        return self._t
+
+    def advance(self, dt: float, duty: np.ndarray) -> None:
+        """Go on to t + dt, in whole steps: what is left of one is made up for the next time.
+
+        duty: PWM -1 .. 1 with the sign of the wire, (motor,), held. Raises NumericalError as `MujocoSim` does.
+        """
+        self._t += dt
+        wanted = int((self._t - self._begin) / self._h + _ROUNDING)
+        for _ in range(wanted - self._steps):
+            self._step(self._begin + self._steps * self._h, duty)
+            self._steps += 1
+
+    def lengths(self) -> np.ndarray:
+        """Distances of cap centres [m], (cable,): what the sensors are stretched by, laws of sensing apart."""
+        p = self.sim.data.geom_xpos[self._caps]
+        pairs = self.sim._caps
+        return np.asarray(np.linalg.norm(p[pairs[:, 1]] - p[pairs[:, 0]], axis=-1))
+
+    def sensed(self) -> np.ndarray:
+        """The same with the laws of sensing [m], (cable,)."""
+        length = self.lengths()
+        for law in self._sense:
+            length = law.sense(self._t, length)
+        return length
+
+    def truth(self) -> Truth:
+        """Everything, now."""
+        seen: Reading = self.sim.read()
+        return Truth(
+            t=self._t, p_WE=seen.p_WE, p_WR=seen.p_WR, q_WR=seen.q_WR, v_WR=seen.v_WR, w_R=seen.w_R, length=seen.length,
+            tension=seen.tension, rest=self.winches.rest.copy(), angle=self.winches.angle.copy(),
+            force=self._forces(), contact=seen.contact, battery=self.winches.share,
+        )  # fmt: skip
+
+    def _step(self, t: float, duty: np.ndarray) -> None:
+        data, model = self.sim.data, self.sim.model
+        if self._dead:
+            stopped = [fault.motor for fault in self._dead if fault.on(t)]
+            duty = duty.copy()
+            duty[stopped] = 0.0
+        for fault in [fault for fault in self._torn if fault.on(t)]:
+            Cords(self.sim).tear(fault.cable)
+            self._torn.remove(fault)
+        if self._force:
+            data.xfrc_applied[:] = 0.0
+            for law in self._force:
+                law.force(t)
+        if self._friction:
+            mu = self._mu
+            for law in self._friction:
+                mu = law.friction(mu)
+            model.geom_friction[self._caps, 0] = mu
+        self.sim.step()
+        # As in `MujocoSim.wind`: a step uses the rest lengths at its start; what is wound in it shows in the next.
+        tension = -data.actuator_force[: self._n]
+        data.ctrl[: self._n] = self._zero - self.winches.turn(t, self._h, duty, tension)
+
+    def _forces(self) -> np.ndarray:
+        data, force, six = self.sim.data, np.zeros((len(self._caps), 3)), np.zeros(6)
+        for i in range(data.ncon):
+            a, b = (int(x) for x in data.contact.geom[i])
+            if self._ground not in (a, b) or data.contact.efc_address[i] < 0:
+                continue
+            mujoco.mj_contactForce(self.sim.model, data, i, six)
+            # The first axis of a contact's frame points from its first geom to its second.
+            f = data.contact.frame[i].reshape(3, 3).T @ six[:3]
+            force[self._cap_of[b if a == self._ground else a]] += f if a == self._ground else -f
+        return force
+
+    def _laws(self) -> tuple[Law, ...]:
+        laws = []
+        for name, effect in self.world.effects.present():
+            rng = np.random.default_rng([self.world.seed, zlib.crc32(name.encode())])
+            laws.append(effect.law(Scene(self.robot, self.sim, self.winches.r, rng)))
+        return tuple(laws)
+
+    def _cap_geoms(self) -> np.ndarray:
+        return cap_geoms(self.sim, self.robot.n_caps)
+
+    def _own_friction(self) -> None:
+        """From now on the caps decide about friction, not the ground."""
+        model = self.sim.model
+        model.geom_priority[self._caps] = model.geom_priority[self._ground] + 1
+        model.geom_condim[self._caps] = model.geom_condim[self._ground]
+        model.geom_friction[self._caps] = model.geom_friction[self._ground]
+
+
+def _options(world: World) -> Options:
+    options = STIFF if world.stiff else Options(timestep_s=world.timestep_s)
+    options = replace(options, friction=world.floor.friction, restitution=world.floor.restitution)
+    for _, effect in world.effects.present():
+        options = effect.options(options)
+    return options
+
+
+def _placed(pose: Pose, world: World, options: Options) -> Pose:
+    """The pose turned by the heading, moved, and laid on the floor."""
+    a = world.start.heading_rad
+    R_GS = np.array([[np.cos(a), -np.sin(a), 0.0], [np.sin(a), np.cos(a), 0.0], [0.0, 0.0, 1.0]])
+    R_WG = ground_rotation(options.ground_normal)
+    # The floor's own x axis is as near the world's as can be, so a level floor turns nothing.
+    p_GR = pose.p_WR @ R_GS.T + np.array([*world.start.position_m, 0.0])
+    R_WR = R_WG @ R_GS @ rotation(pose.q_WR)
+    return Pose(p_GR @ R_WG.T, np.array([quaternion(R) for R in R_WR]), pose.rest)
+
+
+def _check(robot: Robot, world: World) -> None:
+    """Raises UsageError where the world file names a rod, cable, cap, motor or sensor that the robot does not have."""
+    counts = {
+        "rod": len(robot.rods), "cable": len(robot.cables), "motor": len(robot.motors), "sensor": len(robot.sensors),
+    }  # fmt: skip
+    tables = [("effects." + name, effect) for name, effect in world.effects.present()]
+    tables += [(f"effects.attachment_offset.moved.{i}", one) for i, one in enumerate(_moved(world))]
+    tables += [(f"faults.{i}", fault) for i, fault in enumerate(world.faults)]
+    for where, table in tables:
+        for key, count in counts.items():
+            value = getattr(table, key, None)
+            if isinstance(value, int) and value >= count:
+                raise UsageError(
+                    f"the robot has no {key} {value}", where=f"world file: {where}.{key}",
+                    expected=f"0 to {count - 1}", received=str(value), hint=f"correct {where}.{key} in the world file",
+                )  # fmt: skip
+
+
+def _moved(world: World) -> tuple[object, ...]:
+    offset = world.effects.attachment_offset
+    return () if offset is None else offset.moved

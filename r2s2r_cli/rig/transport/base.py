@@ -41,6 +41,9 @@ class Transport(Protocol):
     def drop(self) -> None:
         """The link is torn off: closed, and from now on refused."""
 
+    def restore(self) -> None:
+        """It is there again, at the same address where that can be had."""
+
     def close(self) -> None:
         """Release the port."""
 

@@ -89,6 +89,7 @@ class Channel:
             self._push_split(due, self._flipped(data) if flip else data, board, split=bool(split))
 
     def _push_split(self, due: float, data: bytes, board: int | None, *, split: bool) -> None:
+        due = max(due, self._last_due) if self._stream else due
         if not split or len(data) < 2:
             self._push(due, data, board)
             return

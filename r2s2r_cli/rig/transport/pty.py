@@ -8,6 +8,7 @@ import select
 import termios
 import time
 import tty
+from pathlib import Path
 
 from r2s2r_cli.errors import HardwareError
 from r2s2r_cli.rig.transport.base import Event
@@ -23,7 +24,18 @@ class PtyTransport:
 
     stream = True
 
-    def __init__(self) -> None:
+    def __init__(self, name: Path | None = None) -> None:
+        """name: a link to the device, made here and removed by `close`; a plug that comes back keeps it.
+
+        Raises HardwareError where there is no free terminal, or something else has that name.
+        """
+        self._name = name
+        self._outbox = Outbox()
+        self._poll = select.poll()
+        self.connected = False
+        self._open()
+
+    def _open(self) -> None:
         try:
             self._master, slave = os.openpty()
         except OSError as error:
@@ -32,15 +44,27 @@ class PtyTransport:
                 received=error.strerror or str(error), hint="r2s2r rig --link tcp",
             ) from error  # fmt: skip
         tty.setraw(slave)
-        self.address = os.ttyname(slave)
+        device = os.ttyname(slave)
         os.set_blocking(self._master, False)
         # Once it was open and is no longer, the master reports a hang-up until somebody opens it.
         os.close(slave)
-        self._poll = select.poll()
         self._poll.register(self._master, select.POLLIN | select.POLLHUP)
-        self._outbox = Outbox()
         self._gone = False
-        self.connected = False
+        self.address = device if self._name is None else str(self._name)
+        if self._name is not None:
+            self._link(self._name, device)
+
+    def _link(self, name: Path, device: str) -> None:
+        try:
+            if name.is_symlink():
+                name.unlink()
+            name.symlink_to(device)
+        except OSError as error:
+            self.close()
+            raise HardwareError(
+                "the device cannot have that name", where=str(name), expected="a free name, or a link to replace",
+                received=error.strerror or str(error), hint="r2s2r rig --link pty",
+            ) from error  # fmt: skip
 
     def poll(self, timeout: float) -> list[Event]:
         """Opened, bytes, closed. Raises nothing for what the host does."""
@@ -75,11 +99,20 @@ class PtyTransport:
         """The device file is gone, as with a USB plug that was pulled."""
         self.close()
 
+    def restore(self) -> None:
+        """Plugged in again: another terminal, under the same name where it has one."""
+        if self._gone:
+            self._open()
+
     def close(self) -> None:
         """Release the terminal."""
         if not self._gone:
             self._gone, self.connected = True, False
+            self._outbox.clear()
+            self._poll.unregister(self._master)
             os.close(self._master)
+            if self._name is not None and self._name.is_symlink():
+                self._name.unlink()
 
     def _wait(self, timeout: float) -> int:
         found = self._poll.poll(timeout * 1e3)

@@ -20,16 +20,9 @@ class TcpTransport:
     stream = True
 
     def __init__(self, host: str = "127.0.0.1", port: int = 0) -> None:
-        self._listen = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        try:
-            self._listen.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            self._listen.bind((host, port))
-            self._listen.listen()
-        except OSError as error:
-            self._listen.close()
-            raise _refused(host, port, error) from error
-        self._listen.setblocking(False)
-        self.address = f"socket://{host}:{self._listen.getsockname()[1]}"
+        self._listen = _listening(host, port)
+        self._at: tuple[str, int] = (host, self._listen.getsockname()[1])
+        self.address = f"socket://{host}:{self._at[1]}"
         self._peer: socket.socket | None = None
         self._outbox = Outbox()
         self._gone = False
@@ -66,6 +59,12 @@ class TcpTransport:
     def drop(self) -> None:
         """Nobody is let in any more."""
         self.close()
+
+    def restore(self) -> None:
+        """Listen at the same port again."""
+        if self._gone:
+            self._listen = _listening(*self._at)
+            self._gone = False
 
     def close(self) -> None:
         """Release the port."""
@@ -113,8 +112,17 @@ class TcpTransport:
         return [Event("closed")]
 
 
-def _refused(host: str, port: int, error: OSError) -> HardwareError:
-    return HardwareError(
-        "the port cannot be opened", where=f"{host}:{port}", expected="a free port",
-        received=error.strerror or str(error), hint="r2s2r rig --link tcp --port 0",
-    )  # fmt: skip
+def _listening(host: str, port: int) -> socket.socket:
+    listen = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        listen.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listen.bind((host, port))
+        listen.listen()
+    except OSError as error:
+        listen.close()
+        raise HardwareError(
+            "the port cannot be opened", where=f"{host}:{port}", expected="a free port",
+            received=error.strerror or str(error), hint="r2s2r rig --link tcp --port 0",
+        ) from error  # fmt: skip
+    listen.setblocking(False)
+    return listen

@@ -12,6 +12,7 @@ from r2s2r_cli.rig.transport.base import Event
 
 PORT = 2390
 """Where the authors' boards send to."""
+_LOOPBACK = ("localhost",)
 _CHUNK = 2048
 _BURST = 64
 """Datagrams that are read of one board before another has its turn."""
@@ -26,22 +27,9 @@ class UdpTransport:
     def __init__(self, host: str = "127.0.0.1", port: int = PORT, *, boards: int = 1, shared: bool = False) -> None:
         self._to = (host, port or PORT)
         self.address = f"udp://{host}:{self._to[1]}"
-        self._shared = shared
+        self._shared, self._boards = shared, 1 if shared else boards
+        self._sockets = self._open()
         self._gone = False
-        self._sockets: list[socket.socket] = []
-        try:
-            for _ in range(1 if shared else boards):
-                one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-                self._sockets.append(one)
-                # On the loopback alone where the host is: nobody else shall drive the rig.
-                one.bind(("127.0.0.1" if host.startswith("127.") else "0.0.0.0", 0))
-                one.setblocking(False)
-        except OSError as error:
-            self.close()
-            raise HardwareError(
-                "no socket can be opened", where=self.address, expected="a free UDP port",
-                received=error.strerror or str(error), hint="r2s2r rig --link tcp",
-            ) from error  # fmt: skip
 
     def poll(self, timeout: float) -> list[Event]:
         """Datagrams, each ended by a newline whether it came with one or not."""
@@ -70,8 +58,31 @@ class UdpTransport:
         """Silence."""
         self.close()
 
+    def restore(self) -> None:
+        """Other sockets, as after a restart of the boards."""
+        if self._gone:
+            self._sockets, self._gone = self._open(), False
+
     def close(self) -> None:
         """Release the sockets."""
         self._gone = True
         for one in self._sockets:
             one.close()
+
+    def _open(self) -> list[socket.socket]:
+        sockets: list[socket.socket] = []
+        # On the loopback alone where the host is: nobody else shall drive the rig.
+        own = "127.0.0.1" if self._to[0] in _LOOPBACK or self._to[0].startswith("127.") else "0.0.0.0"
+        try:
+            for _ in range(self._boards):
+                sockets.append(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+                sockets[-1].bind((own, 0))
+                sockets[-1].setblocking(False)
+        except OSError as error:
+            for one in sockets:
+                one.close()
+            raise HardwareError(
+                "no socket can be opened", where=self.address, expected="a free UDP port",
+                received=error.strerror or str(error), hint="r2s2r rig --link tcp",
+            ) from error  # fmt: skip
+        return sockets

@@ -82,6 +82,9 @@ class DeviceCodec(Protocol):
     def closed(self, t: float) -> None:
         """The host has gone (byte streams)."""
 
+    def tick_of(self, line: bytes) -> int | None:
+        """The tick that a line of the host asks for; None: it is another line."""
+
     def receive(self, line: bytes, board: int | None, t: float) -> Received:
         """Obey one line of the host, as it came, its newline included if it had one.
 

@@ -58,6 +58,10 @@ class BoardsCodec:
     def closed(self, t: float) -> None:
         """Nothing: the motors keep what they have."""
 
+    def tick_of(self, line: bytes) -> int | None:
+        """The tick that a line asks for."""
+        return tick_asked(line)
+
     def receive(self, line: bytes, board: int | None, t: float) -> Received:
         """Leave it in the buffer of the board, or of all of them; where that is full, it is lost."""
         tick = tick_asked(line)

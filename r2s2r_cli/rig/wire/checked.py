@@ -83,6 +83,10 @@ class CheckedCodec:
         if self.state is not State.ESTOP:
             self.state = State.WAIT
 
+    def tick_of(self, line: bytes) -> int | None:
+        """The tick that a line asks for."""
+        return _tick_of(parse(line))
+
     def receive(self, line: bytes, board: int | None, t: float) -> Received:
         """Obey a valid line and answer it; count an invalid one."""
         frame = parse(line)

@@ -36,6 +36,10 @@ class LegacyCodec:
     def closed(self, t: float) -> None:
         """Nothing: the motors keep what they have."""
 
+    def tick_of(self, line: bytes) -> int | None:
+        """The tick that a line asks for."""
+        return tick_asked(line)
+
     def receive(self, line: bytes, board: int | None, t: float) -> Received:
         """One motor, or the stop; everything else is passed over."""
         tick = tick_asked(line)

@@ -9,7 +9,6 @@ import numpy as np
 
 from r2s2r_cli.stages.segments import Intervals, segments
 
-
 NamedRow = tuple[str, dict[str, Any]]
 """Stream and row."""
 

@@ -14,7 +14,7 @@ from schemas.robot import Robot
 
 @dataclass(frozen=True)
 class StreamLayout:
-    """Datasets of one group that grow together. fields: (name, dtype, shape of a row). name: where a group has several."""
+    """Datasets of one group that grow together. fields: (name, dtype, shape). name: where a group has several."""
 
     path: str
     fields: tuple[tuple[str, str, tuple[int, ...]], ...]

@@ -86,7 +86,7 @@ class Session:
 
 
 def _stamp(loop: RunLoop, *, lock_step: bool) -> Callable[[Frame], float]:
-    """From a frame to its time in the run [s]: when it came; in lock-step by the camera's clock, set at its first one."""
+    """From a frame to its time in the run [s]: when it came; in lock-step by the camera's clock, from its first."""
     start = loop.link.now() - loop.elapsed()
     if not lock_step:
         return lambda frame: frame.t_host - start

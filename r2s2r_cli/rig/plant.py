@@ -201,7 +201,7 @@ def _check(robot: Robot, world: World) -> None:
     counts = {
         "rod": len(robot.rods), "cable": len(robot.cables), "motor": len(robot.motors), "sensor": len(robot.sensors),
     }  # fmt: skip
-    tables = [("effects." + name, effect) for name, effect in world.effects.present()]
+    tables: list[tuple[str, object]] = [("effects." + name, effect) for name, effect in world.effects.present()]
     tables += [(f"effects.attachment_offset.moved.{i}", one) for i, one in enumerate(_moved(world))]
     tables += [(f"faults.{i}", fault) for i, fault in enumerate(world.faults)]
     for where, table in tables:

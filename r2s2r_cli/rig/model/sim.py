@@ -171,15 +171,16 @@ class MujocoSim:
         self.data.ctrl[: len(rest)] = self._zero - np.clip(rest, *self._range.T)
 
     def _check(self) -> None:
-        for kind, warning in enumerate(self.data.warning):
-            # MuJoCo notes a divergence, starts anew from its default pose, and goes on as if nothing had been.
-            if warning.number:
-                text = mujoco.mju_warningText(kind, warning.lastinfo)
-                raise NumericalError(
-                    "MuJoCo's simulation went wrong", where=f"{self.robot.name}, t = {self.t:.3f} s",
-                    expected="finite numbers", received=text.strip(),
-                    hint="use a smaller timestep_s, or softer cables in robot.toml",
-                )  # fmt: skip
+        # MuJoCo notes a divergence, starts anew from its default pose, and goes on as if nothing had been.
+        counts = self.data.warning.number
+        if not counts.any():
+            return
+        kind = int(np.flatnonzero(counts)[0])
+        raise NumericalError(
+            "MuJoCo's simulation went wrong", where=f"{self.robot.name}, t = {self.t:.3f} s",
+            expected="finite numbers", received=mujoco.mju_warningText(kind, self.data.warning[kind].lastinfo).strip(),
+            hint="use a smaller timestep_s, or softer cables in robot.toml",
+        )  # fmt: skip
 
 
 def _checked(name: str, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:

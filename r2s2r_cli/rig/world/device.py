@@ -19,12 +19,13 @@ class Sensors(Section):
     """The same: capacitance at length 0 [F]."""
     day_sd_m: NonNegative = 0.005
     """Offset of today against the calibration, drawn once a sensor from the seed [m], standard deviation."""
-    drift_m_per_s: NonNegative = 1.7e-5
-    """Slow drift: a random walk that is this far away after one second per second, so 1 mm after a minute [m/s]."""
-    bow_m: NonNegative = 0.002
-    """Quadratic error: largest deviation from the line within the limits of cable length [m]."""
+    drift_sd_m: NonNegative = 0.001
+    """Slow drift: a random walk with this standard deviation after a minute, growing with the root of time [m]."""
+    bow_sd_m: NonNegative = 0.002
+    """Quadratic error: largest deviation from the calibrated line within the controller's range (passive cables:
+    within 5 cm of their length at rest), beyond it constant; drawn once a sensor [m], standard deviation."""
     noise_sd_m: NonNegative = 0.0005
-    """White, every sample [m]."""
+    """White, every sample [m], standard deviation."""
     lag_s: NonNegative = 0.03
     """Time constant of the first-order lag [s]."""
     converter: Literal["10 bit", "exact"] = "10 bit"
@@ -34,14 +35,15 @@ class Sensors(Section):
 
 
 class Inertial(Section):
-    """The inertial unit of every board, in the rod's axes R."""
+    """The inertial unit of every board, in the rod's axes R, at the rod's middle."""
 
-    accel_bias_sd_g: NonNegative = 0.04
-    """Drawn once an axis from the seed; [g] as the boards send."""
-    accel_noise_sd_g: NonNegative = 0.002
-    gyro_bias_sd_deg_per_s: NonNegative = 1.0
-    gyro_noise_sd_deg_per_s: NonNegative = 0.1
-    yaw_drift_deg_per_s: Real = 0.02
+    accel_bias_sd_m_per_s2: NonNegative = 0.4
+    """Drawn once an axis from the seed."""
+    accel_noise_sd_m_per_s2: NonNegative = 0.02
+    gyro_bias_sd_rad_per_s: NonNegative = 0.017
+    """Drawn once an axis from the seed."""
+    gyro_noise_sd_rad_per_s: NonNegative = 0.002
+    yaw_drift_rad_per_s: Real = 3.5e-4
     """Of the attitude that the older boards send: nothing holds its heading."""
 
 

@@ -53,7 +53,7 @@ class Sample:
     received. t_sensor: arrival of each of them [s], (sensor,), NaN: never. fresh: they came with this message,
     (sensor,), bool. encoder: counts of the latest message, (actuated,), NaN: none. a_B: specific force of this board's
     IMU [m/s^2], w_WB: angular velocity [rad/s], in board axes, (3,), None: the message has none. voltage: battery [V],
-    None: not told. driven: the duty that the device says it applies, +1 reels in, (actuated,), None: not told.
+    None: not told.
     """
 
     t_host: float
@@ -67,7 +67,6 @@ class Sample:
     a_B: np.ndarray | None = None
     w_WB: np.ndarray | None = None
     voltage: float | None = None
-    driven: np.ndarray | None = None
 
     @property
     def complete(self) -> bool:
@@ -79,11 +78,12 @@ class Sample:
 class LinkStatistics:
     """Health of a link since it was opened. A number that the protocol cannot tell is None.
 
-    received: good messages; sent: commands and stops. lost, repeated, reordered: by sequence number or board clock.
-    corrupt: failed the check sum, or do not parse. other: status texts and unknown messages. overlong: lines cut.
-    reconnects: how often the port was opened again. latency_median, latency_p99: command to its acknowledgement [s].
-    clock_offset: host minus board clock [s], clock_drift: its slope [1]. gap_max: longest silence while running [s].
-    last_status: the last text that a board said.
+    received: good messages; sent: commands and stops. lost, repeated, reordered: by sequence number. corrupt: a wrong
+    check sum, or no line of the protocol. other: status texts and unknown messages. overlong: lines cut. reconnects:
+    how often the port was opened again. refused: commands that the device did not take; held: how often its watchdog
+    stopped the motors; device_corrupt, device_lost: what it counted in our lines. latency_median, latency_p99: a line
+    of ours to its acknowledgement [s]. clock_offset: host minus board clock [s], clock_drift: its slope [1]. gap_max:
+    longest silence while running [s]. last_status: the last text that a board said.
     """
 
     received: int = 0
@@ -95,6 +95,10 @@ class LinkStatistics:
     other: int = 0
     overlong: int = 0
     reconnects: int = 0
+    refused: int | None = None
+    held: int | None = None
+    device_corrupt: int | None = None
+    device_lost: int | None = None
     latency_median: float | None = None
     latency_p99: float | None = None
     clock_offset: float | None = None
@@ -178,6 +182,10 @@ class RobotLink(Protocol):
 
     def reset(self) -> None:
         """Take the latch off, by intent and by nothing else. Raises LinkError where the device does not do it."""
+        ...
+
+    def reconnect(self, timeout: float = 10.0) -> None:
+        """After a LinkError: open the port again, shake hands, motors stopped. Raises LinkError after `timeout` [s]."""
         ...
 
     def __enter__(self) -> Self:

@@ -1,0 +1,163 @@
+"""The duties of the host: what must stop the robot, whatever the controller wants. A `RobotLink` around another.
+
+The robots of the authors have no watchdog, so nobody else stops them. Stopped is latched: only `reset` goes on.
+
+| duty | when |
+|---|---|
+| stale sensors | a winched cable's sensor, or a board, was not heard for 200 ms |
+| impossible sensors | a winched cable's sensor sends 0.20 pF (its chip is not set up) for 200 ms |
+| frozen sensor | the same value for 0.6 s while its motor was driven through 20 mm |
+| length out of range | outside the limits of robot.toml by more than 20 mm, three messages in a row |
+| time limit | the run takes longer than it was given |
+| exit, exception, SIGINT, SIGTERM | leaving the context; `signals.py` turns both signals into exceptions |
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from r2s2r_cli.devices.lengths import Lengths
+from r2s2r_cli.devices.link import LinkFacts, LinkState, LinkStatistics, RobotLink, SafetyStop, Sample
+from r2s2r_cli.hardware.watch import STALE, Watch
+
+if TYPE_CHECKING:
+    from schemas.robot import Robot
+
+SILENT = 5.0
+"""[s] of the wall's clock without any message in lock-step, where the world's clock stands still."""
+
+
+class GuardedLink:
+    """A link that stops the robot by itself. dry_run: sensors are read and watched, motors never move.
+
+    time_limit [s]: of a run, from entering or `restart`. calibrated: False where sensors have no calibration yet and
+    lengths cannot be watched (a robot that is held in the hand, not driven).
+    """
+
+    def __init__(
+        self, link: RobotLink, robot: Robot, *, time_limit: float = math.inf, dry_run: bool = False,
+        calibrated: bool = True,
+    ) -> None:  # fmt: skip
+        self.inner = link
+        self.dry_run = dry_run
+        self.time_limit = time_limit
+        self._watch = Watch(robot, Lengths.of(robot) if calibrated else None)
+        self._reason = ""
+        self._start = self._heard = self._wall = -math.inf
+        self._moving = np.zeros(len(robot.actuated))
+
+    @property
+    def facts(self) -> LinkFacts:
+        """Of the link."""
+        return self.inner.facts
+
+    @property
+    def state(self) -> LinkState:
+        """Of the link."""
+        return self.inner.state
+
+    @property
+    def statistics(self) -> LinkStatistics:
+        """Of the link."""
+        return self.inner.statistics
+
+    def now(self) -> float:
+        """Of the link."""
+        return self.inner.now()
+
+    def __enter__(self) -> Self:
+        """Connect; the time limit begins."""
+        self.inner.__enter__()
+        self.restart()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop and close."""
+        self.inner.__exit__(kind, value, trace)
+
+    def restart(self, *, time_limit: float | None = None) -> None:
+        """A new run: the time limit begins anew, what was watched is forgotten."""
+        if time_limit is not None:
+            self.time_limit = time_limit
+        self._start = self._heard = self.now()
+        self._wall = time.monotonic()
+        self._watch.restart(self._start)
+
+    def reconnect(self, timeout: float = 10.0) -> None:
+        """Of the link; what was watched is forgotten, the time limit goes on."""
+        self.inner.reconnect(timeout)
+        self._heard, self._wall = self.now(), time.monotonic()
+        self._watch.restart(self._heard)
+
+    def read(self, timeout: float) -> Sample | None:
+        """As of the link, but returns at least every 50 ms of silence inside to look at the clock.
+
+        Raises SafetyStop once a duty asks for it; the motors are stopped by then.
+        """
+        self._refuse()
+        end = self.now() + timeout
+        while True:
+            left = end - self.now()
+            sample = self.inner.read(max(0.0, min(left, STALE / 4)))
+            now = self.now()
+            if sample is not None:
+                self._heard, self._wall = now, time.monotonic()
+                self._object(self._watch.sample(sample, self._moving))
+            self._object(self._clock(now))
+            if sample is not None or left <= STALE / 4:
+                return sample
+
+    def command(self, speed: np.ndarray) -> None:
+        """As of the link; nothing but zeros in a dry run. Raises SafetyStop where the robot is stopped."""
+        self._refuse()
+        self._object(self._clock(self.now()))
+        speed = np.asarray(speed, dtype=np.float64)
+        self.inner.command(np.zeros_like(speed) if self.dry_run and np.isfinite(speed).all() else speed)
+        self._moving = speed if not self.dry_run else np.zeros_like(speed)
+
+    def stop(self) -> None:
+        """Of the link. Not latched: the next command moves again."""
+        self._moving = np.zeros_like(self._moving)
+        self.inner.stop()
+
+    def emergency_stop(self) -> None:
+        """Stop and latch, here and on the device where it can."""
+        self._reason = self._reason or "emergency stop"
+        self.inner.emergency_stop()
+
+    def reset(self) -> None:
+        """Take the latches off. Raises LinkError where the device does not do it."""
+        self.inner.reset()
+        self._reason = ""
+        self._moving = np.zeros_like(self._moving)
+        self.restart()
+
+    def _clock(self, now: float) -> str:
+        """What the clock objects to; "" nothing."""
+        silent = now - self._heard
+        if silent > STALE:
+            return f"stale sensors: nothing came for {silent * 1e3:.0f} ms"
+        if time.monotonic() - self._wall > SILENT:
+            return f"stale sensors: nothing came for {SILENT:g} s"
+        if now - self._start > self.time_limit:
+            return f"time limit: the run has taken {self.time_limit:g} s"
+        return self._watch.stale(now)
+
+    def _object(self, reason: str) -> None:
+        if reason:
+            self.inner.stop()
+            self._moving = np.zeros_like(self._moving)
+            self._reason = self._reason or reason
+            self._refuse()
+
+    def _refuse(self) -> None:
+        if self._reason:
+            raise SafetyStop(f"the robot is stopped: {self._reason}", where=self.facts.port, expected="a healthy robot",
+                             received=self._reason, hint=f"r2s2r doctor ports {self.facts.port}")  # fmt: skip

@@ -1,0 +1,95 @@
+"""What of the sensors must stop the robot. Pure: samples in, a reason or "" out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from r2s2r_cli.devices.lengths import NOT_INITIALISED, Lengths
+from r2s2r_cli.devices.link import Sample
+
+if TYPE_CHECKING:
+    from schemas.robot import Robot
+
+STALE = 0.2
+"""[s] after which a reading is too old to drive on."""
+FROZEN_FOR = 0.6
+"""[s] of one and the same value ..."""
+FROZEN_PATH = 0.02
+"""... while the winch was driven through this [m]. A living sensor changes by its noise alone, about every other time."""
+OUT_FOR = 3
+"""Messages in a row: one bad number is no reason."""
+MARGIN = 0.02
+"""[m] beyond the limits. Assumption: by so much the calibrations of two days differ (90 % of them by less than 18 mm)."""
+
+
+class Watch:
+    """The sensors of the winched cables, and the boards."""
+
+    def __init__(self, robot: Robot, lengths: Lengths | None) -> None:
+        by_cable = {sensor.cable: i for i, sensor in enumerate(robot.sensors)}
+        self._cables = [cable for cable in robot.actuated if cable in by_cable]
+        self._sensors = np.array([by_cable[cable] for cable in self._cables], dtype=np.int64)
+        self._motor = np.array([robot.actuated.index(cable) for cable in self._cables], dtype=np.int64)
+        motors = {motor.cable: motor for motor in robot.motors}
+        self._speed = np.array([
+            motors[c].no_load_rad_per_s * motors[c].speed * motors[c].winch_radius_m for c in self._cables
+        ])  # fmt: skip
+        self._lengths = lengths
+        self._limits = robot.limits
+        self.restart(0.0)
+
+    def restart(self, now: float) -> None:
+        """Forget what was; now [s]: from here on the sensors are awaited."""
+        n = len(self._sensors)
+        self._good = np.full(n, now)
+        self._out = np.zeros(n, dtype=np.int64)
+        self._value, self._raw = np.full(n, np.nan), np.full(n, np.nan)
+        self._since, self._path = np.full(n, now), np.zeros(n)
+        self._last = now
+
+    def sample(self, sample: Sample, moving: np.ndarray) -> str:
+        """Look at a sample that came while the motors had these speeds, (actuated,). A reason to stop, or ""."""
+        now, value, fresh = sample.t_host, sample.capacitance[self._sensors], sample.fresh[self._sensors]
+        self._raw = np.where(fresh, value, self._raw)
+        good = fresh & (np.abs(value - NOT_INITIALISED) > 1e-15)
+        self._good = np.where(good, now, self._good)
+        self._path = self._path + np.abs(moving[self._motor]) * self._speed * max(0.0, now - self._last)
+        self._last = max(now, self._last)
+        changed = good & (value != self._value)
+        self._value = np.where(changed, value, self._value)
+        self._since, self._path = np.where(changed, now, self._since), np.where(changed, 0.0, self._path)
+        frozen = good & (now - self._since > FROZEN_FOR) & (self._path > FROZEN_PATH)
+        if frozen.any():
+            return f"frozen sensor: that of cable {self._name(frozen)} has not changed while its motor ran"
+        return self._range(sample.capacitance, good)
+
+    def stale(self, now: float) -> str:
+        """A reason to stop at the time `now` [s]: a sensor without a good reading for too long."""
+        late = now - self._good > STALE
+        if not late.any():
+            return ""
+        stuck = late & (np.abs(self._raw - NOT_INITIALISED) < 1e-15)
+        if stuck.any():
+            return f"sensor not set up: that of cable {self._name(stuck)} sends 0.20 pF"
+        return f"stale sensors: no good reading of cable {self._name(late)} for {STALE * 1e3:.0f} ms"
+
+    def _range(self, capacitance: np.ndarray, good: np.ndarray) -> str:
+        if self._lengths is None:
+            return ""
+        length = self._lengths(capacitance)[self._cables]
+        low, high = self._limits.cable_length_min_m - MARGIN, self._limits.cable_length_max_m + MARGIN
+        out = good & ~((length >= low) & (length <= high))
+        self._out = np.where(good, np.where(out, self._out + 1, 0), self._out)
+        over = self._out >= OUT_FOR
+        if not over.any():
+            return ""
+        k = int(np.flatnonzero(over)[0])
+        return (
+            f"length out of range: cable {self._cables[k]} measures {length[k] * 1e3:.0f} mm, "
+            f"limits {self._limits.cable_length_min_m * 1e3:.0f} to {self._limits.cable_length_max_m * 1e3:.0f} mm"
+        )
+
+    def _name(self, which: np.ndarray) -> str:
+        return ", ".join(str(self._cables[k]) for k in np.flatnonzero(which))

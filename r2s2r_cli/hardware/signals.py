@@ -17,8 +17,8 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 def interrupting_signals() -> Iterator[None]:
     """While inside, a polite kill or a closed terminal raises KeyboardInterrupt in the main thread.
 
-    Without effect in another thread, which may not set handlers. Nobody can catch SIGKILL: after it only a device with a
-    watchdog stops.
+    Without effect in another thread, which may not set handlers. Nobody can catch SIGKILL: after it only a device
+    with a watchdog stops.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

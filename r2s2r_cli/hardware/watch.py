@@ -17,11 +17,11 @@ STALE = 0.2
 FROZEN_FOR = 0.6
 """[s] of one and the same value ..."""
 FROZEN_PATH = 0.02
-"""... while the winch was driven through this [m]. A living sensor changes by its noise alone, about every other time."""
+"""... while the winch was driven through this [m]. A living sensor changes by its noise alone."""
 OUT_FOR = 3
 """Messages in a row: one bad number is no reason."""
 MARGIN = 0.02
-"""[m] beyond the limits. Assumption: by so much the calibrations of two days differ (90 % of them by less than 18 mm)."""
+"""[m] beyond the limits. Assumption: 90 % of recalibrations a day later differ by less than 18 mm."""
 
 
 class Watch:

@@ -57,8 +57,9 @@ class Frame:
 class Camera(Protocol):
     """A camera. Used as `with open_camera(...) as camera:`; `intrinsics` and the rest are known once it is open."""
 
-    name: str
-    """Model and serial number, for people and for the recording."""
+    @property
+    def name(self) -> str:
+        """Model and serial number, for people and for the recording."""
 
     @property
     def intrinsics(self) -> Intrinsics:

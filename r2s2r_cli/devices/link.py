@@ -79,7 +79,7 @@ class LinkStatistics:
     """Health of a link since it was opened. A number that the protocol cannot tell is None.
 
     received: good messages; sent: commands and stops. lost, repeated, reordered: by sequence number. corrupt: a wrong
-    check sum, or no line of the protocol. other: status texts and unknown messages. overlong: lines cut. reconnects:
+    check sum, or no line of the protocol. other: status texts. overlong: lines cut. reconnects:
     how often the port was opened again. refused: commands that the device did not take; held: how often its watchdog
     stopped the motors; device_corrupt, device_lost: what it counted in our lines. latency_median, latency_p99: a line
     of ours to its acknowledgement [s]. clock_offset: host minus board clock [s], clock_drift: its slope [1]. gap_max:

@@ -84,7 +84,7 @@ class Link:
     @property
     def statistics(self) -> LinkStatistics:
         """Health so far."""
-        return self._tally.snapshot(self.transport.overlong)
+        return self._tally.snapshot(self.transport.overlong, clocks=self.lock_step is None)
 
     def now(self) -> float:
         """Monotonic time of the host [s]; in lock-step the device's."""
@@ -245,8 +245,6 @@ class Link:
             case Status():
                 self._tally.other += 1
                 self._tally.last_status = event.text
-            case _:
-                self._tally.other += 1
         return event
 
     def take_all(self, messages: list[tuple[Reading, float]]) -> None:

@@ -142,10 +142,10 @@ class Tally:
             self._latency.append(t - sent)
             self._clocks.answer(sent, t, t_board)
 
-    def snapshot(self, overlong: int) -> LinkStatistics:
-        """All of it, as of now."""
-        latency = np.array(self._latency)
-        offset, drift = self._clocks.fit()
+    def snapshot(self, overlong: int, *, clocks: bool = True) -> LinkStatistics:
+        """All of it, as of now. clocks: False where the board's time is not that of the wall (lock-step)."""
+        latency = np.array(self._latency if clocks else [])
+        offset, drift = self._clocks.fit() if clocks else (None, None)
         numbers = self.numbers
         return LinkStatistics(
             received=self.received, sent=self.sent, lost=numbers.lost if numbers else None,

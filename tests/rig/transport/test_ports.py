@@ -73,8 +73,8 @@ def test_a_pty_sees_its_host_come_speak_and_go(pty: PtyTransport) -> None:
     """Opened, bytes both ways, closed, and the same again with another host, who reads nothing of the first."""
     for _ in range(2):
         fd = opened(pty.address)
-        os.write(fd, b"hello\n")
         wait(pty, "opened")
+        os.write(fd, b"hello\n")
         assert wait(pty, "bytes").data == b"hello\n"
         pty.send(b"good day\n", 0)
         os.set_blocking(fd, True)

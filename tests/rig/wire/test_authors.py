@@ -136,4 +136,4 @@ def test_only_six_motors_speak_the_authors_protocols() -> None:
     with pytest.raises(UsageError, match="checked, boards, legacy"):
         device_codec("can", known(), Machine(), boards=3)
     assert all(device_codec(name, known(), Machine(), boards=3) for name in PROTOCOLS)
-    assert MOTORS == len(known().motors)
+    assert len(known().motors) == MOTORS

@@ -1,0 +1,26 @@
+"""What `rig` prints with `--json`: once, as soon as hosts can connect."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from schemas.base import Frozen
+
+
+class RigResult(Frozen):
+    """Where the rig can be reached."""
+
+    schema_: Literal["r2s2r.rig/1"] = Field(default="r2s2r.rig/1", alias="schema")
+    device: str
+    """Device or URL to give to `record` and `doctor`."""
+    protocol: str
+    robot: str
+    boards: int
+    lock_step: bool
+    """Time goes on with the ticks that the host asks for, and with nothing else."""
+    camera: str | None = None
+    """URL of the camera; None: there is none."""
+    pid: int
+    """Of this process, for whoever ends it."""

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 
 from r2s2r_cli.rig.effects.base import EffectSection, Law, Scene
+from r2s2r_cli.rig.model.options import Options
 from r2s2r_cli.rig.section import Index, Positive, Vector3
 
 
@@ -15,6 +18,10 @@ class ComOffset(EffectSection):
     rod: Index
     by_m: Vector3
     """In the rod's frame R [m]."""
+
+    def options(self, options: Options) -> Options:
+        """Masses can be changed."""
+        return replace(options, movable_mass=True)
 
     def law(self, scene: Scene) -> Law:
         """The inertial frame of the MuJoCo body moved, its moments as they are."""
@@ -31,6 +38,10 @@ class Payload(EffectSection):
     mass_kg: Positive = 0.03
     at_m: Vector3 = (0.0, 0.0, 0.0)
     """In the rod's frame R [m]."""
+
+    def options(self, options: Options) -> Options:
+        """Masses can be changed."""
+        return replace(options, movable_mass=True)
 
     def law(self, scene: Scene) -> Law:
         """A point mass joined to the MuJoCo body: mass, centre and inertia of the sum."""

@@ -116,15 +116,17 @@ def _world(robot: Robot, options: Options, pose: Pose) -> Iterator[str]:
         f'quat="{_n(*wxyz(quaternion(R_WG)))}"/>'
     )
     for i, rod in enumerate(robot.rods):
-        yield from _rod(robot, rod, i, pose)
+        yield from _rod(robot, rod, i, pose, options)
     yield "  </worldbody>"
 
 
-def _rod(robot: Robot, rod: Rod, i: int, pose: Pose) -> Iterator[str]:
+def _rod(robot: Robot, rod: Rod, i: int, pose: Pose, options: Options) -> Iterator[str]:
     body, half, color = body_of(rod), rod.length_m / 2, _COLORS[i % len(_COLORS)]
     yield ""
     yield f"    <!-- rod {i}, end caps {2 * i} and {2 * i + 1} -->"
-    yield (f'    <body name={quoteattr("rod_" + rod.name)} pos="{_n(*pose.p_WR[i])}" quat="{_n(*wxyz(pose.q_WR[i]))}">')
+    kind = ' simple="false"' if options.movable_mass else ""
+    place = f'pos="{_n(*pose.p_WR[i])}" quat="{_n(*wxyz(pose.q_WR[i]))}"'
+    yield f'    <body name={quoteattr("rod_" + rod.name)} {place}{kind}>'
     yield "      <freejoint/>"
     yield f'      <inertial mass="{_n(body.mass)}" pos="{_n(*body.p_RB)}" diaginertia="{_n(*body.inertia)}"/>'
     yield (

@@ -35,6 +35,9 @@ class Options:
     """Rods collide: shafts as capsules, caps as spheres."""
     rod_friction: float = 0.3
     """Coulomb coefficient between rods."""
+    movable_mass: bool = False
+    """Bodies compiled so that masses may be changed afterwards; MuJoCo else leaves out what a body with its centre of
+    mass in its origin does not need."""
     cone: Cone = "elliptic"
     integrator: Integrator = "Euler"
     """`implicitfast` leaves out of its implicit damping what couples two free bodies: cables then brake their rods

@@ -31,7 +31,7 @@ class Start(Section):
     """Of the rest pose's origin on the floor [m], frame W."""
     heading_rad: Real = 0.0
     """Turn about the vertical [rad]."""
-    settle_s: NonNegative = 2.0
+    settle_s: NonNegative = 3.0
     """How long it comes to rest before the rig's time 0 [s]."""
 
 

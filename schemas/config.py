@@ -35,8 +35,6 @@ class RecordSettings(Frozen):
 
     rest_s: Annotated[float, Field(strict=True, ge=0, le=600)] = 2.0
     """How long the robot is held in its rest shape (all cables long), before and after every run [s]."""
-    stale_s: Annotated[float, Field(strict=True, gt=0, le=10)] = 0.2
-    """A sensor that was not heard for longer than this [s] stops the robot."""
     time_limit_s: Annotated[float, Field(strict=True, gt=0, le=86400)] = 3600.0
     """Longest run [s]; beyond it the robot is stopped."""
     color: Literal["jpeg", "png"] = "jpeg"

@@ -35,6 +35,7 @@ ROBOT_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
                "rest_caps_m": ()},
     "calibrate": {"name": (), "rods": ("name", "length_m", "cap_radius_m"), "sensors": ("cable",),
                   "cables": ("caps", "kind", "rest_length_m"), "pid": (), "limits": ()},
+    "record": {"name": (), "motors": (), "pid": (), "limits": (), "sensors": ("cable", "slope_f_per_m", "offset_f")},
     "estimate": {"name": (), "rods": ("length_m", "cap_radius_m"), "cables": ("caps", "kind"),
                  "sensors": ("cable", "slope_f_per_m", "offset_f")},
     "simulate": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),
@@ -43,6 +44,10 @@ ROBOT_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
                  "sensors": ("cable", "stiffness_n_per_m", "rest_length_m"), "rest_caps_m": ()},
 }  # fmt: skip
 """Which part of robot.toml each stage uses; a change elsewhere does not make its results stale."""
+
+
+MEASURED = ("record",)
+"""Stages whose artifacts are measurements."""
 
 
 def robot_part(stage: str, robot: Robot) -> dict[str, Any]:
@@ -65,7 +70,12 @@ def wanted(
 
 
 def wanted_again(project: Project, iteration: Iteration | None, made: Provenance) -> Wanted:
-    """What the stage that made an artifact would use now, with the same overrides and flags."""
+    """What the stage that made an artifact would use now, with the same overrides and flags.
+
+    A measurement does not go stale: what a robot did stays what it did, whatever the settings have become.
+    """
+    if made.stage in MEASURED:
+        return Wanted(made.stage_version, made.settings, made.robot)
     return wanted(project, iteration, made.stage, made.overrides, made.settings.get("flags", {}))
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 
+from r2s2r_cli.devices.camera import CameraFeed, Frame
 from r2s2r_cli.errors import HardwareError
 from r2s2r_cli.stages.record.writer import Writer
 from schemas.config import RecordSettings
@@ -17,37 +18,6 @@ from schemas.config import RecordSettings
 _IDLE_S = 0.004
 """Between two looks for a frame: an eighth of the time between frames."""
 _PNG_LEVEL = 1
-
-
-class Frame(Protocol):
-    """One picture with its depth, as every camera gives it (`hardware.camera.base.Frame`)."""
-
-    @property
-    def color(self) -> np.ndarray:
-        """RGB uint8 (v, u, 3)."""
-
-    @property
-    def depth(self) -> np.ndarray:
-        """Counts uint16 (v, u), 0 unknown; of the same pixels."""
-
-    @property
-    def t_device(self) -> float:
-        """Clock of the camera [s], of unknown origin."""
-
-    @property
-    def t_host(self) -> float:
-        """`time.monotonic` of the host when it had come [s]."""
-
-    @property
-    def number(self) -> int:
-        """Counted by the camera; a gap is a lost frame."""
-
-
-class Feed(Protocol):
-    """Frames that a thread has read (`hardware.camera.feed.Feed`)."""
-
-    def frames(self) -> Sequence[Frame]:
-        """Those that have come since the last call. Raises HardwareError where the camera is gone."""
 
 
 class Pictures:
@@ -58,7 +28,7 @@ class Pictures:
     """
 
     def __init__(
-        self, feed: Feed, writer: Writer, stream: str, settings: RecordSettings, stamp: Callable[[Frame], float]
+        self, feed: CameraFeed, writer: Writer, stream: str, settings: RecordSettings, stamp: Callable[[Frame], float]
     ) -> None:
         self._feed, self._writer, self._stream, self._settings, self._stamp = feed, writer, stream, settings, stamp
         self._ended = threading.Event()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence as Items
 from dataclasses import dataclass
+from statistics import fmean
 
 import numpy as np
 
@@ -51,15 +52,21 @@ def plans(policies: Items[PolicyFile], *, repeats: int, rest: float) -> tuple[Ru
 
 
 def with_rest(sequence: Sequence, *, rest: float, timeout: float) -> Sequence:
-    """The same with the rest shape (all cables long) before and after, each held for `rest` [s]; 0: without."""
+    """The same with the rest shape (all cables long) before and after, each held for `rest` [s]; 0: without.
+
+    Where the sequence itself begins or ends in the rest shape, that target is held for so much longer.
+    """
     if rest <= 0:
         return sequence
-    long = np.ones((1, sequence.target.shape[1]))
-    return Sequence(
-        np.concatenate([long, sequence.target, long]),
-        np.concatenate([[rest], sequence.hold, [rest]]),
-        np.concatenate([[timeout], sequence.timeout, [timeout]]),
-    )
+    target, hold, limit = sequence.target, sequence.hold.copy(), sequence.timeout
+    for end in (0, -1):
+        if (target[end] == 1).all():
+            hold[end] += rest
+            continue
+        place = 0 if end == 0 else len(target)
+        target = np.insert(target, place, 1.0, axis=0)
+        hold, limit = np.insert(hold, place, rest), np.insert(limit, place, timeout)
+    return Sequence(target, hold, limit)
 
 
 def run_attributes(plan: RunPlan, robot: Robot, *, origin: str, source: str, lock_step: bool) -> dict[str, Scalar]:
@@ -69,7 +76,7 @@ def run_attributes(plan: RunPlan, robot: Robot, *, origin: str, source: str, loc
         "origin": origin, "nature": "simulated" if origin == "rig" else "measured", "source": source,
         "robot": robot.name, "pid_min_length": pid.min_length_m, "pid_range": pid.range_m,
         "pid_tolerance": pid.tolerance, "pid_p": pid.p, "pid_i": pid.i, "pid_d": pid.d,
-        "motor_speed": float(np.mean([motor.speed for motor in robot.motors])),
-        "winch_radius": float(np.mean([motor.winch_radius_m for motor in robot.motors])),
+        "motor_speed": fmean(motor.speed for motor in robot.motors),
+        "winch_radius": fmean(motor.winch_radius_m for motor in robot.motors),
         "clock": "board" if lock_step else "host", "repeat": plan.repeat, "rest": plan.rest,
     }  # fmt: skip

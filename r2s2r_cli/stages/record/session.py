@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from r2s2r_cli.devices.camera import CameraFeed, Frame
 from r2s2r_cli.devices.link import RobotLink
 from r2s2r_cli.errors import R2S2RError
-from r2s2r_cli.stages.record.camera import Feed, Frame, Pictures
+from r2s2r_cli.stages.record.camera import Pictures
 from r2s2r_cli.stages.record.plan import RunPlan
 from r2s2r_cli.stages.record.run import RunLoop, Watch
 from r2s2r_cli.stages.record.writer import Sink, Writer
@@ -28,14 +29,15 @@ _SILENT = 0.02
 class Session:
     """The runs to record, and what became of them: of every run that was begun there is a report, whatever ended it.
 
-    started: wall clock of each run that was begun [unix s].
+    begin: called before every run. started: wall clock of each run that was begun [unix s].
     """
 
     plans: Sequence[RunPlan]
     robot: Robot
     link: RobotLink
     settings: RecordSettings
-    feed: Feed | None = None
+    feed: CameraFeed | None = None
+    begin: Callable[[], None] = lambda: None
     wall_clock: Callable[[], float] = lambda: float("nan")
     watch: Watch = lambda now: None
     runs: list[RecordRun] = field(default_factory=list)
@@ -62,6 +64,7 @@ class Session:
         )  # fmt: skip
 
     def _one(self, plan: RunPlan, writer: Writer) -> None:
+        self.begin()
         loop = RunLoop(plan, self.robot, self.link, writer, self.watch)
         self.started[plan.name] = self.wall_clock()
         pictures = None

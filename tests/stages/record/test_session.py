@@ -51,7 +51,7 @@ def test_targets_are_reached_and_the_rest_shape_frames_them() -> None:
 
 
 def test_the_lengths_written_are_those_of_the_robot() -> None:
-    """Through the line of its sensor, every capacitance is the length that the cable had; the sensor table says which."""
+    """Through the line of its sensor every capacitance is the length of the cable that the sensor table names."""
     robot = calibrated()
     link = FakeLink(robot)
     seen: list[np.ndarray] = []

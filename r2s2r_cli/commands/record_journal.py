@@ -1,0 +1,99 @@
+"""The journal of a recording, from the layout that the stage asks for; and its sealing, whatever ended it."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from r2s2r_cli.errors import UsageError
+from r2s2r_cli.store.project import Iteration, Project, journal_of
+from schemas.versions import KINDS
+
+if TYPE_CHECKING:
+    from r2s2r_cli.stages.record import StreamLayout
+    from r2s2r_cli.store.journal import Journal, JournalHead
+    from r2s2r_cli.store.seal import Sealed
+    from schemas.results_record import RecordReport
+
+STAGE = "record"
+
+
+@dataclass
+class Recording:
+    """Where a recording goes, and when it began. overrides, flags: of the command line."""
+
+    project: Project
+    iteration: Iteration
+    overrides: Mapping[str, Any]
+    flags: Mapping[str, Any]
+    seed: int | None
+    started: datetime = field(default_factory=lambda: datetime.now(UTC))
+    clock: float = field(default_factory=time.monotonic)
+
+    @property
+    def target(self) -> Path:
+        """The artifact."""
+        return self.iteration.artifact("recording")
+
+    def require_room(self, *, force: bool) -> None:
+        """Raises UsageError where a recording is there: raw runs cannot be made again. force: it keeps another name."""
+        journal = journal_of(self.target)
+        if journal.exists():
+            raise UsageError(
+                "a recording that was cut off is in the way, or is running", where=self.project.relative(journal),
+                expected="no journal", received="one", hint=f"r2s2r recover '{journal}'",
+            )  # fmt: skip
+        if self.target.exists() and not force:
+            newest = self.project.iterations()[-1].number
+            raise UsageError(
+                "this iteration has a recording already, and what a robot did cannot be made again",
+                where=self.project.relative(self.target), expected="none", received="one",
+                hint=f"r2s2r record ... --iteration {newest + 1}   # or --force: the old one is kept as .replaced",
+            )  # fmt: skip
+
+    def put_aside(self) -> Path | None:
+        """The recording that is there gets another name (--force); None where there is none."""
+        from r2s2r_cli.store.atomic import keep_beside
+
+        if not self.target.exists():
+            return None
+        kept = keep_beside(self.target, ".replaced")
+        self.target.unlink()
+        return kept
+
+    def open(self, streams: Sequence[StreamLayout], groups: Mapping[str, Mapping[str, Any]]) -> Journal:
+        """The journal, ready for rows. Raises ArtifactError on a full disk."""
+        from r2s2r_cli.store.journal import Journal
+
+        return Journal(journal_of(self.target), self._head(streams, groups))
+
+    def seal(self, report: RecordReport, started: Mapping[str, float], drawings: Sequence[str]) -> Sealed:
+        """The artifact of the closed journal. started: wall clock of each run [unix s]. Raises ArtifactError."""
+        from r2s2r_cli.store.seal import Late, seal
+
+        late = Late(
+            wall_s=time.monotonic() - self.clock, report=report.model_dump(mode="json"), drawings=tuple(drawings),
+            attributes={f"runs/{run}": {"start_unix": start} for run, start in started.items()},
+        )  # fmt: skip
+        return seal(journal_of(self.target), self.target, late=late)
+
+    def _head(self, streams: Sequence[StreamLayout], groups: Mapping[str, Mapping[str, Any]]) -> JournalHead:
+        from r2s2r_cli.commands.stage import wanted
+        from r2s2r_cli.store.journal import Field, JournalHead, Stream
+        from r2s2r_cli.store.provenance import build_provenance
+
+        use = wanted(self.project, self.iteration, STAGE, dict(self.overrides), self.flags)
+        provenance = build_provenance(
+            stage=STAGE, stage_version=use.stage_version, argv=sys.argv, settings=use.settings,
+            overrides=self.overrides, robot=use.robot, inputs=(), started=self.started, wall_s=0.0, seed=self.seed,
+        )  # fmt: skip
+        made = tuple(
+            Stream(s.path, tuple(Field(name, dtype, shape) for name, dtype, shape in s.fields), s.attributes, s.name)
+            for s in streams
+        )
+        return JournalHead("recording", KINDS["recording"].version, made, groups, provenance.model_dump(mode="json"))

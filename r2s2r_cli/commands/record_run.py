@@ -1,0 +1,219 @@
+"""A recording from the open port to the sealed artifact; what ends it early is raised once all is safe."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from r2s2r_cli.commands.record_journal import Recording
+from r2s2r_cli.commands.record_live import Live, shown, stop_key
+from r2s2r_cli.console import Console
+from r2s2r_cli.errors import HardwareError, Interrupted, R2S2RError
+
+if TYPE_CHECKING:
+    from r2s2r_cli.devices.camera import CameraFeed
+    from r2s2r_cli.devices.link import LinkFacts
+    from r2s2r_cli.hardware.guard import GuardedLink
+    from r2s2r_cli.stages.record import CameraFacts, RunPlan, Session
+    from r2s2r_cli.store.project import Iteration, Project
+    from schemas.config import RecordSettings
+    from schemas.results import StageResult
+    from schemas.results_record import RecordReport
+    from schemas.robot import Robot
+
+LOOK_S = 1.0
+"""How long --dry-run looks at the sensors."""
+_RIG = "rig"
+
+
+@dataclass(frozen=True)
+class Wish:
+    """One command line of `record`, read and checked."""
+
+    project: Project
+    iteration: Iteration
+    robot: Robot
+    runs: Sequence[RunPlan]
+    settings: RecordSettings
+    port: str
+    protocol: str
+    camera: str | None
+    simulated: bool
+    overrides: Mapping[str, Any]
+    flags: Mapping[str, Any]
+    seed: int | None
+    draw: bool
+    force: bool
+
+
+def carry_out(wish: Wish, console: Console) -> None:
+    """Record, seal, draw, report. Raises HardwareError or Interrupted after what there is was sealed."""
+    from r2s2r_cli.hardware.signals import interrupting_signals
+    from r2s2r_cli.stages.record import Session
+    from r2s2r_cli.store.lock import writing
+
+    recording = Recording(wish.project, wish.iteration, wish.overrides, wish.flags, wish.seed)
+    recording.require_room(force=wish.force)
+    with writing(wish.project.root, "record"):
+        ended: BaseException | None = None
+        session: Session | None = None
+        try:
+            with ExitStack() as stack:
+                stack.enter_context(interrupting_signals())
+                feed, facts = _camera(wish.camera, stack)
+                link = stack.enter_context(_guarded(wish, dry_run=False))
+                live = Live([len(plan.policy.steps) * plan.policy.repeat + 2 for plan in wish.runs])
+                session = Session(
+                    wish.runs, wish.robot, link, wish.settings, feed=feed, wall_clock=time.time, watch=live.watch,
+                    begin=lambda: link.restart(time_limit=wish.settings.time_limit_s),
+                )  # fmt: skip
+                _remarks(link.facts, console)
+                kept = recording.put_aside()
+                if kept is not None:
+                    console.say(f"the recording that was there is kept as {kept.name}")
+                stack.enter_context(stop_key(link.emergency_stop))
+                stack.enter_context(shown(live, console))
+                with recording.open(_streams(wish, link.facts, facts), _groups(wish, link.facts)) as journal:
+                    session.record(journal.append)
+        except (R2S2RError, KeyboardInterrupt) as error:
+            if session is None:
+                raise
+            ended = error
+        assert session is not None  # noqa: S101 - an error without a session was raised above
+        result = _seal(wish, recording, session, console)
+    _finish(wish, session.report(), result, ended, console)
+
+
+def look(wish: Wish, console: Console) -> None:
+    """--dry-run: the plan, and with a port what the sensors say; no motor moves, nothing is written."""
+    from r2s2r_cli.views.record_page import look_tables, plan_table
+    from schemas.results import StageResult
+
+    recording = Recording(wish.project, wish.iteration, wish.overrides, wish.flags, wish.seed)
+    recording.require_room(force=wish.force)
+    tables = [plan_table(wish.runs, wish.robot)]
+    if wish.port:
+        with _guarded(wish, dry_run=True) as link:
+            end, sample = time.monotonic() + LOOK_S, None
+            while time.monotonic() < end:
+                sample = link.read(0.05) or sample
+            _remarks(link.facts, console)
+            tables += look_tables(link.facts, link.statistics, sample, wish.robot)
+    for table in tables:
+        console.table(table.title, table.columns, table.rows)
+    console.document(
+        StageResult(
+            stage="record", state="dry_run", artifact=wish.project.relative(recording.target), content_sha256=None,
+            reasons=("it was asked for",), inputs=(),
+        )
+    )  # fmt: skip
+    console.say(f"would write {wish.project.relative(recording.target)}; nothing moved")
+
+
+def _guarded(wish: Wish, *, dry_run: bool) -> GuardedLink:
+    from r2s2r_cli.hardware.guard import GuardedLink
+    from r2s2r_cli.hardware.open_link import open_link
+
+    return GuardedLink(open_link(wish.port, wish.robot, protocol=wish.protocol), wish.robot, dry_run=dry_run)
+
+
+def _camera(spec: str | None, stack: ExitStack) -> tuple[CameraFeed | None, CameraFacts | None]:
+    """The camera, open and read by a thread of its own until the stack ends. Raises CameraError, UsageError."""
+    if spec is None:
+        return None, None
+    from r2s2r_cli.hardware.camera.choose import open_camera
+    from r2s2r_cli.hardware.camera.feed import Feed
+    from r2s2r_cli.stages.record import CameraFacts
+
+    camera = stack.enter_context(open_camera(spec))
+    names = ("width", "height", "fx", "fy", "cx", "cy")
+    intrinsics = {name: getattr(camera.intrinsics, name) for name in names}
+    return stack.enter_context(Feed(camera)), CameraFacts(intrinsics, camera.depth_scale)
+
+
+def _streams(wish: Wish, link: LinkFacts, camera: CameraFacts | None) -> list[Any]:
+    from r2s2r_cli.stages.record import run_layout
+
+    return [stream for plan in wish.runs for stream in run_layout(plan, wish.robot, link, camera)]
+
+
+def _groups(wish: Wish, link: LinkFacts) -> dict[str, Mapping[str, Any]]:
+    from r2s2r_cli.stages.record import run_attributes
+
+    rig = wish.simulated or link.lock_step or _RIG in link.device.lower() or (wish.camera or "").startswith("rig:")
+    source = f"{wish.robot.name} at {link.port}, protocol {link.protocol}"
+    return {
+        f"runs/{plan.name}": run_attributes(
+            plan, wish.robot, origin=_RIG if rig else "robot", source=source, lock_step=link.lock_step
+        )
+        for plan in wish.runs
+    }
+
+
+def _remarks(facts: LinkFacts, console: Console) -> None:
+    for text in facts.remarks:
+        console.warn(text)
+    console.say(f"{facts.robot or 'robot'} at {facts.port}, protocol {facts.protocol}; space is the emergency stop")
+
+
+def _seal(wish: Wish, recording: Recording, session: Session, console: Console) -> StageResult | None:
+    """The artifact of what was recorded; None where nothing was, or where the disk refuses it (the journal stays)."""
+    from r2s2r_cli.commands.record_run_pictures import draw_recorded, drawing_names
+    from schemas.results import StageResult
+
+    report = session.report()
+    names = drawing_names(recording.target, report) if wish.draw else []
+    try:
+        with _not_interrupted():
+            sealed = recording.seal(report, session.started, names)
+    except R2S2RError as error:
+        console.warn(f"what was recorded is not sealed yet: {error.what} ({error.where})")
+        console.hint(f"r2s2r recover '{recording.target}.journal'   # once: {error.hint}")
+        return None
+    if sealed.header is None:
+        return None
+    drawings = draw_recorded(wish.project, recording.target, report) if wish.draw else []
+    return StageResult(
+        stage="record", state="done", artifact=wish.project.relative(recording.target), reasons=(), inputs=(),
+        content_sha256=sealed.header.content_sha256, drawings=tuple(drawings), report=report.model_dump(mode="json"),
+    )  # fmt: skip
+
+
+@contextmanager
+def _not_interrupted() -> Iterator[None]:
+    """An impatient second Ctrl-C while sealing: the journal stays whole either way, and is said where."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        raise Interrupted("the recording is not sealed yet, all of it is in its journal",
+                          hint="r2s2r recover") from error  # fmt: skip
+
+
+def _finish(
+    wish: Wish, report: RecordReport, result: StageResult | None, ended: BaseException | None, console: Console
+) -> None:
+    """Say what there is; then raise what ended the recording early."""
+    from r2s2r_cli.commands.stage import show_outcome
+    from r2s2r_cli.views.record_page import report_tables
+
+    if ended is None and result is not None:
+        show_outcome(result, console)
+    elif result is not None:
+        console.say(f"sealed what there is: {result.artifact}")
+    if report.runs:
+        for table in report_tables(report):
+            console.table(table.title, table.columns, table.rows)
+    for run in report.runs:
+        for text in run.warnings:
+            console.warn(f"{run.run}: {text}")
+    if ended is None:
+        return
+    if isinstance(ended, KeyboardInterrupt):
+        kept = "what was recorded is sealed" if result is not None else "nothing was recorded"
+        raise Interrupted(f"the motors were told to stop; {kept}", hint="r2s2r status") from ended
+    if isinstance(ended, HardwareError) and result is not None:
+        ended.hint = f"{ended.hint}   # what came before is in {result.artifact}"
+    raise ended

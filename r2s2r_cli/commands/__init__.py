@@ -20,6 +20,7 @@ from r2s2r_cli.commands.init import init
 from r2s2r_cli.commands.inspect import inspect
 from r2s2r_cli.commands.migrate import migrate
 from r2s2r_cli.commands.recover import recover
+from r2s2r_cli.commands.rig import rig
 from r2s2r_cli.commands.simulate import simulate
 from r2s2r_cli.commands.status import status
 from r2s2r_cli.commands.validate import validate
@@ -31,6 +32,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "estimate": estimate,
     "identify": identify,
     "simulate": simulate,
+    "rig": rig,
     "status": status,
     "inspect": inspect,
     "validate": validate,

@@ -88,7 +88,7 @@ class _InOrder:
 
     def __init__(self, blobs: Value | None) -> None:
         self._blobs = blobs if isinstance(blobs, Blobs) else Blobs((), 0)
-        self._start()
+        self._rest, self._held, self._image = iter(self._blobs.items), -1, b""
 
     def all(self) -> Iterator[bytes]:
         return iter(self._blobs.items)
@@ -98,13 +98,10 @@ class _InOrder:
         if not 0 <= number < self._blobs.count:
             return None
         if number < self._held:
-            self._start()
+            self._rest, self._held = self.all(), -1
         while self._held < number:
             self._image, self._held = next(self._rest), self._held + 1
         return self._image
-
-    def _start(self) -> None:
-        self._rest, self._held, self._image = self.all(), -1, b""
 
 
 def _dataset(group: Group | None, name: str) -> object:

@@ -73,8 +73,8 @@ class DepthSensor:
             columns = np.clip(np.arange(shape[1])[None, :] + side[1], 0, shape[1] - 1)
             inverse = inverse[rows, columns]
         front, back = _extremes(inverse)
-        # 1/back - 1/front > EDGE_M, without the division
-        edge = (front - back) > EDGE_M * front * np.maximum(back, 1e-3)
+        # 1/far - 1/near > EDGE_M for a pixel and one of its neighbours, without the division
+        edge = (front - inverse > EDGE_M * front * inverse) | (inverse - back > EDGE_M * inverse * back)
         draw = rng.random((2, *shape), dtype=np.float32)
         holes = edge & (draw[0] < noise.edge_hole_share)
         flying = edge & (draw[0] >= 1 - noise.flying_share) & (back > 0)

@@ -41,9 +41,9 @@ def wire_speeds(duty: np.ndarray) -> np.ndarray:
 def rig_line(line: bytes) -> Event | None:
     """What only a rig in lock-step says; None: something else."""
     if match := _ANNOUNCED.fullmatch(line):
-        return LockStep(period=int(match[1]) * 1e-6)
+        return LockStep(period=int(match[1]) / 1e6)
     if match := _TICK.fullmatch(line):
-        return TickDone(k=int(match[1]), t=int(match[2]) * 1e-6)
+        return TickDone(k=int(match[1]), t=int(match[2]) / 1e6)
     return None
 
 

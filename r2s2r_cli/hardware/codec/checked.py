@@ -74,19 +74,19 @@ class CheckedCodec:
                 return self._reading(seq, fields)
             case "K":
                 of, code, us = (_count(field) for field in _some(fields, 3))
-                return Ack(seq=seq, of=of, code=code, t_board=us * 1e-6)
+                return Ack(seq=seq, of=of, code=code, t_board=us / 1e6)
             case "B":
                 us, now, bad, missed = (_count(field) for field in _some(fields, 4))
-                return Beat(seq=seq, t_board=us * 1e-6, state=DeviceState(now), bad=bad, missed=missed)
+                return Beat(seq=seq, t_board=us / 1e6, state=DeviceState(now), bad=bad, missed=missed)
             case "T":
                 k, us = (_count(field) for field in _some(fields, 2))
-                return TickDone(seq=seq, k=k, t=us * 1e-6)
+                return TickDone(seq=seq, k=k, t=us / 1e6)
             case "H":
                 version, robot, firmware, boards, motors, sensors, watchdog, state, lock = _some(fields, 9)
                 return Greeting(
                     seq=seq, version=_count(version), robot=_name(robot), firmware=_name(firmware),
                     boards=_count(boards), motors=_count(motors), sensors=_count(sensors),
-                    watchdog=_count(watchdog) * 1e-3, state=DeviceState(_count(state)), lock_step=_count(lock) * 1e-6,
+                    watchdog=_count(watchdog) / 1e3, state=DeviceState(_count(state)), lock_step=_count(lock) / 1e6,
                 )  # fmt: skip
         return Passed(seq=seq)
 
@@ -96,8 +96,8 @@ class CheckedCodec:
         values = np.array([_number(field) for field in rest])
         capacitance, encoder, a_B, w_WB = np.split(values, [sensors, sensors + motors, sensors + motors + 3])
         return Reading(
-            seq=seq, board=_count(board), t_board=_count(t) * 1e-6, state=DeviceState(_count(state)),
-            voltage=_count(battery) * 1e-3 if battery else None, capacitance=capacitance * PICO, encoder=encoder,
+            seq=seq, board=_count(board), t_board=_count(t) / 1e6, state=DeviceState(_count(state)),
+            voltage=_count(battery) / 1e3 if battery else None, capacitance=capacitance * PICO, encoder=encoder,
             a_B=None if np.isnan(a_B).all() else a_B, w_WB=None if np.isnan(w_WB).all() else w_WB,
         )  # fmt: skip
 

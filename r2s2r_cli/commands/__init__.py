@@ -11,7 +11,7 @@ import typer
 
 from r2s2r_cli.commands.bench import bench_app
 from r2s2r_cli.commands.calibrate import calibrate
-from r2s2r_cli.commands.doctor import doctor
+from r2s2r_cli.commands.doctor import doctor_app
 from r2s2r_cli.commands.estimate import estimate
 from r2s2r_cli.commands.export import export
 from r2s2r_cli.commands.identify import identify
@@ -38,12 +38,12 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "validate": validate,
     "migrate": migrate,
     "recover": recover,
-    "doctor": doctor,
     "export": export,
 }
 """Subcommands in the order of the data, then of use."""
 
 GROUPS: dict[str, typer.Typer] = {
+    "doctor": doctor_app,
     "bench": bench_app,
 }
 """Subcommands that have subcommands."""

@@ -30,7 +30,12 @@ IMPORT_LIMIT_S = 60
 MIN_FREE_BYTES = 1 << 30
 
 
+doctor_app = typer.Typer(invoke_without_command=True)
+
+
+@doctor_app.callback(invoke_without_command=True)
 def doctor(
+    context: typer.Context,
     quick: Annotated[bool, typer.Option("--quick", help="Versions and paths only; import no library.")] = False,
     project: ProjectOption = None,
     json: JsonOption = False,
@@ -40,6 +45,8 @@ def doctor(
 
     Example: r2s2r doctor
     """
+    if context.invoked_subcommand is not None:
+        return
     console = Console(json=json, quiet=quiet)
     probes = [*_installation(), *_place(project)]
     if not quick:

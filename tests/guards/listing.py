@@ -36,7 +36,8 @@ def name(path: Path) -> str:
 
 @functools.cache
 def commands() -> dict[str, Any]:
-    """Registered commands as the command line sees them, by name; those of a group as `group command`."""
+    """Registered commands as the command line sees them, by name; those of a group as `group command`, and the group
+    itself where it does something without one."""
     import typer.main
 
     from r2s2r_cli.app import app
@@ -44,7 +45,9 @@ def commands() -> dict[str, Any]:
     found: dict[str, Any] = {}
     for top, command in typer.main.get_group(app).commands.items():
         below = getattr(command, "commands", None)
-        found |= {top: command} if below is None else {f"{top} {sub}": inner for sub, inner in below.items()}
+        if below is None or command.invoke_without_command:
+            found[top] = command
+        found |= {f"{top} {sub}": inner for sub, inner in (below or {}).items()}
     return found
 
 

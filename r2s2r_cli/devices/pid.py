@@ -99,8 +99,8 @@ class WireSteps:
         there = bool(done.all())
         self.held += there
         # A cable that is done stays done: once all are, the time-out has nothing to give up.
-        timed_out = not there and self.elapsed >= self.timeout[self.index]
-        changed = timed_out or (there and self.held > self.hold[self.index])
+        timed_out = not there and self.elapsed >= int(self.timeout[self.index])
+        changed = timed_out or (there and self.held > int(self.hold[self.index]))
         if changed:
             self.index, self.elapsed, self.held = self.index + 1, 0, 0
         return changed, timed_out

@@ -89,3 +89,5 @@ class Client:
             with self._changed:
                 self._open = False
                 self._changed.notify_all()
+        finally:
+            self._connection.close()

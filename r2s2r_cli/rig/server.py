@@ -72,7 +72,7 @@ class Server:
             time.sleep(clock.tick)
             self._pass(clock)
             return
-        for arrival in self._port.poll(_ANNOUNCE_S / 2, clock.t):
+        for arrival in self._in_order(clock.t):
             if arrival.kind == "opened":
                 clock.contact()
                 self._announced = -np.inf
@@ -82,7 +82,18 @@ class Server:
         now = time.monotonic()
         if self._port.transport.connected and not clock.started and now - self._announced >= _ANNOUNCE_S:
             self._announced = now
-            self._port.send(self._codec.announce(clock.us, clock.t), clock.t)
+            lines = self._codec.announce(clock.us, clock.t, first=not self._port.transport.stream)
+            self._port.send(lines, clock.t)
+
+    def _in_order(self, t: float) -> list[Arrival]:
+        """What came, ticks after the commands that were sent before them."""
+        arrivals = self._port.poll(_ANNOUNCE_S / 2, t)
+        ticks = [one for one in arrivals if one.kind == "line" and self._codec.tick_of(one.line) is not None]
+        if self._port.transport.stream or not ticks:
+            return arrivals
+        # Each board has a socket: the tick at one may have been read before the commands at the others.
+        others = [one for one in arrivals if one not in ticks] + self._port.poll(0.0, t)
+        return [*others, *ticks]
 
     def _tick(self, clock: TickClock, k: int, board: int) -> None:
         advance = clock.asked(k, stream=self._port.transport.stream)

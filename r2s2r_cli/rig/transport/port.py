@@ -14,6 +14,8 @@ from r2s2r_cli.rig.wire.base import LINE_MAX, DeviceCodec, Line
 from r2s2r_cli.rig.world import World
 
 _RAW_LINE = 1 << 16
+_TAG = 0x77697265
+"""Makes the random numbers of the wire others than those of anything else with the same seed."""
 
 
 @dataclass(frozen=True)
@@ -26,14 +28,15 @@ class Arrival:
 
 
 class Port:
-    """A transport, its line buffers, and a channel of faults for each direction. lock: lock-step."""
+    """A transport, its line buffer, and channels of faults: one for each direction, over datagrams for each board too.
+
+    lock: lock-step.
+    """
 
     def __init__(self, transport: Transport, codec: DeviceCodec, world: World, *, lock: bool) -> None:
-        self.transport, self._codec = transport, codec
-        seeds = np.random.SeedSequence((world.seed, 0x77697265)).spawn(2)
-        self._down, self._up = (
-            Channel(world.wire, np.random.default_rng(seed), stream=transport.stream, still=lock) for seed in seeds
-        )
+        self.transport, self._codec, self._world, self._lock = transport, codec, world, lock
+        self._down: dict[int, Channel] = {}
+        self._up: dict[int, Channel] = {}
         self._raw, self._lines = LineBuffer(_RAW_LINE), LineBuffer()
 
     @property
@@ -46,45 +49,63 @@ class Port:
         arrivals: list[Arrival] = []
         for event in self.transport.poll(timeout):
             if event.kind != "bytes":
-                for part in (self._raw, self._lines, self._up, self._down):
-                    part.clear()
+                self.clear()
                 arrivals.append(Arrival(event.kind))
                 continue
             for line in self._raw.feed(event.data) if self.transport.stream else _datagram(event.data):
-                safe = self._codec.tick_of(line) is not None
-                if safe:
+                if self._codec.untouched(line):
                     arrivals += self.arrived(t)
                     arrivals.append(Arrival("line", line, event.board))
                 else:
-                    self._down.put(line, event.board, t)
-            arrivals += self.arrived(t)
+                    self._channel(self._down, event.board).put(line, event.board, t)
         return arrivals + self.arrived(t)
 
     def arrived(self, t: float) -> list[Arrival]:
         """What was on its way to us and has got through by now."""
         arrivals = []
-        for data, board in self._down.take(t):
-            for line in self._lines.feed(data) if self.transport.stream else _datagram(data):
-                arrivals.append(Arrival("line", line, board))
+        for channel in self._down.values():
+            for data, board in channel.take(t):
+                for line in self._lines.feed(data) if self.transport.stream else _datagram(data):
+                    arrivals.append(Arrival("line", line, board))
         return arrivals
 
     def send(self, lines: Iterable[Line], t: float) -> None:
         """Put lines on their way."""
         for line in lines:
+            channel = self._channel(self._up, line.board)
             data = line.data if self.transport.stream or self._codec.datagrams_end else line.data.rstrip(b"\n")
             if line.safe:
                 self.flush(t)
-                self.transport.send(self._up.whole(data), line.board)
-                self._up.sent(data)
+                self.transport.send(channel.whole(data), line.board)
+                channel.sent(data)
             else:
-                self._up.put(data, line.board, t)
+                channel.put(data, line.board, t)
         self.flush(t)
 
     def flush(self, t: float) -> None:
         """Send what is due."""
-        for data, board in self._up.take(t):
-            self._up.sent(data)
-            self.transport.send(data, board or 0)
+        for channel in self._up.values():
+            for data, board in channel.take(t):
+                channel.sent(data)
+                self.transport.send(data, board or 0)
+
+    def clear(self) -> None:
+        """Another host, or none: what was on its way is lost."""
+        for buffer in (self._raw, self._lines):
+            buffer.clear()
+        for channel in (*self._up.values(), *self._down.values()):
+            channel.clear()
+
+    def _channel(self, direction: dict[int, Channel], board: int | None) -> Channel:
+        """The channel of a board: of its own over datagrams, that of all over a stream."""
+        stream = self.transport.stream
+        key = 0 if stream or board is None else board
+        if key not in direction:
+            # Each has its own numbers, so that it does not matter which board is heard first.
+            seed = (self._world.seed, _TAG, int(direction is self._up), key)
+            rng = np.random.default_rng(seed)
+            direction[key] = Channel(self._world.wire, rng, stream=stream, still=self._lock)
+        return direction[key]
 
 
 def _datagram(data: bytes) -> list[bytes]:

@@ -85,6 +85,9 @@ class DeviceCodec(Protocol):
     def tick_of(self, line: bytes) -> int | None:
         """The tick that a line of the host asks for; None: it is another line."""
 
+    def untouched(self, line: bytes) -> bool:
+        """Whether no fault of the wire may touch this line: one without which time would stand still for ever."""
+
     def receive(self, line: bytes, board: int | None, t: float) -> Received:
         """Obey one line of the host, as it came, its newline included if it had one.
 
@@ -97,8 +100,11 @@ class DeviceCodec(Protocol):
     def sample(self, reading: BoardReading, t: float) -> list[Line]:
         """The lines that a board sends for one reading."""
 
-    def announce(self, tick_us: int, t: float) -> list[Line]:
-        """The lines that tell a host of lock-step with ticks of this length [us]."""
+    def announce(self, tick_us: int, t: float, *, first: bool) -> list[Line]:
+        """The lines that tell a host of lock-step with ticks of this length [us].
+
+        first: the device speaks first (datagrams), else it may leave it to what it will answer.
+        """
 
     def ticked(self, k: int, t: float, board: int) -> Line:
         """The answer at the end of tick k, from the board that was asked."""

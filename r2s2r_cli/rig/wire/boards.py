@@ -62,6 +62,10 @@ class BoardsCodec:
         """The tick that a line asks for."""
         return tick_asked(line)
 
+    def untouched(self, line: bytes) -> bool:
+        """A tick is."""
+        return tick_asked(line) is not None
+
     def receive(self, line: bytes, board: int | None, t: float) -> Received:
         """Leave it in the buffer of the board, or of all of them; where that is full, it is lost."""
         tick = tick_asked(line)
@@ -89,7 +93,7 @@ class BoardsCodec:
         text = " ".join([str(n), *map(_two, pF), *(str(round(_finite(x))) for x in enc), *map(_two, imu)])
         return [Line(n, text.encode() + b"\n")]
 
-    def announce(self, tick_us: int, t: float) -> list[Line]:
+    def announce(self, tick_us: int, t: float, *, first: bool) -> list[Line]:
         """A status text, which a host of a real board passes over."""
         return [Line(0, b"#lockstep %d\n" % tick_us, safe=True)]
 

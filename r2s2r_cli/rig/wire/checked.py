@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from enum import IntEnum
 
 import numpy as np
@@ -87,6 +88,11 @@ class CheckedCodec:
         """The tick that a line asks for."""
         return _tick_of(parse(line))
 
+    def untouched(self, line: bytes) -> bool:
+        """A tick is, and in lock-step the hello before it, which could not arrive late."""
+        frame = parse(line)
+        return _tick_of(frame) is not None or (self._tick_us > 0 and frame is not None and frame.type == "H")
+
     def receive(self, line: bytes, board: int | None, t: float) -> Received:
         """Obey a valid line and answer it; count an invalid one."""
         frame = parse(line)
@@ -113,6 +119,7 @@ class CheckedCodec:
         lines = [self._acknowledge(frame, code, t, at)]
         if frame.type == "H":
             lines.append(self._say_hello(t, at))
+            lines = [replace(line, safe=self._tick_us > 0) for line in lines]
         return Received(tuple(lines))
 
     def advance(self, t: float) -> list[Line]:
@@ -145,9 +152,11 @@ class CheckedCodec:
         ]  # fmt: skip
         return [self._line("S", *fields, board=reading.board)]
 
-    def announce(self, tick_us: int, t: float) -> list[Line]:
-        """The hello, which has the tick."""
-        return [self._say_hello(t, 0, safe=True)]
+    def announce(self, tick_us: int, t: float, *, first: bool) -> list[Line]:
+        """The hello, which has the tick. It is not counted, so that the bytes after it do not depend on how many of it
+        the wall's clock made: it has the number of the line before. A stream's host hears it as the answer to its own.
+        """
+        return [Line(0, build(self._seq % SEQ_COUNT, "H", self._hello_now()), safe=True)] if first else []
 
     def ticked(self, k: int, t: float, board: int) -> Line:
         """`T` at the end of a tick."""
@@ -221,9 +230,12 @@ class CheckedCodec:
     def _acknowledge(self, frame: Frame, code: Code, t: float, board: int) -> Line:
         return self._line("K", str(frame.seq), str(int(code)), self._us(t), board=board)
 
-    def _say_hello(self, t: float, board: int, *, safe: bool = False) -> Line:
+    def _say_hello(self, t: float, board: int) -> Line:
         self._hello_due = t + _HELLO_S
-        return self._line("H", *self._hello_fields, str(int(self.state)), str(self._tick_us), board=board, safe=safe)
+        return self._line("H", *self._hello_now(), board=board)
+
+    def _hello_now(self) -> tuple[str, ...]:
+        return (*self._hello_fields, str(int(self.state)), str(self._tick_us))
 
     def _line(self, kind: str, *fields: str, board: int = 0, safe: bool = False) -> Line:
         self._seq = (self._seq + 1) % SEQ_COUNT

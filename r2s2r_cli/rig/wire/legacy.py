@@ -40,6 +40,10 @@ class LegacyCodec:
         """The tick that a line asks for."""
         return tick_asked(line)
 
+    def untouched(self, line: bytes) -> bool:
+        """A tick is."""
+        return tick_asked(line) is not None
+
     def receive(self, line: bytes, board: int | None, t: float) -> Received:
         """One motor, or the stop; everything else is passed over."""
         tick = tick_asked(line)
@@ -72,7 +76,7 @@ class LegacyCodec:
             lines.append(f"q {reading.board + 1} {w:.4f} {x:.4f} {y:.4f} {z:.4f}")
         return [Line(reading.board, _PADDING + line.encode() + b"\n") for line in lines]
 
-    def announce(self, tick_us: int, t: float) -> list[Line]:
+    def announce(self, tick_us: int, t: float, *, first: bool) -> list[Line]:
         """A line that no host of the real robot knows."""
         return [Line(self._board, b"#lockstep %d\n" % tick_us, safe=True)]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -56,6 +56,17 @@ class Experiment:
     against: See | None = None
     """What stands on the other axis; None: time [s]."""
     against_unit: str = "t [s]"
+
+
+@dataclass(frozen=True)
+class Sight:
+    """One effect of the camera with its table, what it `says` of itself, and which picture, taken when [s], shows."""
+
+    id: str
+    table: Mapping[str, Any]
+    says: str
+    what: Literal["color", "depth"] = "color"
+    at_s: float = 0.0
 
 
 def trace(one: Experiment, *, on: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -166,6 +177,11 @@ def shown(k: int) -> See:
     return lambda plant: float(plant.sensed()[k] * 1e3)
 
 
+def stamp(plant: Plant) -> float:
+    """What the camera writes on a frame taken now, from its start [s]."""
+    return plant.t + plant.world.seen().clock.stamp_delay_s
+
+
 EXPERIMENTS: tuple[Experiment, ...] = (
     Experiment("motor_dead_zone", {"start": 0.2, "keep": 0.1}, "starts late, and stops later still on the way down",
                "shaft speed [rad/s]", speed,
@@ -238,5 +254,17 @@ EXPERIMENTS: tuple[Experiment, ...] = (
     Experiment("sensor_saturation", {"above_m": 0.16, "rest_m": 0.005}, "flat beyond a length",
                "shown length of cable 0 [mm]", shown(0), lambda t, off, on: on.max() < 166 and on[-1] == off[-1],
                pull(0, 3)),
+    Experiment("camera_delay", {"delay_s": 0.15}, "what is seen has happened earlier than the stamp says",
+               "height of cap 1 [mm]", cap(1, 2), lambda t, off, on: bool(np.array_equal(on, off)), to_and_fro,
+               against=stamp, against_unit="stamp of the frame [s]"),
 )  # fmt: skip
-"""All that show in the robot or its sensors; those of the camera are drawn from its pictures."""
+"""All that show in a curve."""
+
+CAMERA = (
+    Sight("camera_pose", {"turn_rad": [0.0, 0.06, 0.15], "by_m": [0.1, 0.0, 0.0]}, "knocked askew"),
+    Sight(
+        "camera_scale", {"depth_error": 0.08, "focal_error": 0.08}, "larger in the picture, and farther away", "depth"
+    ),
+    Sight("dropout", {"frames": 0.3, "pixels": 0.3}, "holes in depth, and a third of the frames missing", "depth"),
+)
+"""Effects that show in a single picture of the robot at rest."""

@@ -121,8 +121,9 @@ class TendonRelaxation(EffectSection):
     slow_share: Share = 0.15
     """The same of the slow part."""
     fast_s: Positive = 1.0
+    """Time constant of the quick part [s]."""
     slow_s: Positive = 20.0
-    """Their time constants [s]."""
+    """Of the slow part [s]."""
     winched: bool = False
     """Whether the winched cables creep as well, by the same length for the same tension."""
 

@@ -39,6 +39,7 @@ class CameraDelay(EffectSection):
     """Stamps are late: a frame shows the scene as it was earlier than its stamp says."""
 
     delay_s: Real = 0.08
+    """How much later the stamp is than the picture [s]."""
 
     def seen(self, camera: CameraSettings) -> CameraSettings:
         """Of the stamp alone; when a frame arrives stays as it is."""

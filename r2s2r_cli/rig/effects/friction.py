@@ -15,6 +15,7 @@ class Patch(Section):
     center_m: Vector2
     """[m], frame W."""
     radius_m: Positive
+    """Where it is half faded out [m]."""
     factor: NonNegative = 0.4
     """Of the coefficient in the middle."""
     edge_m: Positive = 0.02
@@ -25,6 +26,7 @@ class FrictionField(EffectSection):
     """Friction depends on the place: patches, and a gradient across the floor."""
 
     patches: tuple[Patch, ...] = ()
+    """Round places of another friction."""
     gradient_per_m: Vector2 = (0.0, 0.0)
     """Relative change of the coefficient a metre along x and y [1/m]; it stays between 0.1 and 3 times itself."""
 

@@ -16,6 +16,7 @@ class ComOffset(EffectSection):
     """The centre of mass of a rod lies elsewhere."""
 
     rod: Index
+    """Its number."""
     by_m: Vector3
     """In the rod's frame R [m]."""
 
@@ -35,7 +36,9 @@ class Payload(EffectSection):
     """Something heavy is tied to a rod."""
 
     rod: Index
+    """Its number."""
     mass_kg: Positive = 0.03
+    """[kg]"""
     at_m: Vector3 = (0.0, 0.0, 0.0)
     """In the rod's frame R [m]."""
 

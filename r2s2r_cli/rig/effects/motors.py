@@ -14,7 +14,9 @@ class MotorDeadZone(EffectSection):
     """Gears stick: a motor starts at a drive of `start` only, and once it turns it stops below `keep`."""
 
     start: Share = 0.2
+    """Drive at which a motor at rest starts."""
     keep: Share = 0.1
+    """Drive below which one that turns stops."""
 
     def law(self, scene: Scene) -> Law:
         """A switch with hysteresis a motor, where the catalogue has a plain threshold."""
@@ -34,6 +36,7 @@ class CommandLatency(EffectSection):
     """Commands arrive late: by `delay_s` and by a random time beyond, drawn anew whenever the command changes."""
 
     delay_s: NonNegative = 0.1
+    """The part that is always there [s]."""
     jitter_s: NonNegative = 0.0
     """Mean of the random part, exponential [s]."""
 
@@ -106,6 +109,7 @@ class LoadDroop(EffectSection):
     """Motors are slower against a load: a tension of `stall_n` stops one that reels in, and helps one that lets out."""
 
     stall_n: Positive = 40.0
+    """Tension of the cable at which the motor stands still, whatever its drive [N]."""
     help_share: Share = 0.3
     """How much a load speeds a motor up that lets out, against how much it slows one that reels in (a worm-like gear
     lets little through)."""

@@ -50,6 +50,7 @@ class TetherDrag(EffectSection):
     stiffness_n_per_m: NonNegative = 1.0
     """Pull towards the anchor a metre beyond `free_m` [N/m]."""
     largest_n: NonNegative = 0.5
+    """The pull towards the anchor grows no further [N]."""
     rod: Index = 0
     """Tied to the middle of this rod."""
 
@@ -78,7 +79,9 @@ class AirDrag(EffectSection):
     """The air, or something thicker."""
 
     density_kg_per_m3: NonNegative = 1.2
+    """Of the fluid [kg/m^3]."""
     viscosity_pa_s: NonNegative = 1.8e-5
+    """Of the fluid [Pa s]."""
 
     def law(self, scene: Scene) -> Law:
         """MuJoCo's fluid: quadratic and viscous drag of a box with the body's inertia, a law no catalogue has."""

@@ -77,6 +77,7 @@ class Moved(Section):
     """An end of a cable that is tied elsewhere."""
 
     cable: Index
+    """Its number."""
     end: Literal[0, 1] = 0
     """0 or 1: which of its two caps."""
     by_m: Vector3
@@ -87,6 +88,7 @@ class AttachmentOffset(EffectSection):
     """Cables are not tied where `robot.toml` says."""
 
     moved: tuple[Moved, ...]
+    """The ends that are tied elsewhere."""
 
     def law(self, scene: Scene) -> Law:
         """Sites of the MuJoCo model moved."""

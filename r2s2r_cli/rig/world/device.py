@@ -10,7 +10,7 @@ from r2s2r_cli.rig.section import Count, NonNegative, Positive, Real, Section, S
 class Sensors(Section):
     """The capacitive stretch sensors. Lengths are distances of cap centres, as `robot.toml` calibrates them.
 
-    C = slope (length + day + drift + bow) + offset, followed by lag, noise and the converter (perception.md section 5).
+    C = slope (length + day + drift + bow) + offset, followed by lag, noise and the converter.
     """
 
     slope_f_per_m: Positive = 3e-11
@@ -38,11 +38,13 @@ class Inertial(Section):
     """The inertial unit of every board, in the rod's axes R, at the rod's middle."""
 
     accel_bias_sd_m_per_s2: NonNegative = 0.4
-    """Drawn once an axis from the seed."""
+    """Drawn once an axis from the seed, standard deviation."""
     accel_noise_sd_m_per_s2: NonNegative = 0.02
+    """White, every sample."""
     gyro_bias_sd_rad_per_s: NonNegative = 0.017
     """Drawn once an axis from the seed."""
     gyro_noise_sd_rad_per_s: NonNegative = 0.002
+    """White, every sample."""
     yaw_drift_rad_per_s: Real = 3.5e-4
     """Of the attitude that the older boards send: nothing holds its heading."""
 
@@ -54,6 +56,7 @@ class Boards(Section):
     """`per_rod`: three boards with three sensors and two motors each, as on the newer robot (other robots: one board a
     rod, everything dealt out in turn). `central`: one board with everything, as on the older robot."""
     rate_hz: Positive = 50.0
+    """Samples of a board a second [Hz]; it drives its motors at once when a command comes."""
     rate_spread: Share = 0.01
     """Boards differ in rate by this part (standard deviation, drawn from the seed)."""
     jitter_s: NonNegative = 0.001

@@ -29,6 +29,7 @@ class SensorStuck(Timed):
 
     kind: Literal["sensor_stuck"]
     sensor: Index
+    """Place in `[[sensors]]` of `robot.toml`."""
 
 
 class SensorFrozen(Timed):
@@ -36,6 +37,7 @@ class SensorFrozen(Timed):
 
     kind: Literal["sensor_frozen"]
     sensor: Index
+    """Place in `[[sensors]]` of `robot.toml`."""
 
 
 class SensorJump(Timed):
@@ -43,7 +45,9 @@ class SensorJump(Timed):
 
     kind: Literal["sensor_jump"]
     sensor: Index
+    """Place in `[[sensors]]` of `robot.toml`."""
     by_m: Real = 0.02
+    """How much longer [m]."""
 
 
 class BoardSilent(Timed):
@@ -51,6 +55,7 @@ class BoardSilent(Timed):
 
     kind: Literal["board_silent"]
     board: Index
+    """Its number."""
 
 
 class BoardReset(Timed):
@@ -58,6 +63,7 @@ class BoardReset(Timed):
 
     kind: Literal["board_reset"]
     board: Index
+    """Its number."""
     for_s: For = 1.5
 
 
@@ -66,7 +72,9 @@ class ClockJump(Timed):
 
     kind: Literal["clock_jump"]
     board: Index
+    """Its number."""
     by_s: Real = 5.0
+    """Forwards, or, below 0, backwards [s]."""
 
 
 class MotorDead(Timed):
@@ -74,6 +82,7 @@ class MotorDead(Timed):
 
     kind: Literal["motor_dead"]
     motor: Index
+    """Place in `[[motors]]` of `robot.toml`."""
 
 
 class CableTorn(Timed):
@@ -81,6 +90,7 @@ class CableTorn(Timed):
 
     kind: Literal["cable_torn"]
     cable: Index
+    """Its number."""
 
 
 class LinkGone(Timed):

@@ -58,16 +58,22 @@ class SerialPort:
 
     def _bytes(self, timeout: float) -> bytes:
         with port_errors(self.name, "reading"):
+            port = self._opened()
             number = self._number()
             if number is None:
-                data = bytes(self._port.read(4096))
+                data = bytes(port.read(4096))
                 if not data and timeout > 0:
                     time.sleep(min(timeout, _POLL))
                 return data
             if not select.select([number], [], [], timeout)[0]:
                 return b""
             # Readable and nothing to read is how a hang-up looks; pyserial raises in `read`, which must be called.
-            return bytes(self._port.read(max(1, self._port.in_waiting)))
+            return bytes(port.read(max(1, port.in_waiting)))
+
+    def _opened(self) -> Any:
+        if self._port is None:
+            raise OSError("the port is not open")
+        return self._port
 
     def _number(self) -> int | None:
         """The file descriptor, where it can be waited for."""
@@ -81,7 +87,7 @@ class SerialPort:
 
         with port_errors(self.name, "writing"):
             try:
-                self._port.write(data)
+                self._opened().write(data)
             except serial.SerialTimeoutException:
                 raise not_taken(self.name, WRITE_TIMEOUT) from None
 

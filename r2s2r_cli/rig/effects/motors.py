@@ -9,6 +9,9 @@ import numpy as np
 from r2s2r_cli.rig.effects.base import EffectSection, Law, Scene, per
 from r2s2r_cli.rig.section import NonNegative, Positive, Share
 
+_ROUNDING = 1e-9
+"""Times that differ by less [s] are the same: they are sums of steps."""
+
 
 class MotorDeadZone(EffectSection):
     """Gears stick: a motor starts at a drive of `start` only, and once it turns it stops below `keep`."""
@@ -56,7 +59,7 @@ class _Queue(Law):
             due = t + self._p.delay_s + (self._rng.exponential(self._p.jitter_s) if self._p.jitter_s else 0.0)
             self._queue.append((max(due, self._queue[-1][0] if self._queue else due), u.copy()))
             self._last = u.copy()
-        while self._queue and self._queue[0][0] <= t:
+        while self._queue and self._queue[0][0] <= t + _ROUNDING:
             self._now = self._queue.popleft()[1]
         return self._now
 

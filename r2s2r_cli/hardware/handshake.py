@@ -165,7 +165,7 @@ def unlatch(link: Link) -> None:
     """Ask the device to take its latch off, then greet it again. Raises LinkError where it does not."""
     line = link.codec.reset()
     if line is None:
-        return
+        return shake(link)
     link.send(line)
     end = time.monotonic() + link.handshake_timeout
     while (left := end - time.monotonic()) > 0:
@@ -181,4 +181,4 @@ def unlatch(link: Link) -> None:
         raise LinkError("the robot refuses the reset", where=link.transport.name, expected="code 0",
                         received=f"code {event.code}: {CODES.get(event.code, 'unknown')}",
                         hint=f"r2s2r doctor ports {link.transport.name}")  # fmt: skip
-    shake(link)
+    return shake(link)

@@ -120,25 +120,25 @@ class Link:
                     raise
                 time.sleep(min(0.2, max(0.0, end - time.monotonic())))
 
-    def _connect(self) -> None:
+    def _connect(self, begin: Callable[[Link], None] = handshake.shake) -> None:
         self._state = LinkState.CONNECTING
         self._samples.clear()
         self.routes, self.lock_step, self.greeting, self._held = Routes(), None, None, False
         self._picture.restart()
         self._tally.restart()
-        self._tally.reconnects += self._ever
-        self._ever = True
         try:
             self.transport.open()
             self._state = LinkState.HANDSHAKE
             self.stop()
-            handshake.shake(self)
+            begin(self)
         except BaseException:
             self.stop()
             self.transport.close()
             self._state = LinkState.LOST
             raise
         self._state = LinkState.RUNNING
+        self._tally.reconnects += self._ever
+        self._ever = True
 
     # The loop
 
@@ -183,8 +183,8 @@ class Link:
         self._say(self.codec.emergency)
 
     def reset(self) -> None:
-        """Take the latch off. Raises LinkError where the device does not confirm it."""
-        handshake.unlatch(self)
+        """Take the latch off, on a new connection. Raises LinkError where the device does not confirm it."""
+        self._connect(handshake.unlatch)
         self._latched = ""
 
     def _say(self, what: Callable[[], Outgoing]) -> None:

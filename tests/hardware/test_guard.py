@@ -1,0 +1,181 @@
+"""The duties of the host, on a robot in lock-step memory: each stops the motors by itself, and is latched."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.devices.lengths import NOT_INITIALISED
+from r2s2r_cli.devices.link import LinkFacts, LinkState, LinkStatistics, RobotLink, SafetyStop, Sample
+from r2s2r_cli.errors import ExitCode
+from r2s2r_cli.hardware.guard import GuardedLink
+from r2s2r_cli.hardware.signals import interrupting_signals
+from tests.support.wire_robot import OFFSET, SLOPE, calibrated
+
+TICK = 0.02
+
+
+class Clockwork:
+    """A link whose time goes on by a tick at every read; `wrong(k, capacitance)` is what becomes of tick k's values."""
+
+    facts = LinkFacts(port="/dev/fake", protocol="checked")
+    state = LinkState.RUNNING
+    statistics = LinkStatistics()
+
+    def __init__(self, wrong: Callable[[int, np.ndarray], np.ndarray | None] = lambda k, c: c) -> None:
+        self.k = 0
+        self.wrong = wrong
+        self.said: list[tuple[float, object]] = []
+        self.draw = np.random.default_rng(0)
+        self.length = np.full(9, 0.15)
+        self.t_sensor = np.full(9, np.nan)
+        self.capacitance = np.full(9, np.nan)
+
+    def now(self) -> float:
+        return self.k * TICK
+
+    def read(self, timeout: float) -> Sample | None:
+        self.k += 1
+        noisy = SLOPE * (self.length + self.draw.normal(0, 5e-4, 9)) + OFFSET
+        value = self.wrong(self.k, np.round(noisy, 14))
+        if value is None:
+            return None
+        fresh = np.isfinite(value)
+        self.capacitance = np.where(fresh, value, self.capacitance)
+        self.t_sensor = np.where(fresh, self.now(), self.t_sensor)
+        return Sample(t_host=self.now(), board=0, t_board=math.nan, due=True, capacitance=self.capacitance,
+                      t_sensor=self.t_sensor, fresh=fresh, encoder=np.full(6, np.nan))  # fmt: skip
+
+    def command(self, speed: np.ndarray) -> None:
+        self.said.append((self.now(), speed))
+
+    def stop(self) -> None:
+        self.said.append((self.now(), "stop"))
+
+    def emergency_stop(self) -> None:
+        self.said.append((self.now(), "emergency"))
+
+    def reset(self) -> None:
+        self.said.append((self.now(), "reset"))
+
+    def reconnect(self, timeout: float = 10.0) -> None:
+        self.said.append((self.now(), "reconnect"))
+
+    def __enter__(self) -> Clockwork:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+
+def drive(link: GuardedLink, seconds: float, speed: float = 1.0) -> None:
+    """A loop that always commands the same."""
+    while link.now() < seconds - 1e-9:
+        if link.read(TICK) is not None:
+            link.command(np.full(6, speed))
+
+
+def stuck(value: float) -> Callable[[int, np.ndarray], np.ndarray]:
+    """Sensor 3 has this value from 1 s on."""
+    return lambda k, c: np.where((np.arange(9) == 3) & (k * TICK > 1), value, c)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "what", "after"),
+    [
+        (stuck(NOT_INITIALISED), "sends 0.20 pF", 0.2), (stuck(np.nan), "no good reading of cable 3", 0.2),
+        (stuck(SLOPE * 0.15 + OFFSET), "frozen sensor: that of cable 3", 0.6),
+        (stuck(SLOPE * 0.45 + OFFSET), "cable 3 measures 450 mm", 0.04),
+        (stuck(SLOPE * 0.01 + OFFSET), "cable 3 measures 10 mm", 0.04),
+        (lambda k, c: None if k * TICK > 1 else c, "nothing came for", 0.2),
+        (lambda k, c: np.where(np.arange(9) // 3 == 1, np.nan, c) if k * TICK > 1 else c, "cable 3, 4, 5 for 200", 0.2),
+    ],
+    ids=["not set up", "drop-out", "frozen", "too long", "too short", "silence", "a board gone"],
+)  # fmt: skip
+def test_each_failure_of_sensors_stops_the_motors(
+    wrong: Callable[[int, np.ndarray], np.ndarray | None], what: str, after: float
+) -> None:
+    """From 1 s on something is wrong: a stop is said within the time of the duty and one tick; nothing moves later."""
+    inner = Clockwork(wrong)
+    with pytest.raises(SafetyStop, match=what) as caught, GuardedLink(inner, calibrated()) as link:
+        drive(link, 5.0)
+    assert caught.value.exit_code == ExitCode.HARDWARE and "/dev/fake" in caught.value.where and caught.value.hint
+    first = next(t for t, said in inner.said if isinstance(said, str) and said == "stop")
+    assert 1.0 < first <= 1.0 + after + 2 * TICK + 1e-9
+    assert all(isinstance(said, str) for t, said in inner.said if t >= first)
+
+
+def test_a_healthy_robot_is_left_alone() -> None:
+    """20 s with noise of 0.5 mm, a short drop-out, single wild values, winches that pull in vain: no reason to end."""
+
+    def wrong(k: int, c: np.ndarray) -> np.ndarray | None:
+        if 100 <= k < 108:
+            return None
+        return np.where((np.arange(9) == 2) & (k % 50 == 3), SLOPE * 0.9 + OFFSET, c)
+
+    with GuardedLink(Clockwork(wrong), calibrated(), time_limit=30.0) as link:
+        assert isinstance(link, RobotLink)
+        drive(link, 20.0)
+
+
+def test_a_passive_sensor_may_fail() -> None:
+    """Cables without a motor are not driven: their sensors stop nothing."""
+    link = GuardedLink(Clockwork(lambda k, c: np.where(np.arange(9) == 7, np.nan, c)), calibrated())
+    with link:
+        drive(link, 3.0)
+
+
+def test_the_time_limit_ends_a_run_and_a_new_run_has_its_own() -> None:
+    """As long as it was given, not longer; `restart` begins anew."""
+    link = GuardedLink(Clockwork(), calibrated(), time_limit=2.0)
+    with link:
+        drive(link, 1.9)
+        link.restart(time_limit=3.0)
+        drive(link, 4.8)
+        with pytest.raises(SafetyStop, match="time limit"):
+            drive(link, 6.0)
+        assert link.now() == pytest.approx(1.9 + 3.0, abs=2.5 * TICK)
+
+
+def test_a_stop_by_the_host_is_latched_until_reset() -> None:
+    """Everything is refused with the first reason, until `reset`; then it goes on."""
+    inner = Clockwork(stuck(np.nan))
+    with GuardedLink(inner, calibrated()) as link:
+        with pytest.raises(SafetyStop):
+            drive(link, 5.0)
+        for call in (lambda: link.read(0.0), lambda: link.command(np.zeros(6))):
+            with pytest.raises(SafetyStop, match="no good reading"):
+                call()
+        inner.wrong = lambda k, c: c
+        link.reset()
+        drive(link, link.now() + 1.0)
+        link.emergency_stop()
+        with pytest.raises(SafetyStop, match="emergency stop"):
+            link.command(np.zeros(6))
+    assert [said for _, said in inner.said if isinstance(said, str)] == ["stop", "reset", "emergency", "stop"]
+
+
+def test_a_dry_run_moves_nothing() -> None:
+    """Every command that reaches the robot is zero, and a frozen value is no wonder then; nonsense is still refused."""
+    inner = Clockwork(lambda k, c: np.full(9, SLOPE * 0.15 + OFFSET))
+    with GuardedLink(inner, calibrated(), dry_run=True) as link:
+        drive(link, 3.0)
+        link.command(np.full(6, np.nan))
+    speeds = np.array([said for _, said in inner.said if not isinstance(said, str)])
+    assert len(speeds) > 100 and (speeds[:-1] == 0).all() and np.isnan(speeds[-1]).all()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_polite_kills_leave_the_context(number: signal.Signals) -> None:
+    """SIGTERM, SIGHUP and SIGINT become an exception in the run; the motors are told to stop; handlers come back."""
+    inner, before = Clockwork(), signal.getsignal(number)
+    with pytest.raises(KeyboardInterrupt), interrupting_signals(), GuardedLink(inner, calibrated()) as link:
+        link.command(np.ones(6))
+        os.kill(os.getpid(), number)
+        drive(link, 5.0)
+    assert inner.said[-1][1] == "stop" and signal.getsignal(number) == before

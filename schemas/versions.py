@@ -11,13 +11,14 @@ from typing import Any
 from schemas.base import ArtifactSpec
 from schemas.calibration import CALIBRATION
 from schemas.estimate import ESTIMATE
+from schemas.floor import FLOOR
 from schemas.identification import IDENTIFICATION
 from schemas.policy import POLICY
 from schemas.recording import RECORDING
 from schemas.simulation import SIMULATION
 
 KINDS: dict[str, ArtifactSpec] = {
-    spec.kind: spec for spec in (CALIBRATION, RECORDING, ESTIMATE, IDENTIFICATION, POLICY, SIMULATION)
+    spec.kind: spec for spec in (CALIBRATION, RECORDING, ESTIMATE, IDENTIFICATION, POLICY, SIMULATION, FLOOR)
 }
 """The artifact kinds by name, in the order of the data."""
 

@@ -38,6 +38,8 @@ ROBOT_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
     "record": {"name": (), "motors": (), "pid": (), "limits": (), "sensors": ("cable", "slope_f_per_m", "offset_f")},
     "estimate": {"name": (), "rods": ("length_m", "cap_radius_m"), "cables": ("caps", "kind"),
                  "sensors": ("cable", "slope_f_per_m", "offset_f")},
+    "floor": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "contact": (), "sensors": (),
+              "rest_caps_m": ()},
     "simulate": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),
                  "sensors": ("cable", "stiffness_n_per_m", "rest_length_m"), "rest_caps_m": ()},
     "identify": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),

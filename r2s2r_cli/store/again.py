@@ -28,6 +28,10 @@ def command_again(made: Provenance, artifact: Path, *, force: bool = False) -> s
         words += [word for option in ("random", "seed", "from") if flags.get(option) is not None
                   for word in (f"--{option}", str(flags[option]))]  # fmt: skip
         words += [word for run in flags.get("replay", ()) for word in ("--replay", run)]
+    elif made.stage == "floor":
+        words += [word for number in flags.get("iterations", ()) for word in ("--iteration", str(number))]
+        words += ["--by", flags["by"]] if flags.get("by", "pose") != "pose" else []
+        words += ["--numerics", str(flags["numerics"])] if flags.get("numerics") else []
     elif made.stage == "identify":
         words += _identify(flags)
     if artifact.parent.name.isdigit():

@@ -1,0 +1,154 @@
+"""`r2s2r floor`: repeats of the robot -> floor.h5, what remains of any gap when nothing is wrong."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from r2s2r_cli.console import Console
+from r2s2r_cli.errors import UsageError
+from r2s2r_cli.options import DrawOption, DryRunOption, ForceOption, JsonOption, ProjectOption, QuietOption
+from r2s2r_cli.store.project import Iteration, Project
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+    from r2s2r_cli.artifact import ArtifactData
+    from r2s2r_cli.stages.floor import Numerics, SeenRun, SensedRun
+    from schemas.header import InputRef
+    from schemas.results_floor import FloorReport
+
+GAITS_MAX = 1000
+
+
+class Carry(StrEnum):
+    """What `--by` takes."""
+
+    POSE = "pose"
+    DISPLACEMENT = "displacement"
+
+
+def floor(
+    iteration: Annotated[
+        list[int] | None,
+        typer.Option("--iteration", metavar="N", help="Of these iterations; repeatable. Default: all."),
+    ] = None,
+    by: Annotated[
+        Carry, typer.Option("--by", help="Repeats are laid on each other by their start pose, or by what they moved.")
+    ] = Carry.POSE,
+    numerics: Annotated[
+        int,
+        typer.Option("--numerics", metavar="N", help="Also engine against the rig's model over N random gait steps."),
+    ] = 0,
+    project: ProjectOption = None,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+    draw: DrawOption = True,
+    dry_run: DryRunOption = False,
+    force: ForceOption = False,
+) -> None:
+    """Measure how far the robot repeats itself, in end caps and in cable lengths; no simulator can be better than that.
+
+    From 3 or more repeats of a policy, from commissioning runs, or from steps of the same phase within a run. Judged on
+    the estimates and recordings that the iterations have.
+
+    Example: r2s2r floor --iteration 1
+    """
+    from r2s2r_cli.commands.stage import StageRun, show_outcome
+    from schemas.results_floor import FloorReport
+
+    console = Console(json=json, quiet=quiet)
+    here = Project.find(project)
+    if not 0 <= numerics <= GAITS_MAX:
+        raise UsageError("this is no number of gait steps", where="--numerics", expected=f"0 to {GAITS_MAX}",
+                         received=str(numerics), hint="r2s2r floor --numerics 16")  # fmt: skip
+    places = [here.iteration(number) for number in iteration] if iteration else here.iterations()
+    run = StageRun(
+        stage="floor", kind="floor", project=here, iteration=None, find_inputs=lambda: _refs(here, places, numerics),
+        report_model=FloorReport, dry_run=dry_run, force=force,
+        flags={"iterations": list(iteration or ()), "by": by.value, "numerics": numerics},
+    )  # fmt: skip
+    result, report = run.run(
+        lambda: _compute(here, places, by, numerics, console), (lambda data, said: _draw(data, said)) if draw else None
+    )
+    show_outcome(result, console)
+    if report is not None:
+        _show(report, console)
+
+
+def _sources(place: Iteration) -> tuple[Path, Path]:
+    """Recording and estimate of an iteration, there or not."""
+    return place.artifact("recording"), place.artifact("estimate")
+
+
+def _refs(project: Project, places: Sequence[Iteration], numerics: int) -> list[InputRef]:
+    from r2s2r_cli.store.header import whole_header
+    from r2s2r_cli.store.staleness import artifact_ref
+
+    found = [path for place in places for path in _sources(place) if path.exists()]
+    if not found and not numerics:
+        raise UsageError("there is nothing to measure a floor with", where="r2s2r floor", received="none",
+                         expected="an iteration with 10-record.h5 or 20-estimate.h5",
+                         hint="r2s2r record gait.toml --repeats 3 --port ...")  # fmt: skip
+    return [artifact_ref(project, path, whole_header(path)) for path in found]
+
+
+def _compute(
+    project: Project, places: Sequence[Iteration], by: Carry, gaits: int, console: Console
+) -> tuple[ArtifactData, FloorReport]:
+    from r2s2r_cli.stages.floor import floor as measure
+
+    seen, sensed, policies = _runs(project, places)
+    found: Numerics | None = None
+    if gaits:
+        from r2s2r_cli.commands.floor_numerics import numerics
+
+        with console.progress("engine and rig", 1) as advance:
+            found = numerics(project.robot(), gaits, project.cache)
+            advance(1)
+    return measure(seen, sensed, policies=policies, numerics=found, by=by.value)
+
+
+def _runs(project: Project, places: Sequence[Iteration]) -> tuple[list[SeenRun], list[SensedRun], dict[str, str]]:
+    """Runs with caps, runs with sensors, and the policy of each by name."""
+    from r2s2r_cli.stages.floor import seen_run, sensed_run
+    from r2s2r_cli.store.read import read_artifact
+
+    robot = project.robot()
+    seen: list[SeenRun] = []
+    sensed: list[SensedRun] = []
+    policies: dict[str, str] = {}
+    for place in places:
+        source, states = _sources(place)
+        recording = read_artifact(source, "recording")[1] if source.exists() else None
+        estimate = read_artifact(states, "estimate")[1] if states.exists() else None
+        for run in estimate.runs() if estimate is not None else ():
+            one = seen_run(f"{place.number}:{run}", estimate, recording, run) if estimate is not None else None
+            seen += [one] if one is not None else []
+        for run in recording.runs() if recording is not None else ():
+            name = f"{place.number}:{run}"
+            repeat = recording.groups[f"runs/{run}"].attributes.get("repeat") if recording is not None else None
+            policies[name] = run.removesuffix(f"-{repeat}") if repeat is not None else run
+            other = sensed_run(name, recording, run, robot) if recording is not None else None
+            sensed += [other] if other is not None else []
+    return seen, sensed, policies
+
+
+def _draw(data: ArtifactData, report: FloorReport) -> Iterator[tuple[str, bytes]]:
+    from r2s2r_cli.views.floor import draw_floor, floor_page
+
+    picture = draw_floor(data)
+    yield ".png", picture
+    yield ".html", floor_page(report, picture)
+
+
+def _show(report: FloorReport, console: Console) -> None:
+    from r2s2r_cli.views.floor import floor_tables
+
+    for table in floor_tables(report):
+        console.table(table.title, table.columns, table.rows)
+    for text in report.warnings:
+        console.warn(text)

@@ -1,0 +1,87 @@
+"""Runs as the floor sees them: observed caps with their target intervals, and sensor lengths with theirs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.segments import Intervals
+from schemas.robot import Robot
+
+
+@dataclass(frozen=True)
+class SeenRun:
+    """A run with end caps: a `stages.measures.steps.ObservedRun`.
+
+    name: iteration and run, `1:crawl`. t: (frame,) [s]. observed: (frame, cap, 3) [m], ground at z = 0. noise: (cap, 3)
+    [m]. quality: codes of `schemas.estimate.QUALITY`, (frame, cap).
+    """
+
+    name: str
+    t: np.ndarray
+    observed: np.ndarray
+    noise: np.ndarray
+    quality: np.ndarray
+    intervals: Intervals
+
+
+@dataclass(frozen=True)
+class SensedRun:
+    """A run with cable sensors. t: (sample,) [s]; length: (sample, sensor) [m], NaN: not in this sample; cable: that
+    each sensor measures, (sensor,)."""
+
+    name: str
+    t: np.ndarray
+    length: np.ndarray
+    cable: np.ndarray
+    intervals: Intervals
+
+
+def seen_run(name: str, estimate: ArtifactData, recording: ArtifactData | None, run: str) -> SeenRun | None:
+    """Of an estimate and its recording; None where the run has no target intervals.
+
+    observed: the recording's caps at the kept frames on the estimate's ground, as the measures want them; where a
+    tracker made them on the way, the estimate's. Raises InputError where both do not belong together.
+    """
+    groups = dict(estimate.streams(run))
+    if "intervals" not in groups or not len(groups["intervals"]["t_first"]):
+        return None
+    frames, tracks, ground = groups["frames"], groups["tracks"], groups["ground"]
+    caps = None if recording is None else recording.group(run, "caps")
+    observed = frames["p_WE"] if caps is None else _caps_at(caps, frames, ground, name)
+    return SeenRun(
+        name, frames["t"], observed, tracks["noise_sd"], frames["quality"], Intervals.from_group(groups["intervals"])
+    )
+
+
+def sensed_run(name: str, recording: ArtifactData, run: str, robot: Robot) -> SensedRun | None:
+    """Of a recording; None where the run has no target intervals, or no lengths of the robot's sensors."""
+    sensors, intervals = recording.group(run, "sensors"), recording.group(run, "intervals")
+    if sensors is None or intervals is None or not len(intervals["t_first"]):
+        return None
+    if "length" in sensors:
+        length = sensors["length"]
+    elif "capacitance" in sensors:
+        lines = [(s.slope_f_per_m or np.nan, np.nan if s.offset_f is None else s.offset_f) for s in robot.sensors]
+        slope, offset = np.array(lines, dtype=float).reshape(-1, 2).T
+        length = (sensors["capacitance"] - offset) / slope
+    else:
+        return None
+    if length.shape[1] != len(robot.sensors) or not np.isfinite(length).any():
+        return None
+    cable = np.array([sensor.cable for sensor in robot.sensors], dtype=np.int64)
+    return SensedRun(name, sensors["t"], length, cable, Intervals.from_group(intervals))
+
+
+def _caps_at(caps: Group, frames: Group, ground: Group, name: str) -> np.ndarray:
+    rows = frames["source_frame"]
+    if int(rows.max()) >= len(caps["p_WE"]) or not np.array_equal(caps["t"][rows], frames["t"]):
+        raise InputError(
+            f"the estimate of run {name} was made of another recording", where="frames/source_frame",
+            expected="rows of the recording, with its stamps", received=f"rows up to {int(rows.max())}",
+            hint="r2s2r estimate",
+        )  # fmt: skip
+    return np.asarray(caps["p_WE"][rows] + np.array([0.0, 0.0, float(ground.attributes["shift"])]))

@@ -70,8 +70,8 @@ class TcpTransport:
         """Release the port."""
         if not self._gone:
             self._gone = True
+            self._listen.close()  # before the host's: it shall not slip in again between the two
             self._leave()
-            self._listen.close()
 
     def _accept(self) -> list[Event]:
         try:

@@ -55,10 +55,10 @@ def with_sensor_line(text: str, lines: Mapping[int, tuple[float, float]], *, sou
         for sensor, (slope, offset) in lines.items():
             if not 0 <= sensor < len(tables):
                 raise _absent(f"sensors.{sensor}", f"{len(tables)} [[sensors]] tables")
-            _set(tables[sensor], "slope_f_per_m", slope, source)
-            _set(tables[sensor], "offset_f", offset, source)
+            set_value(tables[sensor], "slope_f_per_m", slope, source)
+            set_value(tables[sensor], "offset_f", offset, source)
 
-    return _edited(text, edit)
+    return edited(text, edit)
 
 
 def with_tendon(text: str, k1: float, k2: float, k3: float, *, x_max: float | None = None, source: str = "") -> str:
@@ -81,9 +81,9 @@ def with_tendon(text: str, k1: float, k2: float, k3: float, *, x_max: float | No
             raise _absent("cables", "no [[cables]] table of kind passive")
         for table in passive:
             for key, value in zip(_TENDON_KEYS, (k1, k2, k3), strict=True):
-                _set(table, key, value, source)
+                set_value(table, key, value, source)
 
-    return _edited(text, edit)
+    return edited(text, edit)
 
 
 def with_parts(text: str, rod: str | None, parts: Sequence[Lump], *, source: str = "") -> str:
@@ -96,10 +96,11 @@ def with_parts(text: str, rod: str | None, parts: Sequence[Lump], *, source: str
         for table in tables:
             _set_parts(table, parts, source)
 
-    return _edited(text, edit)
+    return edited(text, edit)
 
 
-def _edited(text: str, edit: Callable[[Any], None]) -> str:
+def edited(text: str, edit: Callable[[Any], None]) -> str:
+    """The text after `edit` of its tomlkit document. Raises InputError where it, or the result, is no valid robot."""
     import tomlkit
     from tomlkit.exceptions import TOMLKitError
 
@@ -141,16 +142,16 @@ def _absent(where: str, received: str) -> InputError:
     )  # fmt: skip
 
 
-def _set(table: Any, key: str, value: float, source: str) -> None:
-    """Set a number and its comment; what stood in a comment of the user stays behind the new one."""
+def set_value(table: Any, key: str, value: float | list[float | int], source: str) -> None:
+    """Set a number, or a list of them, and its comment; what the user wrote there stays behind the new one."""
     from tomlkit.items import Table
 
-    number = _rounded(value, key)
+    number = value if isinstance(value, list) else _rounded(value, key)
     if not isinstance(table, Table):
         raise InputError(
             "robot.toml holds an inline table where a comment cannot stand", where=f"robot.toml, {key}",
-            expected="a table of its own, [[sensors]] or [[cables]]", received="an inline table in braces",
-            hint="write one [[sensors]] or [[cables]] table per element, as `r2s2r init` does",
+            expected="a table of its own, [[sensors]], [[cables]] or [[colors]]", received="an inline table in braces",
+            hint="write one table in double brackets per element, as `r2s2r init` does",
         )  # fmt: skip
     old = table[key].trivia.comment.lstrip("# ").rstrip() if key in table else ""
     if old == MARK or old.startswith(f"{MARK}: "):  # ours; "calibrated by hand" is the user's and stays
@@ -167,7 +168,7 @@ def _comment(item: Any, source: str, before: str = "") -> None:
     item.trivia.comment_ws = "  "
 
 
-def _put(table: Table, key: str, value: str | float) -> None:
+def _put(table: Table, key: str, value: str | float | list[float | int]) -> None:
     """Set a value; a new key goes below the last one, above blank lines and the comments of the next table."""
     if key in table:
         table[key] = value
@@ -249,7 +250,7 @@ def _update_part(table: Table, part: Lump, source: str) -> None:
         if table.get(key) == value:
             continue
         if isinstance(value, float):
-            _set(table, key, value, source)
+            set_value(table, key, value, source)
         else:
             _put(table, key, value)
 

@@ -1,0 +1,1 @@
+"""What `doctor` works out from a few frames of a camera: the ground, the colours, the pace."""

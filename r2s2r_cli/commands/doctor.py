@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from r2s2r_cli import __version__
+from r2s2r_cli.commands.doctor_ports import ports
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import GateError, R2S2RError
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
@@ -141,3 +142,6 @@ def _hdf5() -> Probe:
     lines = (child.stdout if works else child.stderr).strip().splitlines() or ["it crashed"]
     return Probe(name="HDF5 write and read", state="ok" if works else "error", found=lines[-1][:200],
                  hint="" if works else "pip install --force-reinstall h5py")  # fmt: skip
+
+
+doctor_app.command("ports")(ports)

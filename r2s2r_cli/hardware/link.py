@@ -223,8 +223,11 @@ class Link:
                 self.transport.send(answer, message.source)
         self._tally.heard(message.t)
         numbers = self._tally.numbers
-        if numbers and event.seq is not None and not numbers.new(event.seq) and not isinstance(event, Greeting):
-            return None
+        if numbers and event.seq is not None:
+            if isinstance(event, Greeting):
+                numbers.greeted(event.seq)
+            elif not numbers.new(event.seq):
+                return None
         self._tally.received += 1
         match event:
             case Reading():

@@ -50,6 +50,11 @@ class Numbers:
         self._remember(seq)
         return True
 
+    def greeted(self, seq: int) -> None:
+        """A greeting: in lock-step it may carry the number of the line before it, and is counted once at most."""
+        if seq not in self._seen:
+            self.new(seq)
+
     def _remember(self, seq: int) -> None:
         self._seen.add(seq)
         self._order.append(seq)

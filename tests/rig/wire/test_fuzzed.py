@@ -42,6 +42,7 @@ def spoilt(data: bytes, rng: np.random.Generator) -> bytes:
     return bytes(out[: int(rng.integers(len(out) + 1))] if rng.random() < 0.1 else out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_spoilt_lines_do_no_harm(protocol: str) -> None:
     """Nine of ten lines are spoilt; duties stay finite and in range after each, and ours counts the bad ones.

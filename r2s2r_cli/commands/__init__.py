@@ -14,11 +14,13 @@ from r2s2r_cli.commands.calibrate import calibrate
 from r2s2r_cli.commands.doctor import doctor_app
 from r2s2r_cli.commands.estimate import estimate
 from r2s2r_cli.commands.export import export
+from r2s2r_cli.commands.floor import floor
 from r2s2r_cli.commands.identify import identify
 from r2s2r_cli.commands.import_ import import_
 from r2s2r_cli.commands.init import init
 from r2s2r_cli.commands.inspect import inspect
 from r2s2r_cli.commands.migrate import migrate
+from r2s2r_cli.commands.record import record
 from r2s2r_cli.commands.recover import recover
 from r2s2r_cli.commands.rig import rig
 from r2s2r_cli.commands.simulate import simulate
@@ -28,9 +30,11 @@ from r2s2r_cli.commands.validate import validate
 COMMANDS: dict[str, Callable[..., None]] = {
     "init": init,
     "calibrate": calibrate,
+    "record": record,
     "import": import_,
     "estimate": estimate,
     "identify": identify,
+    "floor": floor,
     "simulate": simulate,
     "rig": rig,
     "status": status,

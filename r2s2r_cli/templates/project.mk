@@ -4,11 +4,13 @@
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help iterate status check
+.PHONY: help iterate floor status check
 
 R2S2R  ?= r2s2r
 ITER   ?= 001
 SOURCE ?=
+PORT   ?=
+RUNS   ?= --random 15 --repeats 3
 
 # ITER=2 and ITER=002 are the same iteration.
 I := iterations/$(shell printf '%03d' "$$(expr '$(ITER)' + 0)" 2>/dev/null || printf '%s' '$(ITER)')
@@ -37,6 +39,8 @@ SETTINGS := project.toml robot.toml $(wildcard $(I)/config.toml)
 
 help:
 	@echo 'make iterate ITER=001 SOURCE="a.csv b.csv"   bring the iteration up to date (SOURCE: logs to import, the first time)'
+	@echo 'make iterate ITER=001 PORT=/dev/ttyUSB0     the same with runs of the robot itself (RUNS: which, else 15 random targets, 3 times)'
+	@echo 'make floor                                  how far the robot repeats itself'
 	@echo 'make status                                  what is fresh, what is stale and why'
 	@echo 'make check                                   exit code 3 where something is stale or does not validate'
 
@@ -45,10 +49,14 @@ iterate: $(ARTIFACTS)
 ifneq ($(strip $(SOURCE)),)
 $(RECORD): $(SOURCE) $(SETTINGS)
 	"$(R2S2R)" import --iteration $(ITER) $(SOURCE)
+else ifneq ($(strip $(PORT)),)
+# Nothing stands behind the colon: a robot that has moved is not asked to do it again.
+$(RECORD):
+	"$(R2S2R)" record --iteration $(ITER) $(RUNS) --port "$(PORT)"
 else
 $(RECORD):
-	@echo 'error: $@ is not there, and there is no log to import' >&2
-	@echo 'hint: make iterate ITER=$(ITER) SOURCE="a.csv b.csv"' >&2
+	@echo 'error: $@ is not there, and there is neither a log to import nor a robot to record' >&2
+	@echo 'hint: make iterate ITER=$(ITER) SOURCE="a.csv b.csv"   # or PORT=/dev/ttyUSB0' >&2
 	@exit 2
 endif
 
@@ -57,6 +65,9 @@ $(ESTIMATE): $(RECORD) $(SETTINGS)
 
 $(IDENTIFY): $(FROM) $(SETTINGS)
 	"$(R2S2R)" identify --iteration $(ITER)
+
+floor:
+	"$(R2S2R)" floor
 
 status:
 	@"$(R2S2R)" status

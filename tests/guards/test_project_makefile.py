@@ -18,7 +18,7 @@ IDENTIFY = "iterations/001/30-identify.h5"
 # Stands in for r2s2r: writes the artifact of the stage that make asks for, logs the call, fails where told to.
 STAND_IN = """#!/bin/sh
 echo "$@" >> calls.txt
-case "$1" in import) f=10-record.h5 ;; estimate) f=20-estimate.h5 ;; identify) f=30-identify.h5 ;; *) exit 0 ;; esac
+case "$1" in import|record) f=10-record.h5 ;; estimate) f=20-estimate.h5 ;; identify) f=30-identify.h5 ;; *) exit 0 ;; esac
 mkdir -p iterations/$3 && echo "$1" > iterations/$3/$f
 [ "$1" != "$FAIL_IN" ]
 """
@@ -87,6 +87,16 @@ def test_nothing_to_import_is_said_in_words(project: Path) -> None:
     assert done.returncode == 2
     assert 'hint: make iterate ITER=001 SOURCE="a.csv b.csv"' in done.stderr
     assert calls(project) == []
+
+
+def test_a_robot_is_recorded_once(project: Path) -> None:
+    """With PORT the runs come from the robot, and however old they are, a second call does not move it again."""
+    assert make(project, "iterate", "PORT=/dev/ttyUSB0", "RUNS=gait.toml").returncode == 0
+    assert calls(project)[0] == "record --iteration 001 gait.toml --port /dev/ttyUSB0"
+    os.utime(project / "robot.toml", (4e9, 4e9))
+    os.utime(project / RECORD, (0, 0))
+    make(project, "iterate", "PORT=/dev/ttyUSB0")
+    assert [call for call in calls(project)[1:] if call.startswith("record")] == []
 
 
 def test_make_never_deletes_a_recording(project: Path) -> None:

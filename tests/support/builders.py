@@ -133,9 +133,29 @@ def identification(frames: int = 24) -> ArtifactData:
     return identified(robot(), frames)
 
 
+def floor() -> ArtifactData:
+    """Four repeats of two phases in caps, two sensors, two gait steps."""
+    away = np.array([[1.0, 2, 3, 2, 1, 2], [2, 1, 1, 2, 3, 2], [3, 3, 1, 1, 2, 2], [1, 1, 2, 2, 3, 3]]) * 1e-3
+    caps = Group(
+        {"run": np.array([b"1:walk-1", b"1:walk-2"] * 2), "interval": np.array([2, 2, 3, 3]),
+         "phase": np.array([0, 0, 1, 1]), "deviation": np.sqrt(np.mean(away**2, axis=1)), "deviation_cap": away},
+        {"floor": 0.003, "lower": 0.002, "upper": 0.005, "level": 0.95, "sensor": 0.001, "repeatability": 0.0028,
+         "contrasts": 2, "basis": "repeats of a policy", "carry": "pose"},
+    )  # fmt: skip
+    lengths = Group(
+        {"cable": np.array([0, 3]), "sd": np.array([0.002, np.nan]), "noise": np.array([0.0005, np.nan])},
+        {"floor": 0.002, "basis": "repeats of a policy", "contrasts": 2},
+    )
+    numerics = Group(
+        {"seed": np.array([0, 1]), "error": np.array([0.001, 0.002]), "way": np.array([0.03, 0.04])},
+        {"floor": 0.0016, "median": 0.0015, "worst": 0.002, "moved": 0.035, "engine_step": 2.5e-4, "rig_step": 2.5e-4},
+    )  # fmt: skip
+    return ArtifactData("floor", {"caps": caps, "lengths": lengths, "numerics": numerics})
+
+
 BUILDERS: dict[str, Callable[[], ArtifactData]] = {
     "calibration": calibration, "recording": recording, "estimate": estimate, "identification": identification,
-    "policy": policy, "simulation": simulation,
+    "policy": policy, "simulation": simulation, "floor": floor,
 }  # fmt: skip
 """One builder a kind."""
 

@@ -32,6 +32,12 @@ STARRED = {
 }  # fmt: skip
 """The effects of the first release, design.md section 5."""
 
+OTHERS = {
+    "tendon_hysteresis", "capstan_friction", "attachment_offset", "friction_anisotropy", "stribeck", "viscous_contact",
+    "obstacle", "air_drag", "sensor_saturation", "dropout",
+}  # fmt: skip
+"""The rest of the catalogue."""
+
 
 def scene() -> Scene:
     """A robot to make laws with that do not touch its model."""
@@ -49,7 +55,9 @@ def world(**effects: object) -> World:
 
 def test_every_effect_of_the_first_release_is_there() -> None:
     """The 25 starred ids of the design, and no id that the design does not have."""
-    assert STARRED <= set(Effects.model_fields)
+    there = set(Effects.model_fields)
+    assert not STARRED - there
+    assert not there - STARRED - OTHERS
 
 
 def test_nothing_is_shared_with_the_catalogue() -> None:

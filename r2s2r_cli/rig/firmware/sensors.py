@@ -47,7 +47,7 @@ class StretchSensors:
         passive = np.array([robot.cables[k].kind == "passive" for k in self._cable], dtype=bool)
         self._middle = np.where(passive, cap_spans(robot)[self._cable], robot.pid.min_length_m + robot.pid.range_m / 2)
         self._half = np.where(passive, _PASSIVE_HALF_M, robot.pid.range_m / 2)
-        self._drift = np.zeros(n)
+        self._walk, self._steps = [np.zeros(n)], rng.spawn(1)[0]
         self._stuck = [f for f in world.faults if isinstance(f, SensorStuck)]
         self._frozen = [f for f in world.faults if isinstance(f, SensorFrozen)]
         self._jumps = [f for f in world.faults if isinstance(f, SensorJump)]
@@ -72,15 +72,21 @@ class StretchSensors:
         else:
             self._y = x.copy()
         self._x, self._t = x, t
-        self._drift = self._drift + self._settings.drift_sd_m * np.sqrt(dt / _MINUTE) * self._rng.standard_normal(
-            len(x)
-        )
+
+    def _drift(self, t: float) -> np.ndarray:
+        """At the rig's time t [s]: a walk from second to second, straight in between, however often it is asked for."""
+        whole, part = divmod(max(t, 0.0), 1.0)
+        k = int(whole)
+        while len(self._walk) < k + 2:
+            step = self._steps.standard_normal(len(self._cable)) / np.sqrt(_MINUTE)
+            self._walk.append(self._walk[-1] + self._settings.drift_sd_m * step)
+        return np.asarray((1.0 - part) * self._walk[k] + part * self._walk[k + 1])
 
     def read(self, t: float, which: tuple[int, ...]) -> np.ndarray:
         """Capacitances of some sensors [pF], in that order."""
         i = np.array(which, dtype=int)
         s = np.clip((self._y[i] - self._middle[i]) / self._half[i], -1.0, 1.0)
-        shown = self._y[i] + self._day[i] + self._drift[i] + self._bow[i] * (2.0 * s * s - 1.0)
+        shown = self._y[i] + self._day[i] + self._drift(t)[i] + self._bow[i] * (2.0 * s * s - 1.0)
         for jump in self._jumps:
             if jump.on(t):
                 shown = shown + np.where(i == jump.sensor, jump.by_m, 0.0)

@@ -85,7 +85,7 @@ class OurSide:
         clock, before, recipe = time.process_time(), self.predictor.rollouts, self.recipe()
         start = np.array([free.start for free in self.frees])
         found = first_round(self.predictor, [self.window], start, recipe, seed=self.case.seed)
-        trust = spread_of(found.problem, found.solution, LOSSES[recipe.loss], found.posterior)
+        trust = spread_of(found.problem, found.solution, LOSSES[recipe.loss], found.drawn)
         residual = found.solution.residual
         return Fit(estimate=trust.value, low=trust.lower, high=trust.upper, cpu_s=time.process_time() - clock,
                    rollouts=float(self.predictor.rollouts - before),

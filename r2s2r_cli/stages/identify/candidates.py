@@ -16,6 +16,8 @@ from r2s2r_cli.stages.identify.windows import Window
 if TYPE_CHECKING:
     from torch import Tensor
 
+TINY = 1e-6
+"""Of a step: stamps are decimal numbers, and not exact."""
 MOST = 256
 """Simulations in one batch: beyond, their stored states fill the memory and nothing gets faster."""
 
@@ -29,18 +31,38 @@ def predict_candidates(
     The same as `Predictor.predict` of each, but what leaves the finite numbers is nan and raises nothing: one bad
     candidate does not spoil the others.
     """
-    parts: list[np.ndarray | None] = [None] * len(windows)
-    for group in alike(windows):
-        own = [windows[k] for k in group]
-        together = max(1, MOST // len(group))
+    whole = longest(windows) if offsets is None else list(range(len(windows)))
+    run = sorted(set(whole))
+    parts: dict[int, np.ndarray] = {}
+    for group in alike([windows[k] for k in run]):
+        own = [run[k] for k in group]
+        together = max(1, MOST // len(own))
         chunks = []
         for first in range(0, len(values), together):
             some = slice(first, first + together)
-            moved = None if offsets is None else offsets[some][:, group]
-            chunks.append(_together(predictor, own, values[some], moved))
-        for place, k in enumerate(group):
+            moved = None if offsets is None else offsets[some][:, own]
+            chunks.append(_together(predictor, [windows[k] for k in own], values[some], moved))
+        for place, k in enumerate(own):
             parts[k] = np.concatenate([chunk[place] for chunk in chunks])
-    return np.concatenate([part for part in parts if part is not None], axis=1)
+    found = [
+        parts[other][:, np.isin(windows[other].frames, window.frames)]
+        for window, other in zip(windows, whole, strict=True)
+    ]
+    return np.concatenate(found, axis=1)
+
+
+def longest(windows: Sequence[Window]) -> list[int]:
+    """For each window the number of the one that simulates it as well: the longest with the same start, itself
+    perhaps."""
+    best: dict[tuple[int, int, int], int] = {}
+    keys = [(id(window.run), window.first, id(window.state)) for window in windows]
+    for k, key in enumerate(keys):
+        if key not in best or windows[best[key]].duration < windows[k].duration:
+            best[key] = k
+    return [
+        best[key] if set(window.frames.tolist()) <= set(windows[best[key]].frames.tolist()) else k
+        for k, (key, window) in enumerate(zip(keys, windows, strict=True))
+    ]
 
 
 def _together(
@@ -59,15 +81,26 @@ def _together(
     if offsets is not None:
         s0 = displaced(structure, s0, torch.as_tensor(offsets.reshape(len(s0), -1)))
     duration = max(window.duration for window in windows)
-    rows = STRIDE * (math.ceil(duration / step / STRIDE) + 1)
+    stride = _stride(windows, step)
+    rows = stride * (math.ceil(duration / step / stride - TINY) + 1)
     u = _commands(predictor, windows, values, rows)
     predictor.rollouts += len(s0)
     n = predictor.simulator.substeps(theta, unpack_state(structure, s0), step)
     with torch.no_grad():
         flat = predictor.simulator.advance(
-            s0, u, pack_parameters(structure, theta), h=step / n, hold=n, every=STRIDE * n
-        )
-        return [_caps(predictor, flat[place :: len(windows)], window, values) for place, window in enumerate(windows)]
+            s0, u, pack_parameters(structure, theta), h=step / n, hold=n, every=stride * n
+        )  # fmt: skip
+        return [
+            _caps(predictor, flat[place :: len(windows)], window, values, stride * step)
+            for place, window in enumerate(windows)
+        ]
+
+
+def _stride(windows: Sequence[Window], step: float) -> int:
+    """Steps between stored states: `STRIDE`, or a multiple on which all frames lie, as those of simulated runs do."""
+    at = np.concatenate([window.run.t[window.frames] - window.start for window in windows]) / step
+    common = int(np.gcd.reduce(np.round(at).astype(int))) if len(at) else STRIDE
+    return common if common > STRIDE and np.abs(at - np.round(at)).max() < TINY else STRIDE
 
 
 def _commands(predictor: Predictor, windows: Sequence[Window], values: np.ndarray, rows: int) -> Tensor:
@@ -78,23 +111,23 @@ def _commands(predictor: Predictor, windows: Sequence[Window], values: np.ndarra
     delays = np.array([one.command_delay + one.camera_delay for one in seen])
     logs = {id(window.run): CommandLog(window.run) for window in windows}
     made = {
-        (place, delay): logs[id(window.run)].rows(window.start, rows, step=predictor.step, delay=delay)[0]
+        (place, delay): logs[id(window.run)].means(window.start, rows, step=predictor.step, delay=delay)
         for place, window in enumerate(windows)
         for delay in set(delays.tolist())
     }
     return torch.as_tensor(np.stack([made[place, delay] for delay in delays.tolist() for place in range(len(windows))]))
 
 
-def _caps(predictor: Predictor, flat: Tensor, window: Window, values: np.ndarray) -> np.ndarray:
-    """End caps (k, frame, cap, 3) at the frames of a window, from its stored states (k, stored, NS), as seen."""
+def _caps(predictor: Predictor, flat: Tensor, window: Window, values: np.ndarray, every: float) -> np.ndarray:
+    """End caps (k, frame, cap, 3) at the frames of a window, from its states (k, stored, NS) every so many seconds."""
     import torch
 
     from r2s2r_cli.engine import end_caps
     from r2s2r_cli.engine.flat import unpack_state
     from r2s2r_cli.engine.hooks import effective
 
-    at = torch.as_tensor((window.run.t[window.frames] - window.start) / (predictor.step * STRIDE))
-    low = at.floor().long()
+    at = torch.as_tensor((window.run.t[window.frames] - window.start) / every)
+    low = (at + TINY).floor().long()
     share = (at - low)[None, :, None]
     states = flat[:, low] * (1 - share) + flat[:, low + 1] * share
     k, frames = states.shape[:2]

@@ -33,7 +33,12 @@ class CommandLog:
         A row is the mean of the delayed command over its step: so the derivative exists where a switch falls into it.
         """
         edges = start + step * np.arange(count + 1) - delay
-        return np.diff(self._integral(edges), axis=0) / step, -np.diff(self.at(edges), axis=0) / step
+        return self.means(start, count, step=step, delay=delay), -np.diff(self.at(edges), axis=0) / step
+
+    def means(self, start: float, count: int, *, step: float, delay: float) -> np.ndarray:
+        """The commands of `rows` without their derivatives."""
+        edges = start + step * np.arange(count + 1) - delay
+        return np.asarray(np.diff(self._integral(edges), axis=0) / step)
 
     def _integral(self, t: np.ndarray) -> np.ndarray:
         """Integral of the commands from the first row to t (n,) [s], (n, actuated)."""

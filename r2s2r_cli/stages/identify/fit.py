@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -19,11 +20,10 @@ from r2s2r_cli.stages.identify.solve.found_twice import cool_growing
 from r2s2r_cli.stages.identify.solve.horizon import Limits, solve_growing
 from r2s2r_cli.stages.identify.solve.levenberg import levenberg_marquardt
 from r2s2r_cli.stages.identify.solve.loss import LOSSES
-from r2s2r_cli.stages.identify.solve.population import HELD, Cooled, Cooling, cool
+from r2s2r_cli.stages.identify.solve.population import HELD, MEMBERS, TRIED, Cooled, Cooling, cool
 from r2s2r_cli.stages.identify.solve.record import Checkpoint, Counts, Progress, Solution
 from r2s2r_cli.stages.identify.solve.starts import multi_start, starts
 from r2s2r_cli.stages.identify.training import filtered_windows, training_windows
-from r2s2r_cli.stages.identify.trust.posterior import Posterior
 from r2s2r_cli.stages.identify.windows import Window
 
 if TYPE_CHECKING:
@@ -45,21 +45,25 @@ FIRST = 0.3
 """Of the first draw of a later round, in widths of the priors."""
 LOOKS = 4
 """Generations after which the residuals tell how far they are from independent noise."""
+ON_THE_WAY = 5
+"""Generations of a later round that is not the last, as cold as that gets."""
 HOTTER = 8.0
 """First temperature of a later round, in such inflations."""
+LANES = 8
+"""Simulations that the engine runs side by side on a core."""
 MOST_UNKNOWNS = 40
 """With more, a population that could tell their effects apart costs more than derivatives that mislead a little."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A finished fit. problem: at its last start states; solution: in its unknowns; values: (n,), units. posterior:
-    where they lie, None where nothing was drawn."""
+    """A finished fit. problem: at its last start states; solution: in its unknowns; values: (n,), units. drawn: their
+    covariance as candidates showed it, None where none were drawn."""
 
     problem: CapResiduals
     solution: Solution
     values: np.ndarray
-    posterior: Posterior | None = None
+    drawn: np.ndarray | None = None
 
 
 Told = Callable[[int, int, Progress], None]
@@ -148,10 +152,10 @@ def first_round(
     )  # fmt: skip
     if few:
         rest = slice(smooth, None) if smooth < len(stages) else slice(-1, None)
-        cooling = Cooling(members=max(Cooling.members, 2 * int(np.count_nonzero(problem.prior_sd > HELD))))
+        cooling = Cooling(members=members_for(problem))
         hear = None if progress is None else partial(_heard, progress, names[rest], cooling.generations)
         ways = cool_growing(stages[rest], solution.z, solution.normal, loss=loss, seed=seed, cooling=cooling, told=hear)
-        return _settled(problem, ways.best, recipe, seed, cooling.generations)
+        return _settled(problem, ways.best, recipe, seed, cooling.generations, ways.others)
     if problem.misfit(solution.z) < EXACT:
         # The model explains the data to their noise: no filter knows these start states as well as the fit does.
         problem = problem_of(predictor, windows, recipe, noise=0.0)
@@ -177,8 +181,9 @@ def later_round(
     problem = problem_of(predictor, windows, recipe)
     z = started(problem, values)
     wide = np.diag((FIRST * np.minimum(problem.prior_sd, START_SPREAD)) ** -2.0)
-    looks = Cooling(hottest=1.0, generations=LOOKS)
-    ends = Cooling(generations=recipe.cooled_generations)
+    members = members_for(problem)
+    looks = Cooling(members, hottest=1.0, generations=LOOKS)
+    ends = Cooling(members, generations=recipe.cooled_generations if final else ON_THE_WAY)
     both = looks.generations + ends.generations
     hear = (lambda offset, generation, cost: None) if progress is None else partial(_heard_later, progress, both)
     seen = cool(problem, z, wide, loss=loss, seed=seed, cooling=looks, told=partial(hear, 0))
@@ -208,13 +213,21 @@ def more_starts(
         return [(z0s[index], one) for one, index in zip(trials.solutions, trials.order, strict=True)]
     found = []
     inflation = spread_of(problem, fitted.solution, loss).inflation
-    cooling = Cooling(hottest=HOTTER * inflation, coldest=inflation, generations=recipe.cooled_generations)
+    cooling = Cooling(
+        members_for(problem), hottest=HOTTER * inflation, coldest=inflation, generations=recipe.cooled_generations
+    )
     for number, z0 in enumerate(z0s):
         wide = np.diag((FIRST * np.minimum(problem.prior_sd, START_SPREAD)) ** -2.0) * cooling.hottest
         hear = partial(_heard, progress, ("all",), cooling.generations, number, 0)
         end = cool(problem, z0, wide, loss=loss, seed=seed + number + 1, cooling=cooling, told=hear)
         found.append((z0, solution_at(problem, end.z, end, loss, cooling.generations)))
     return found
+
+
+def members_for(problem: CapResiduals) -> int:
+    """Candidates of a generation: more unknowns need more, or the regression cannot tell their effects apart."""
+    moving = int(np.count_nonzero(problem.prior_sd > HELD))
+    return max(MEMBERS, LANES * math.ceil((3 * moving + TRIED) / LANES) - TRIED)
 
 
 def problem_of(
@@ -234,10 +247,17 @@ def started(problem: CapResiduals, values: np.ndarray) -> np.ndarray:
     return z
 
 
-def _settled(problem: CapResiduals, cooled: Cooled, recipe: Recipe, seed: int, generations: int) -> Fit:
-    found = settle(problem, cooled, LOSSES[recipe.loss], seed=seed, generations=generations)
+def _settled(
+    problem: CapResiduals,
+    cooled: Cooled,
+    recipe: Recipe,
+    seed: int,
+    generations: int,
+    others: Sequence[np.ndarray] = (),
+) -> Fit:
+    found = settle(problem, cooled, LOSSES[recipe.loss], seed=seed, generations=generations, others=others)
     values = values_of(problem.frees, found.solution.z[: len(problem.frees)])
-    return Fit(problem, found.solution, values, found.posterior)
+    return Fit(problem, found.solution, values, found.drawn)
 
 
 def _heard(

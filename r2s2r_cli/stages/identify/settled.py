@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from r2s2r_cli.stages.identify.solve.population import Cooled
 from r2s2r_cli.stages.identify.solve.problem import Evaluation
 from r2s2r_cli.stages.identify.solve.record import Counts, Reason, Solution, names_on_bound
 from r2s2r_cli.stages.identify.trust.covariance import Covariance, covariance
-from r2s2r_cli.stages.identify.trust.posterior import Posterior, posterior
+from r2s2r_cli.stages.identify.trust.posterior import posterior
 
 AS_GOOD = 1.0
 """[nats per parameter, noise counted with the misfit] The mean of the posterior is taken where it costs no more than
@@ -22,33 +23,42 @@ that above the best candidate: it is the better estimate, unless it lies between
 
 @dataclass(frozen=True)
 class Settled:
-    """solution: at the mean of the posterior, or at the best candidate; posterior: None where nothing was drawn."""
+    """solution: at the mean of the posterior, or at the best candidate. drawn: covariance of the unknowns (n, n) as
+    candidates showed it."""
 
     solution: Solution
-    posterior: Posterior | None
+    drawn: np.ndarray
 
 
-def settle(problem: CapResiduals, cooled: Cooled, loss: Loss, *, seed: int, generations: int) -> Settled:
-    """generations: that were allowed. Raises NumericalError where the mean cannot be simulated."""
+def settle(
+    problem: CapResiduals, cooled: Cooled, loss: Loss, *, seed: int, generations: int, others: Sequence[np.ndarray] = ()
+) -> Settled:
+    """generations: that were allowed. others: unknowns where other ways ended that are about as good.
+
+    With too many unknowns to draw for, the ends of the ways show where else the best may lie: their scatter comes to
+    the curvature that the population saw. Raises NumericalError where the mean cannot be simulated.
+    """
     own = solution_at(problem, cooled.z, cooled, loss, generations)
     inflation = spread_of(problem, own, loss).inflation
-    found = posterior(problem, cooled.z, np.linalg.inv(cooled.normal), loss=loss, temperature=inflation, seed=seed)
+    narrow = np.linalg.inv(cooled.normal)
+    found = posterior(problem, cooled.z, narrow, loss=loss, temperature=inflation, seed=seed)
     if found is None:
-        return Settled(own, None)
+        off = np.array([cooled.z, *others]) - np.mean([cooled.z, *others], axis=0)
+        return Settled(own, inflation * narrow + off.T @ off / max(len(others), 1))
     best = cooled.z if cooled.cost <= found.cost else found.best
     lowest = min(cooled.cost, found.cost)
     mean = np.clip(found.mean, problem.lower, problem.upper)
     at_mean = solution_at(problem, mean, cooled, loss, generations)
     if at_mean.cost <= lowest + AS_GOOD * inflation * len(problem.names):
-        return Settled(at_mean, found)
-    return Settled(solution_at(problem, best, cooled, loss, generations), found)
+        return Settled(at_mean, found.covariance)
+    return Settled(solution_at(problem, best, cooled, loss, generations), found.covariance)
 
 
-def spread_of(problem: CapResiduals, solution: Solution, loss: Loss, drawn: Posterior | None = None) -> Covariance:
+def spread_of(problem: CapResiduals, solution: Solution, loss: Loss, drawn: np.ndarray | None = None) -> Covariance:
     """Covariance of the parameters, residuals of a target interval counted together; no less than what was drawn."""
     return covariance(
         problem, solution, problem.frees, loss=loss, block=problem.block, cluster=problem.cluster,
-        drawn=None if drawn is None else drawn.covariance,
+        drawn=drawn,
     )  # fmt: skip
 
 

@@ -13,9 +13,9 @@ from r2s2r_cli.stages.identify.commands import CommandLog
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.found import ParameterFound
 from r2s2r_cli.stages.identify.free import Free, Mapping, select
-from r2s2r_cli.stages.identify.free.extend import extended, name_of
+from r2s2r_cli.stages.identify.free.extend import PLUS, extended, name_of
 from r2s2r_cli.stages.identify.predict import Predictor
-from r2s2r_cli.stages.identify.recipe import Recipe, default_free, recipe_of
+from r2s2r_cli.stages.identify.recipe import Recipe, default_fixed, default_free, recipe_of
 from r2s2r_cli.stages.identify.request import Checkpoint, Progress, Request, silent
 from schemas.config import IdentifySettings
 from schemas.robot import Robot
@@ -50,12 +50,21 @@ class Task:
         """What each run is, of those that say so."""
         return {run.name: run.nature for run in self.runs if run.nature}
 
+    @property
+    def given(self) -> dict[str, float]:
+        """Values of parameters that are not fitted: of the request, and those that the default set goes with."""
+        asked = (*self.settings.free, *self.request.free)
+        own = default_fixed(self.robot) if all(spec.startswith(PLUS) for spec in asked) else {}
+        named = {name_of(spec.removeprefix(PLUS)).partition(".")[0] for spec in asked}
+        kept = {name: value for name, value in own.items() if not {name, name.partition("_")[0]} & named}
+        return {**kept, **self.request.fixed}
+
     def predictor(self, frees: Sequence[Free]) -> Predictor:
         """The engine with these free numbers, those that were given, and the effects that were asked for."""
         from r2s2r_cli.stages.model import structure_of
 
         structure = replace(structure_of(self.robot), rod_contact=self.settings.rod_contact)
-        mapping = Mapping(self.robot, frees, self.request.effects, fixed=self.request.fixed, structure=structure)
+        mapping = Mapping(self.robot, frees, self.request.effects, fixed=self.given, structure=structure)
         return Predictor(mapping, step=self.recipe.step, cache_dir=self.cache_dir)
 
     def fixed(self) -> tuple[ParameterFound, ...]:
@@ -65,9 +74,10 @@ class Task:
         known, nan = catalogue(self.robot), float("nan")
         return tuple(
             ParameterFound(
-                replace(known[name], start=value), value, nan, nan, nan, (nan, nan), None, "fixed by hand"
+                replace(known[name], start=value), value, nan, nan, nan, (nan, nan), None,
+                "fixed by hand" if name in self.request.fixed else "goes with the default set",
             )
-            for name, value in self.request.fixed.items()
+            for name, value in self.given.items()
         )  # fmt: skip
 
 

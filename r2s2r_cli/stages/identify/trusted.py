@@ -36,7 +36,7 @@ def sureness(fitted: Fit, others: np.ndarray, *, loss: str, seed: int) -> Surene
     """Of a finished fit. others: parameters (k, p), z, of other fits that explain the data about as well."""
     problem, solution, frees = fitted.problem, fitted.solution, fitted.problem.frees
     robust, group = LOSSES[loss], problem.cluster
-    spread = spread_of(problem, solution, robust, fitted.posterior)
+    spread = spread_of(problem, solution, robust, fitted.drawn)
     after = identifiability(
         problem, solution.z, frees,
         evaluation=Evaluation(solution.residual, solution.jacobian, problem.block), weight=solution.weight,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from r2s2r_cli.stages.identify import candidates
-from r2s2r_cli.stages.identify.candidates import predict_candidates
+from r2s2r_cli.stages.identify.candidates import longest, predict_candidates
 from r2s2r_cli.stages.identify.offsets import StartSpread, count
 from r2s2r_cli.stages.identify.residuals import CapResiduals
 from r2s2r_cli.stages.identify.windows import window
@@ -30,6 +32,21 @@ def test_each_candidate_is_what_it_is_alone(monkeypatch: pytest.MonkeyPatch) -> 
         for k, one in enumerate(values):
             alone = predictor.predict(windows, one, None if moved is None else moved[k]).p_WE
             np.testing.assert_allclose(found[k], alone, atol=1e-12)
+
+
+def test_windows_with_one_start_are_simulated_once() -> None:
+    """A short window is the beginning of a longer one with the same start; another start is another simulation."""
+    predictor = predictor_of(*SPECS)
+    run, state = walk(3), start()
+    windows = [window(run, numbers, state) for numbers in ((1,), (1, 2, 3), (1, 2))]
+    windows.append(window(run, (1, 2), replace(state)))
+    assert longest(windows) == [1, 1, 1, 3]
+    values = np.array([[0.7, 0.7, 0.02, 0.001], [0.6, 0.8, 0.0, 0.0]])
+    before = predictor.rollouts
+    found = predict_candidates(predictor, windows, values)
+    assert predictor.rollouts - before == 2 * 2
+    for k, one in enumerate(values):
+        np.testing.assert_allclose(found[k], predictor.predict(windows, one).p_WE, atol=1e-12)
 
 
 def test_residuals_of_many_points_are_those_of_each() -> None:

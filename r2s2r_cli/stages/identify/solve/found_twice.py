@@ -20,22 +20,26 @@ ROUGH = 1.5
 HOTTER = 1.5
 """Each way begins so much hotter than the one before."""
 COOLING = Cooling()
+MORE = 16
+"""Candidates more in a generation of a later way: the problem has shown that it is not easy."""
 CHANCES = 6
 """Ways, at most."""
 
 
 @dataclass(frozen=True)
 class Ways:
-    """best: where the best way ended. costs: of all ways at the end. evaluations: of all, of points at any horizon."""
+    """best: where the best way ended. others: unknowns (n,) at the ends of those that are about as good. costs: of all
+    ways at the end. evaluations: of all, of points at any horizon."""
 
     best: Cooled
+    others: tuple[np.ndarray, ...]
     costs: tuple[float, ...]
     evaluations: int
 
     @property
     def twice(self) -> bool:
         """Whether a second way ended at about the best cost."""
-        return sum(cost < min(self.costs) + AGREE for cost in self.costs) > 1
+        return bool(self.others)
 
 
 def cool_growing(
@@ -60,13 +64,17 @@ def cool_growing(
     for chance in range(chances):
         z, curvature = z0, normal
         for number, problem in enumerate(stages):
-            own = replace(cooling, hottest=cooling.hottest * HOTTER**chance)
+            own = replace(
+                cooling, hottest=cooling.hottest * HOTTER**chance, members=cooling.members + MORE * (chance > 0)
+            )
             heard = None if told is None else partial(told, chance, number)
             own_seed = 1000 * seed + 100 * chance + number
             at = cool(problem, z, curvature, loss=loss, seed=own_seed, cooling=own, told=heard)
             z, curvature, spent = at.z, at.normal, spent + at.evaluations
         ends.append(at)
-        ways = Ways(min(ends, key=lambda one: one.cost), tuple(one.cost for one in ends), spent)
+        best = min(ends, key=lambda one: one.cost)
+        others = tuple(one.z for one in ends if one is not best and one.cost < best.cost + AGREE)
+        ways = Ways(best, others, tuple(one.cost for one in ends), spent)
         easy = chance == 0 and at.generations <= EASY and at.rough <= ROUGH
         if easy or ways.twice:
             break

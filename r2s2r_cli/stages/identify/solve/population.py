@@ -26,6 +26,10 @@ RIDGE = 1e-3
 """Of the regression, on slopes in standard deviations of the draw: with few good candidates it stays defined."""
 CLOSE = 1.0
 """[nats] The regression foretells the cost of its own minimum to that: nothing is rough on the scale of the draw."""
+MEMBERS = 26
+"""Candidates of a generation, with the `TRIED` ones a multiple of what the engine simulates side by side."""
+TRIED = 6
+"""Points on the way to the minimum of a regression, tried beside the next draw."""
 GAIN = 0.5
 """[nats] A generation at the end that gains less is the last but one."""
 
@@ -45,7 +49,7 @@ class Cooling:
     """members: candidates of a generation. hottest: first temperature; coldest: last. generations: at most. rate: what
     is left of the temperature after a generation that gains little for it."""
 
-    members: int = 32
+    members: int = MEMBERS
     hottest: float = 40.0
     coldest: float = 1.0
     generations: int = 16
@@ -223,8 +227,8 @@ def _weights(problem: Population, residual: np.ndarray, loss: Loss) -> np.ndarra
 
 
 def _tried(problem: Problem, best: np.ndarray, moving: np.ndarray, middle: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """The best point, the minimum of the regression, and points on the ways there, (6, n)."""
-    found = np.tile(best, (6, 1))
+    """The best point, the minimum of the regression, and points on the ways there, (TRIED, n)."""
+    found = np.tile(best, (TRIED, 1))
     from_best = middle + step - best[moving]
     found[1:, moving] = [
         middle + step, middle + 0.5 * step, middle, best[moving] + 0.5 * from_best, best[moving] + 0.2 * from_best,

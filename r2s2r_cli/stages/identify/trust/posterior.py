@@ -16,7 +16,7 @@ from r2s2r_cli.stages.identify.solve.population import HELD, Population, costs_o
 MEMBERS, ROUNDS = 32, 3
 """Of a draw, and draws; up to `MOST_ROUNDS` where few of the candidates count."""
 MOST_ROUNDS = 8
-ENOUGH = 15.0
+ENOUGH = 20.0
 """Candidates that count (effective sample size)."""
 KEPT = 0.4
 """Share of the first covariance in those drawn from: few candidates must not make the next draw too narrow."""

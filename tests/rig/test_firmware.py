@@ -268,7 +268,7 @@ def test_a_command_of_the_future_waits_for_its_time() -> None:
 
 
 def test_how_ticks_are_cut_does_not_matter() -> None:
-    """One tick of 0.4 s gives the samples of twenty of 20 ms; only the sensors see the length at other instants, to a step."""
+    """One tick of 0.4 s gives the samples of twenty of 20 ms; what differs is less than a step."""
     table = {"converter": "exact"}
     (a, _), (b, _) = make(seed=2, sensors=table), make(seed=2, sensors=table)
     whole, parts = a.tick(0.4), run(b, 0.4)

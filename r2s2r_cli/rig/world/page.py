@@ -83,6 +83,26 @@ def documented() -> Iterator[tuple[str, str]]:
     yield from _keys("", World)
 
 
+def undocumented() -> Iterator[tuple[str, str]]:
+    """(table, key) of everything without a text of its own, faults and items of lists included."""
+    yield from _silent("", World)
+    for kind in get_args(get_args(Fault)[0]):
+        name = get_args(kind.model_fields["kind"].annotation)[0]
+        yield from ((table, key) for table, key in _silent(name, kind) if key != "kind")
+
+
+def _silent(table: str, model: type[BaseModel]) -> Iterator[tuple[str, str]]:
+    texts = _attribute_texts(model)
+    for name, field in model.model_fields.items():
+        inner, items = _table_of(field), _items_of(field)
+        if inner is not None:
+            yield from _silent(f"{table}.{name}".strip("."), inner)
+        elif not texts.get(name):
+            yield table, name
+        if items is not None:
+            yield from _silent(f"{table}.{name}".strip("."), items)
+
+
 def _keys(table: str, model: type[BaseModel]) -> Iterator[tuple[str, str]]:
     for name, field in model.model_fields.items():
         inner = _table_of(field)

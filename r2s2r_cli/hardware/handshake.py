@@ -64,7 +64,7 @@ def shake(link: Link) -> None:
     """Wait for the robot and look at what it says of itself. Raises LinkError, or SafetyStop where it is latched."""
     heard = _Heard()
     begin = time.monotonic()
-    end, again, hello = begin + link.handshake_timeout, begin, None
+    end, again, hello, addressed = begin + link.handshake_timeout, begin, None, False
     while not _complete(link, heard):
         now = time.monotonic()
         if now >= end:
@@ -77,6 +77,8 @@ def shake(link: Link) -> None:
                 hello = line.seq
         message = link.transport.receive(max(0.0, min(again, end) - time.monotonic()))
         if message is not None:
+            if message.source is not None and not addressed:
+                addressed, again = True, begin  # only now is it known where to say hello
             heard.note(link.take(message), message.line, hello)
             _refuse(link, heard)
     link.greeting = heard.greeting

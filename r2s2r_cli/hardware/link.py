@@ -226,7 +226,7 @@ class Link:
         if numbers and event.seq is not None:
             if isinstance(event, Greeting):
                 numbers.greeted(event.seq)
-            elif not numbers.new(event.seq):
+            elif not numbers.new(event.seq, event.board if isinstance(event, Reading) else None):
                 return None
         self._tally.received += 1
         match event:

@@ -31,20 +31,27 @@ class Numbers:
     def restart(self) -> None:
         """The other side counts anew."""
         self._last: int | None = None
+        self._of_board: dict[int, int] = {}
         self._order: deque[int] = deque()
         self._seen: set[int] = set()
 
-    def new(self, seq: int) -> bool:
-        """Whether this line is to be used: it is newer than all before it."""
+    def new(self, seq: int, board: int | None = None) -> bool:
+        """Whether this line is to be used: it is newer than all before it, or than all of its board.
+
+        Datagrams of two boards may overtake each other; that is counted, and does no harm.
+        """
         if seq in self._seen:
             self.repeated += 1
             return False
+        newest_of_board = board is not None and (seq - self._of_board.get(board, seq - 1)) % _NUMBERS < _HALF
+        if board is not None and newest_of_board:
+            self._of_board[board] = seq
         step = 1 if self._last is None else (seq - self._last) % _NUMBERS
         if step >= _HALF:
             self.reordered += 1
             self.lost = max(0, self.lost - 1)  # it was counted when it was missed
             self._remember(seq)
-            return False
+            return newest_of_board
         self.lost += step - 1
         self._last = seq
         self._remember(seq)

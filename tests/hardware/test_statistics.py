@@ -69,3 +69,12 @@ def test_latency_and_silence() -> None:
     found = tally.snapshot(2)
     assert found.latency_median == pytest.approx(0.004) and found.sent == 2000 and found.overlong == 2
     assert found.gap_max == pytest.approx(2.006) and math.isfinite(found.clock_offset or math.nan)
+
+
+def test_boards_may_overtake_each_other() -> None:
+    """A late line is used where it is the newest of its board, and counted as late all the same."""
+    numbers = Numbers()
+    arrivals = [(65535, 0), (1, 1), (0, 0), (3, 0), (2, 0), (4, 1)]
+    assert [numbers.new(seq, board) for seq, board in arrivals] == [True, True, True, True, False, True]
+    assert (numbers.lost, numbers.reordered) == (0, 2)
+    assert not numbers.new(0, 0) and numbers.repeated == 1

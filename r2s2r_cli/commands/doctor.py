@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from r2s2r_cli import __version__
+from r2s2r_cli.commands.doctor_camera import camera
 from r2s2r_cli.commands.doctor_ports import ports
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import GateError, R2S2RError
@@ -145,3 +146,4 @@ def _hdf5() -> Probe:
 
 
 doctor_app.command("ports")(ports)
+doctor_app.command("camera")(camera)

@@ -16,17 +16,20 @@ from schemas.robot import HsvRange, Robot
 
 RAISED_M = 0.008
 """What is lower than this lies on the ground: a distractor, or noise."""
+HOLE_PX = 7
+"""Holes in the depth up to this wide are what is around them; a cap is 14 pixels wide from 1.4 m."""
 _UNKNOWN_SHARE = 0.3
 _RATE_SHARE = 0.9
 
 
 @dataclass(frozen=True)
 class Looked:
-    """What was found, and what a picture of it needs: the middle frame, its points, and the pixels of every rod."""
+    """What was found, and what a picture of it needs: the middle frame, heights over the ground [m] (v, u), NaN where
+    depth is unknown, and the pixels of every rod."""
 
     result: CameraResult
     frame: Frame
-    ground: Ground | None
+    height: np.ndarray | None
     masks: dict[str, np.ndarray]
     remarks: tuple[str, ...]
 
@@ -51,10 +54,10 @@ def look(
     ranges = {color.rod: color for color in robot.colors} if robot else {}
     marked = {box.rod for box in boxes}
     ranges |= {rod: measure_range(pictures, boxes, rod) for rod in rods if rod in marked}
-    raised = np.ones(middle.depth.shape, dtype=bool)
+    raised, height = np.ones(middle.depth.shape, dtype=bool), None
     if ground is not None:
         height = ground.height(points)
-        raised = ~(height < max(RAISED_M, 3 * ground.noise_sd))  # unknown depth counts as raised
+        raised = ~_low(height, max(RAISED_M, 3 * ground.noise_sd))
     hsv = hsv_of(middle.color)
     masks = {rod: in_range(hsv, ranges[rod]) for rod in rods if rod in ranges}
     seen = tuple(_rod(rod, ranges.get(rod), rod in marked, masks.get(rod), raised, middle.depth > 0) for rod in rods)
@@ -68,11 +71,20 @@ def look(
         ground=None if ground is None else _ground(ground), rods=seen,
     )  # fmt: skip
     shown = {rod: mask & raised for rod, mask in masks.items()}
-    return Looked(result, middle, ground, shown, tuple(_remarks(result, list(ranges.values()))))
+    return Looked(result, middle, height, shown, tuple(_remarks(result, list(ranges.values()))))
+
+
+def _low(height: np.ndarray, limit: float) -> np.ndarray:
+    """Pixels that lie on the ground: lower than the limit, or unknown in the midst of such."""
+    import cv2
+
+    low = height < limit
+    closed = cv2.morphologyEx(low.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((HOLE_PX, HOLE_PX), np.uint8))
+    return np.asarray(low | ((closed > 0) & ~np.isfinite(height)))
 
 
 def _pace(frames: Sequence[Frame]) -> tuple[float, float, float]:
-    """Rate by the camera's clock [Hz]; host's clock minus the camera's, the smallest, and largest minus smallest [s]."""
+    """Rate by the camera's clock [Hz]; host's clock minus the camera's, the least, and most minus least [s]."""
     t = np.array([frame.t_device for frame in frames])
     number = np.array([frame.number for frame in frames])
     delay = np.array([frame.t_host for frame in frames]) - t

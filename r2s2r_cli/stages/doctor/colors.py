@@ -19,7 +19,8 @@ SATURATION_SPARE, VALUE_SHARE = 30.0, 0.6
 PATCH_PX = 8
 """A smaller connected patch is noise."""
 _LIKE_HUE = 12.0
-_LEAST_PIXELS = 12
+_LEAST_PIXELS = 40
+"""Over all pictures that are looked at (five)."""
 _LEAST_SATURATION = 50.0
 
 
@@ -61,17 +62,21 @@ def in_range(hsv: np.ndarray, wanted: HsvRange) -> np.ndarray:
 
 
 def measure_range(pictures: Sequence[np.ndarray], boxes: Sequence[Box], rod: str) -> HsvRange:
-    """The range of a rod from HSV pictures and the boxes on it. Raises InputError where there is no colour in them."""
-    taken = [_colored(hsv[box.area], box) for hsv in pictures for box in boxes if box.rod == rod]
-    pixels = np.concatenate(taken) if taken else np.empty((0, 3))
-    if len(pixels) < _LEAST_PIXELS:
-        first = next((box for box in boxes if box.rod == rod), None)
-        raise InputError(
-            f"there is no colour to be seen where rod {rod} was marked",
-            where="--click or --box" if first is None else f"u {first.u0} .. {first.u1}, v {first.v0} .. {first.v1}",
-            expected=f"{_LEAST_PIXELS} coloured pixels (saturation {_LEAST_SATURATION:g} and more)",
-            received=str(len(pixels)), hint="look at the preview for the pixel coordinates of the caps",
-        )  # fmt: skip
+    """The range of a rod from HSV pictures and the boxes on it. Raises InputError for a box without colour."""
+    taken = []
+    for box in boxes:
+        if box.rod == rod:
+            found = np.concatenate([_colored(hsv[box.area], box) for hsv in pictures])
+            if len(found) < _LEAST_PIXELS:
+                raise InputError(
+                    f"there is no colour to be seen where rod {rod} was marked",
+                    where=f"u {box.u0} .. {box.u1}, v {box.v0} .. {box.v1}",
+                    expected=f"{_LEAST_PIXELS} coloured pixels (saturation {_LEAST_SATURATION:g} and more)",
+                    received=str(len(found)),
+                    hint="draw what the camera sees for the coordinates of the caps: --preview see.png",
+                )  # fmt: skip
+            taken.append(found)
+    pixels = np.concatenate(taken)
     angle = pixels[:, 0] * (np.pi / 90.0)
     middle = float(np.arctan2(np.median(np.sin(angle)), np.median(np.cos(angle))) * 90.0 / np.pi) % 180.0
     off = np.abs(_apart(pixels[:, 0], middle))

@@ -77,7 +77,9 @@ class Rig:
                 self._truth = TruthLog(outlet.truth, caps=robot.n_caps, cables=len(robot.cables),
                                        motors=len(robot.motors), period=tick)  # fmt: skip
             if outlet.camera_port is not None:
-                self._camera = CameraService(robot, world.seen(), seed=world.seed, host=outlet.host,
+                # Over UDP `host` is somebody else, to whom the boards send.
+                at = outlet.host if outlet.link == "tcp" else _LOCALHOST
+                self._camera = CameraService(robot, world.seen(), seed=world.seed, host=at,
                                              port=outlet.camera_port, lossless=outlet.lock)  # fmt: skip
         except BaseException:
             self.close()

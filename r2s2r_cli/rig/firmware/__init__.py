@@ -4,6 +4,7 @@
 acknowledgement) is the business of `rig/wire`.
 """
 
+from r2s2r_cli.rig.firmware.bench import points_csv as points_csv
 from r2s2r_cli.rig.firmware.firmware import Firmware as Firmware
 from r2s2r_cli.rig.firmware.sample import BoardSample as BoardSample
 from r2s2r_cli.rig.firmware.sensors import nominal_calibration as nominal_calibration

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import zlib
-
 import numpy as np
 
 from r2s2r_cli.rig.firmware.board import Board
+from r2s2r_cli.rig.firmware.generators import generator
 from r2s2r_cli.rig.firmware.inertial import InertialUnit
 from r2s2r_cli.rig.firmware.layout import posts
 from r2s2r_cli.rig.firmware.sample import BoardSample
@@ -33,11 +32,11 @@ class Firmware:
         self._rods, self._motors, self._sensors = len(robot.rods), len(robot.motors), len(robot.sensors)
         self._sign = np.array([motor.sign for motor in robot.motors], dtype=float)
         self._boards = [
-            Board(i, post, world, _generator(world, f"board {i}"))
+            Board(i, post, world, generator(world, f"board {i}"))
             for i, post in enumerate(posts(robot, world.boards.layout))
         ]
-        self._units = [InertialUnit(world.inertial, _generator(world, f"imu {i}")) for i in range(len(self._boards))]
-        self._stretch = StretchSensors(robot, world, _generator(world, "sensors"))
+        self._units = [InertialUnit(world.inertial, generator(world, f"imu {i}")) for i in range(len(self._boards))]
+        self._stretch = StretchSensors(robot, world, generator(world, "sensors"))
         self._stretch.follow(plant.t, plant.sensed())
         self._duty = np.zeros(self._motors)
         self._later: list[tuple[float, np.ndarray]] = []
@@ -131,7 +130,3 @@ class Firmware:
             board=board.number, t=t, t_board=board.clock(t), pF=pF, encoder=encoder, a_B=a_B, w_WB=w_WB, q_WB=q_WB,
             battery=self._settings.supply_v * self._plant.winches.share, status=board.greeting(t),
         )  # fmt: skip
-
-
-def _generator(world: World, name: str) -> np.random.Generator:
-    return np.random.default_rng([world.seed, zlib.crc32(name.encode())])

@@ -73,6 +73,24 @@ class StretchSensors:
             self._y = x.copy()
         self._x, self._t = x, t
 
+    @property
+    def working_range(self) -> tuple[np.ndarray, np.ndarray]:
+        """Shortest and longest length of the working range of every sensor [m], (sensor,)."""
+        return self._middle - self._half, self._middle + self._half
+
+    def on_the_bench(self, length: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Capacitances [pF] of sensors that are held at `length` [m], (sensor,), on a day without offset and drift."""
+        noise = self._settings.noise_sd_m * rng.standard_normal(len(length))
+        return self._pF(self._bent(length) + noise, np.arange(len(length)))
+
+    def _bent(self, length: np.ndarray) -> np.ndarray:
+        s = np.clip((length - self._middle) / self._half, -1.0, 1.0)
+        return np.asarray(length + self._bow * (2.0 * s * s - 1.0))
+
+    def _pF(self, shown: np.ndarray, i: np.ndarray) -> np.ndarray:
+        pF = PICO * (self._slope[i] * shown + self._offset[i])
+        return converted(pF) if self._settings.converter == "10 bit" else np.asarray(pF)
+
     def _drift(self, t: float) -> np.ndarray:
         """At the rig's time t [s]: a walk from second to second, straight in between, however often it is asked for."""
         whole, part = divmod(max(t, 0.0), 1.0)
@@ -85,15 +103,12 @@ class StretchSensors:
     def read(self, t: float, which: tuple[int, ...]) -> np.ndarray:
         """Capacitances of some sensors [pF], in that order."""
         i = np.array(which, dtype=int)
-        s = np.clip((self._y[i] - self._middle[i]) / self._half[i], -1.0, 1.0)
-        shown = self._y[i] + self._day[i] + self._drift(t)[i] + self._bow[i] * (2.0 * s * s - 1.0)
+        shown = self._bent(self._y)[i] + self._day[i] + self._drift(t)[i]
         for jump in self._jumps:
             if jump.on(t):
                 shown = shown + np.where(i == jump.sensor, jump.by_m, 0.0)
         shown = shown + self._settings.noise_sd_m * self._rng.standard_normal(len(i))
-        pF = PICO * (self._slope[i] * shown + self._offset[i])
-        if self._settings.converter == "10 bit":
-            pF = converted(pF)
+        pF = self._pF(shown, i)
         again = (self._rng.random(len(i)) < self._settings.dropout_share) & np.isfinite(self._last[i])
         for frozen in self._frozen:
             if frozen.on(t):

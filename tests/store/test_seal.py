@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from r2s2r_cli.errors import ArtifactError
 from r2s2r_cli.store import seal as module
 from r2s2r_cli.store.journal import Journal
 from r2s2r_cli.store.read import read_artifact
-from r2s2r_cli.store.seal import seal
+from r2s2r_cli.store.seal import Late, seal
 from r2s2r_cli.store.write import write_artifact
 from schemas.versions import KINDS, MIGRATIONS
 from tests.support.builders import materialised, provenance, recording
@@ -48,6 +49,32 @@ def test_all_rows_of_all_streams_are_sealed(tmp_path: Path) -> None:
     check_rows(target, 700)
     assert result.rows == counts(700) and (result.torn_bytes, result.lost_bytes) == (0, 0)
     assert list(tmp_path.iterdir()) == [target]
+
+
+def test_what_is_known_late_is_sealed_with_it(tmp_path: Path) -> None:
+    """Report, duration and drawings go into the provenance, attributes to their group; a run not begun is left out."""
+    journal, target = paths(tmp_path)
+    begun = head()
+    with Journal(journal, replace(begun, groups={**begun.groups, "runs/never": dict(begun.groups[RUN])})) as rows:
+        append(rows, 0)
+    late = Late(12.5, {"runs": 1}, ("10-record.html",), {RUN: {"start_unix": 7.0}})
+    result = seal(journal, target, late=late)
+    assert result.header is not None
+    made = result.header.provenance
+    assert (made.wall_s, made.report, made.drawings) == (12.5, {"runs": 1}, ("10-record.html",))
+    _, data = read_artifact(target, "recording")
+    assert data.runs() == ["walk"] and data.groups[RUN].attributes["start_unix"] == 7.0
+
+
+def test_a_recovery_after_sealing_knows_its_own_artifact(tmp_path: Path) -> None:
+    """Killed between sealing with a report and tidying up: the journal's artifact is recognised without the report."""
+    journal, target = paths(tmp_path)
+    write(journal, 10)
+    kept = journal.read_bytes()
+    first = seal(journal, target, late=Late(1.0, {"runs": 1}))
+    journal.write_bytes(kept)
+    again = seal(journal, target, recovered=True)
+    assert again.header == first.header and not journal.exists()
 
 
 def test_provenance_is_the_recorder_s(tmp_path: Path) -> None:

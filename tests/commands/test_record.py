@@ -1,0 +1,207 @@
+"""`record` in a project with a robot of straight lines: what it writes, what it refuses, how it ends."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.commands import record_run
+from r2s2r_cli.devices.link import LinkError, Sample
+from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.read import read_artifact
+from schemas.robot import Robot
+from tests.commands.conftest import document, invoke
+from tests.support.fake_robot import FakeLink, calibrated
+
+RECORDING = "iterations/001/10-record.h5"
+ASK = ("record", "--random", "2", "--port", "fake", "--set", "record.rest_s=0.3")
+Maker = Callable[..., FakeLink]
+
+
+def with_lines(text: str, robot: Robot) -> str:
+    """robot.toml with the sensors' lines of `robot`."""
+    lines = iter(f"slope_f_per_m = {s.slope_f_per_m!r}\noffset_f = {s.offset_f!r}\n" for s in robot.sensors)
+    return re.sub(r"\[\[sensors\]\].*\ncable = \d+\n", lambda found: found[0] + next(lines), text)
+
+
+@pytest.fixture
+def robot_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A project of a calibrated robot, as the working directory."""
+    root = tmp_path / "robot"
+    assert invoke("init", str(root)).exit_code == 0
+    path = root / "robot.toml"
+    path.write_text(with_lines(path.read_text(), calibrated()))
+    monkeypatch.chdir(root)
+    return root
+
+
+@pytest.fixture
+def link(monkeypatch: pytest.MonkeyPatch) -> Maker:
+    """Puts a robot of straight lines behind every port; the keywords are those of FakeLink. Returns the link."""
+
+    def put(**options: Any) -> FakeLink:
+        made = FakeLink(calibrated(), **options)
+        monkeypatch.setattr("r2s2r_cli.hardware.open_link.open_link", lambda *_, **__: made)
+        return made
+
+    return put
+
+
+def test_a_recording_is_whole_and_valid(robot_project: Path, link: Maker) -> None:
+    """Two repeats: sealed runs with policy, intervals and clocks, a report, a picture each, and nothing to validate."""
+    link()
+    result = document(*ASK, "--repeats", "2")
+    assert result["state"] == "done" and result["artifact"] == RECORDING
+    assert [run["ended"] for run in result["report"]["runs"]] == ["complete", "complete"]
+    header, data = read_artifact(robot_project / RECORDING, "recording")
+    assert data.runs() == ["random-0-1", "random-0-2"]
+    for run in data.runs():
+        attributes = data.groups[f"runs/{run}"].attributes
+        assert attributes["origin"] == "robot" and attributes["clock"] == "host" and attributes["start_unix"] > 1.6e9
+        intervals, policy = data.group(run, "intervals"), data.group(run, "policy")
+        assert intervals is not None and policy is not None
+        assert np.array_equal(intervals["target"], policy["target"])
+    assert header.provenance.seed == 0 and header.provenance.report == result["report"]
+    assert all((robot_project / name).exists() for name in result["drawings"])
+    assert len(result["drawings"]) == 3
+    found = document("validate", RECORDING)
+    assert [one for one in found["findings"] if one["importance"] == "error"] == []
+
+
+def test_a_recording_does_not_go_stale(robot_project: Path, link: Maker) -> None:
+    """Other settings and another robot.toml later: what the robot did stays what it did."""
+    link()
+    document(*ASK, "--no-draw")
+    text = (robot_project / "project.toml").read_text()
+    (robot_project / "project.toml").write_text(text.replace("rest_s = 2.0", "rest_s = 9.0"))
+    path = robot_project / "robot.toml"
+    path.write_text(path.read_text().replace("rate_hz = 50.0", "rate_hz = 40.0"))
+    (state,) = document("status")["artifacts"]
+    assert state["state"] == "fresh" and state["stage"] == "record"
+
+
+def test_nothing_is_overwritten(robot_project: Path, link: Maker) -> None:
+    """A second recording is refused before anything moves; with --force the first keeps another name."""
+    first = link()
+    document(*ASK, "--no-draw")
+    before = read_header(robot_project / RECORDING).content_sha256
+    made = link()
+    refused = invoke(*ASK)
+    assert refused.exit_code == 2 and "--iteration 2" in refused.stderr
+    assert made.commands == [] and first.commands != []
+    document(*ASK, "--no-draw", "--force", "--seed", "1")
+    assert read_header(robot_project / f"{RECORDING}.replaced").content_sha256 == before
+    assert read_header(robot_project / RECORDING).content_sha256 != before
+
+
+def test_a_dead_link_leaves_a_sealed_recording_and_exit_code_5(robot_project: Path, link: Maker) -> None:
+    """The port dies in the middle: motors stopped, all until then sealed, port and next step in the message."""
+
+    def die(number: int, sample: Sample) -> Sample:
+        if number > 60:
+            raise LinkError(
+                "the port is gone", where="fake", expected="a robot", received="EOF", hint="r2s2r doctor ports"
+            )
+        return sample
+
+    made = link(on_read=die)
+    result = invoke(*ASK, "--no-draw")
+    assert result.exit_code == 5
+    assert (
+        "the port is gone" in result.stderr and "where: fake" in result.stderr and "r2s2r doctor ports" in result.stderr
+    )
+    assert not made.driven.any()
+    header, data = read_artifact(robot_project / RECORDING, "recording")
+    sensors = data.group("random-0", "sensors")
+    assert sensors is not None and len(sensors["t"]) == 60
+    assert header.provenance.report["runs"][0]["ended"] == "the port is gone"
+    assert list((robot_project / "iterations" / "001").glob("*.journal")) == []
+
+
+def test_ctrl_c_seals_what_there_is(robot_project: Path, link: Maker) -> None:
+    """An interrupt between two samples: exit code 130, motors off, the recording sealed."""
+
+    def interrupt(number: int, sample: Sample) -> Sample:
+        if number == 40:
+            raise KeyboardInterrupt
+        return sample
+
+    made = link(on_read=interrupt)
+    result = invoke(*ASK, "--no-draw")
+    assert result.exit_code == 130 and "sealed" in result.stderr
+    assert not made.driven.any()
+    assert read_header(robot_project / RECORDING).provenance.report["runs"][0]["ended"] == "interrupted"
+
+
+def test_a_stuck_sensor_stops_the_robot(robot_project: Path, link: Maker) -> None:
+    """0.20 pF from the middle on: the duty of the host ends the run with exit code 5, within 250 ms of the run."""
+
+    def stuck(number: int, sample: Sample) -> Sample:
+        capacitance = sample.capacitance.copy()
+        capacitance[0] = 0.20e-12 if number > 50 else capacitance[0]
+        return Sample(**{**vars(sample), "capacitance": capacitance})
+
+    made = link(on_read=stuck)
+    result = invoke(*ASK, "--no-draw")
+    assert result.exit_code == 5 and "stopped" in result.stderr
+    assert made.count <= 50 + 0.25 / made.period and not made.driven.any()
+    assert (robot_project / RECORDING).exists()
+
+
+def test_dry_run_moves_nothing(robot_project: Path, link: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The plan, the lengths of the sensors, no motor command but zeros, no file."""
+    made = link()
+    monkeypatch.setattr(record_run, "LOOK_S", 0.05)
+    result = invoke(*ASK, "--dry-run")
+    assert result.exit_code == 0, result.stderr
+    assert "random-0" in result.stdout and "250.0" in result.stdout  # the passive cables of the fake
+    assert not np.array(made.commands).any()
+    assert not (robot_project / RECORDING).exists()
+    without = invoke("record", "--excite", "commission", "--dry-run")
+    assert without.exit_code == 0 and all(name in without.stdout for name in ("ramps", "holds", "reversals", "repeats"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (("--port", "fake"), "nothing to record"),
+        (("--random", "3"), "no robot is named"),
+        (("--random", "0", "--port", "fake"), "random policy"),
+        (("--random", "3", "--repeats", "0", "--port", "fake"), "repeats"),
+    ],
+)
+def test_what_cannot_be_recorded_is_said(robot_project: Path, arguments: tuple[str, ...], word: str) -> None:
+    """Exit code 2, before any port is opened; with --json as a document."""
+    result = invoke("record", *arguments, "--json")
+    assert result.exit_code == 2
+    assert word in json.loads(result.stdout)["what"]
+
+
+def test_an_uncalibrated_robot_is_refused_before_it_moves(
+    tmp_path: Path, link: Maker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Exit code 4 and the command that calibrates; no journal is left."""
+    assert invoke("init", str(tmp_path / "raw")).exit_code == 0
+    monkeypatch.chdir(tmp_path / "raw")
+    made = link()
+    result = invoke(*ASK)
+    assert result.exit_code == 4 and "r2s2r calibrate" in result.stderr
+    assert made.commands == [] and list((tmp_path / "raw").rglob("*.journal")) == []
+
+
+def test_the_floor_of_three_repeats(robot_project: Path, link: Maker) -> None:
+    """`floor` on them: lengths only, from repeats of a policy, and nothing in it for a robot that repeats itself."""
+    link()
+    document(*ASK, "--no-draw", "--repeats", "3")
+    result = document("floor")
+    lengths = result["report"]["lengths"]
+    assert lengths["basis"] == "repeats of a policy" and result["report"]["caps"] is None
+    assert lengths["floor_m"] < 0.002  # one control tick of a cable is 1.2 mm
+    assert document("floor")["state"] == "fresh"
+    assert (robot_project / "floor.png").exists() and (robot_project / "floor.html").exists()

@@ -1,0 +1,117 @@
+"""The floor of runs: planted repeatability of caps and lengths comes back, with what it rests on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.floor import Numerics, SeenRun, SensedRun, floor
+from r2s2r_cli.stages.floor.lengths import length_repeats
+from r2s2r_cli.stages.segments import target_intervals
+from tests.stages.measures.gait import FRAMES, path, run
+
+RATE = 50.0
+HOLD_S = 2.0
+SENSORS = 3
+
+
+def sensed(name: str, cycles: int, *, spread: float, noise: float, seed: int, lost: float = 0.0) -> SensedRun:
+    """Targets A, B, A, B ...: each interval ends at its target plus a normal deviation of `spread` [m]."""
+    generator = np.random.default_rng(seed)
+    n = round(HOLD_S * RATE)
+    t = np.arange(2 * cycles * n) / RATE
+    target = np.repeat(np.tile([[0.0], [1.0]], (cycles, 1)), n, axis=0)
+    ends = 0.1 + 0.1 * target[::n] + generator.normal(0.0, spread, (2 * cycles, SENSORS))
+    ramp = np.minimum(np.arange(n) / (0.5 * n), 1.0)[:, None]
+    before = np.vstack([ends[:1], ends[:-1]])
+    length = np.concatenate([b + ramp * (e - b) for b, e in zip(before, ends, strict=True)])
+    length += generator.normal(0.0, noise, length.shape)
+    length[generator.random(length.shape) < lost] = np.nan
+    table = target_intervals(t, target, control=np.zeros_like(target))
+    return SensedRun(name, t, length, np.arange(SENSORS), table)
+
+
+@pytest.mark.parametrize("lost", [0.0, 2 / 3])
+def test_planted_repeatability_of_lengths_is_recovered(lost: float) -> None:
+    """3 mm at the end of 600 intervals come back within their sampling error, also where boards take turns."""
+    found = length_repeats([sensed("a", 300, spread=0.003, noise=1e-4, seed=1, lost=lost)])
+    assert found is not None and found.contrasts == 597
+    assert np.allclose(found.sd, 0.003, rtol=4 / np.sqrt(2 * found.contrasts))
+    assert found.floor == pytest.approx(0.003, rel=4 / np.sqrt(2 * 3 * found.contrasts))
+
+
+def test_noise_of_a_reading_is_told_from_motion() -> None:
+    """0.5 mm white noise on ramps of 100 mm in a second comes back within 5 %."""
+    found = length_repeats([sensed("a", 20, spread=0.003, noise=5e-4, seed=2)])
+    assert found is not None
+    assert np.allclose(found.noise, 5e-4, rtol=0.05)
+
+
+def test_a_silent_sensor_has_no_number() -> None:
+    """NaN, not zero, and the others are not touched by it."""
+    one = sensed("a", 10, spread=0.003, noise=1e-4, seed=3)
+    one.length[:, 1] = np.nan
+    found = length_repeats([one])
+    assert found is not None and np.isnan(found.sd[1]) and np.isnan(found.noise[1])
+    assert np.isfinite(found.floor) and np.isfinite(found.sd[[0, 2]]).all()
+
+
+def test_runs_without_repeats_have_no_floor() -> None:
+    """Two intervals of two phases: nothing to compare."""
+    assert length_repeats([sensed("a", 1, spread=0.003, noise=1e-4, seed=4)]) is None
+    with pytest.raises(InputError, match="nothing repeats"):
+        floor([], [sensed("a", 1, spread=0.003, noise=1e-4, seed=4)], policies={})
+
+
+def test_what_it_rests_on_is_said() -> None:
+    """Three runs of a policy, runs of excitation sets, or one run: each by its name, and the last with a warning."""
+    runs = [sensed(f"1:walk-{i}", 3, spread=0.003, noise=1e-4, seed=i) for i in (1, 2, 3)]
+
+    def told(names: dict[str, str], count: int) -> tuple[str, tuple[str, ...]]:
+        _, report = floor([], runs[:count], policies=names)
+        assert report.lengths is not None
+        return report.lengths.basis, report.warnings
+
+    walk = {run.name: "walk" for run in runs}
+    assert told(walk, 3)[0] == "repeats of a policy"
+    basis, warnings = told(walk, 1)
+    assert basis == "same phase within a run" and any("slow drift" in text for text in warnings)
+    assert told({runs[0].name: "ramps"}, 1)[0] == "commissioning runs"
+
+
+def test_the_floor_of_caps_is_that_of_the_measures() -> None:
+    """A gait whose key frames scatter by 5 mm per axis, in three runs: floor, interval and deviations by phase."""
+    cycles = 13
+    seen, keys = [], np.arange(1, cycles + 1) * FRAMES - 1
+    for i in range(3):
+        observed = path(cycles)
+        observed[keys] += np.random.default_rng(i).normal(0.0, 0.005, (cycles, 6, 3))
+        seen.append(replace_name(run(cycles, observed=observed, noise=0.0), f"1:gait-{i + 1}"))
+    data, report = floor(seen, [], policies={one.name: "gait" for one in seen})
+    assert report.caps is not None and report.caps.basis == "repeats of a policy"
+    relative = (0.5 / (report.caps.contrasts * 18)) ** 0.5
+    assert report.caps.floor_m == pytest.approx(0.005 * 3**0.5, rel=5 * relative)
+    group = data.groups["caps"]
+    assert len(group["run"]) == report.caps.repeats == len(group["deviation_cap"])
+    n = np.bincount(group["phase"])[group["phase"]]
+    scaled = np.sqrt(np.mean(group["deviation"] ** 2 * n / (n - 1)))
+    assert scaled == pytest.approx(report.caps.floor_m, rel=0.05)
+
+
+def test_numerics_are_kept_as_they_are() -> None:
+    """Two gait steps off by 1 and 7 mm: 5 mm in root mean square."""
+    numerics = Numerics(np.arange(2), np.array([0.001, 0.007]), np.array([0.03, 0.05]), 2.5e-4, 2.5e-4)
+    data, report = floor([], [], policies={}, numerics=numerics)
+    assert report.numerics is not None and report.numerics.floor_m == pytest.approx(0.005)
+    assert (report.numerics.worst_m, report.numerics.moved_m) == (0.007, 0.04)
+    assert list(data.groups) == ["numerics"]
+
+
+def replace_name(one: object, name: str) -> SeenRun:
+    """The run of the measures' tests as one of the floor."""
+    keys = ("t", "observed", "noise", "quality", "intervals")
+    made = SeenRun(name, *(getattr(one, key) for key in keys))
+    return replace(made, name=name)

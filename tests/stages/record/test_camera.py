@@ -1,0 +1,174 @@
+"""Pictures beside the control loop: without loss where it is said, counted where lost, errors where they matter."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+import pytest
+
+from r2s2r_cli.devices.camera import CameraError, FeedStatistics, Frame
+from r2s2r_cli.errors import ArtifactError, HardwareError
+from r2s2r_cli.stages.record import Session, plans
+from r2s2r_cli.stages.record.camera import Pictures, encode_color, encode_depth
+from r2s2r_cli.stages.record.writer import Writer
+from r2s2r_cli.stages.simulate.policies import random_policy
+from schemas.config import RecordSettings
+from tests.support.fake_robot import FakeLink, Rows, calibrated
+
+SHAPE = (24, 32)
+
+
+class Still:
+    """A feed that hands out prepared frames, a few at a time, and then an error or nothing."""
+
+    def __init__(self, frames: Sequence[Frame], *, error: Exception | None = None) -> None:
+        self.left, self.error, self.begun = list(frames), error, False
+        self.statistics = FeedStatistics()
+
+    def frames(self) -> list[Frame]:
+        """None at the first call, which is for what came before the run."""
+        if not self.begun:
+            self.begun = True
+            return []
+        if not self.left and self.error is not None:
+            raise self.error
+        some, self.left = self.left[:2], self.left[2:]
+        return some
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+
+def frame(number: int, t: float) -> Frame:
+    """Noise that the number fixes."""
+    generator = np.random.default_rng(number)
+    color = generator.integers(0, 256, (*SHAPE, 3), dtype=np.uint8)
+    depth = generator.integers(0, 65536, SHAPE, dtype=np.uint16)
+    return Frame(color, depth, t_device=900.0 + t, t_host=t, number=number)
+
+
+def written(feed: Still, rows: Rows, *, until: int = 10**9) -> Pictures:
+    """What becomes of the frames of a feed, in a run that begins at host time 0."""
+    with Writer(rows) as writer:
+        pictures = Pictures(feed, writer, "camera", RecordSettings(), lambda one: one.t_host)
+        with pictures:
+            end = time.monotonic() + 5.0
+            while (feed.left or not feed.begun) and pictures.written < until and time.monotonic() < end:
+                time.sleep(0.001)
+    return pictures
+
+
+def test_depth_comes_back_to_the_last_count() -> None:
+    """All 16 bits of every pixel, noise included."""
+    depth = frame(1, 0.0).depth
+    assert np.array_equal(cv2.imdecode(np.frombuffer(encode_depth(depth), np.uint8), cv2.IMREAD_UNCHANGED), depth)
+
+
+def test_colour_is_rgb_and_lossless_where_asked() -> None:
+    """PNG gives the very pixels; JPEG of a smooth picture comes within a few counts; red stays red."""
+    color = frame(1, 0.0).color
+    png = encode_color(color, RecordSettings(color="png"))
+    assert np.array_equal(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)[:, :, ::-1], color)
+    red = np.zeros((*SHAPE, 3), dtype=np.uint8)
+    red[..., 0] = np.linspace(150, 250, SHAPE[1])[None]
+    jpeg = cv2.imdecode(np.frombuffer(encode_color(red, RecordSettings()), np.uint8), cv2.IMREAD_COLOR)[:, :, ::-1]
+    assert np.abs(jpeg.astype(int) - red).max() < 12
+
+
+def test_every_frame_is_written_with_both_clocks() -> None:
+    """Stamps of the run, of the camera, its own numbers, and the depth that belongs to each colour."""
+    rows = Rows()
+    pictures = written(Still([frame(i, 0.033 * (i - 10)) for i in range(11, 31)]), rows)
+    assert pictures.written == 20 and pictures.lost == 0
+    assert np.allclose(rows.column("camera", "t_device") - rows.column("camera", "t"), 900.0)
+    assert rows.column("camera", "source_frame").tolist() == list(range(11, 31))
+    assert rows.column("camera", "pair").tolist() == list(range(20))
+
+
+def test_gaps_in_the_count_are_lost_frames() -> None:
+    """Numbers 1, 2, 5, 9: five lost; a frame of before the run and one that comes twice are left out."""
+    numbers = [(0, -0.1), (1, 0.1), (2, 0.2), (2, 0.2), (5, 0.5), (9, 0.9)]
+    rows = Rows()
+    pictures = written(Still([frame(n, t) for n, t in numbers]), rows)
+    assert rows.column("camera", "source_frame").tolist() == [1, 2, 5, 9]
+    assert pictures.lost == 5
+
+
+def test_a_camera_that_is_gone_ends_the_run() -> None:
+    """Its own error comes out of the control loop, the motors are off, the frames before are written."""
+    robot = calibrated()
+    link, rows = FakeLink(robot), Rows()
+    slow = link.read
+    link.read = lambda timeout: (time.sleep(0.001), slow(timeout))[1]  # type: ignore[method-assign]
+    gone = CameraError("the camera is gone", where="--camera", hint="plug it in")
+    feed = Still([frame(i, 200.0 + i) for i in range(6)], error=gone)
+    session = Session(
+        plans([random_policy(robot, 20, 0)], repeats=1, rest=0.0), robot, link, RecordSettings(), feed=feed
+    )
+    with pytest.raises(CameraError, match="gone"):
+        session.record(rows)
+    assert not link.driven.any()
+    assert len(rows.of["runs/random-0/camera"]) == 6
+    run = session.runs[0]
+    assert run.ended == "the camera is gone" and run.camera is not None and run.camera.frames == 6
+
+
+def test_a_silent_camera_ends_the_run() -> None:
+    """No frame for longer than camera_gone_s."""
+    robot = calibrated()
+    link = FakeLink(robot)
+    slow = link.read
+    link.read = lambda timeout: (time.sleep(0.002), slow(timeout))[1]  # type: ignore[method-assign]
+    session = Session(
+        plans([random_policy(robot, 20, 0)], repeats=1, rest=0.0), robot, link, RecordSettings(camera_gone_s=0.1),
+        feed=Still([]),
+    )  # fmt: skip
+    with pytest.raises(HardwareError, match="no frames"):
+        session.record(Rows())
+    assert not link.driven.any()
+
+
+def test_a_writer_waits_for_its_rows_and_says_what_the_disk_said() -> None:
+    """All rows are with the sink at the end of the context; a refusal comes out as a hardware error, once."""
+    rows = Rows()
+
+    def slow(stream: str, row: object) -> None:
+        time.sleep(0.001)
+        rows(stream, row)
+
+    with Writer(slow) as writer:
+        for i in range(50):
+            writer.put("s", {"i": i})
+    assert rows.column("s", "i").tolist() == list(range(50))
+
+    def full(stream: str, row: object) -> None:
+        raise ArtifactError("the disk is full", where="journal", hint="df -h .")
+
+    with pytest.raises(HardwareError, match="cannot be written") as caught, Writer(full) as writer:
+        writer.put("s", {"i": 0})
+    assert caught.value.received == "the disk is full"
+
+
+def test_a_disk_that_stands_still_is_an_error_not_a_wait() -> None:
+    """A robot in real time is not held up: more than 4000 rows in memory end the run; in lock-step the sender waits."""
+    import threading
+
+    gate = threading.Event()
+
+    def stuck(stream: str, row: object) -> None:
+        gate.wait(5.0)
+
+    with pytest.raises(HardwareError, match="too slow"), Writer(stuck) as writer:
+        try:
+            for i in range(10_000):
+                writer.put("s", {"i": i})
+        finally:
+            gate.set()
+    rows = Rows()
+    with Writer(rows, lossless=True) as writer:
+        for i in range(10_000):
+            writer.put("s", {"i": i})
+    assert len(rows.of["s"]) == 10_000

@@ -43,7 +43,7 @@ def parse_greeting(line: bytes, where: str) -> Greeting:
     """The greeting without its line end. Raises CameraError for another protocol, version, or values no camera has."""
     try:
         about = json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         about = None
     if not isinstance(about, dict) or about.get("protocol") != PROTOCOL:
         raise CameraError(

@@ -164,23 +164,32 @@ def facts(link: Link) -> LinkFacts:
 
 
 def unlatch(link: Link) -> None:
-    """Ask the device to take its latch off, then greet it again. Raises LinkError where it does not."""
-    line = link.codec.reset()
-    if line is None:
+    """Ask the device to take its latch off, then greet it. Raises LinkError where it does not."""
+    port, asked = link.transport.name, set[int | None]()
+    if link.codec.reset() is None:
         return shake(link)
-    link.send(line)
-    end = time.monotonic() + link.handshake_timeout
-    while (left := end - time.monotonic()) > 0:
-        message = link.transport.receive(min(left, AGAIN))
-        event = link.codec.decode(message.line) if message else None
-        if isinstance(event, Ack) and event.of == line.seq:
-            break
-    else:
-        raise LinkError("the robot does not confirm the reset", where=link.transport.name, expected="code 0",
-                        received=f"nothing in {link.handshake_timeout:g} s",
-                        hint=f"r2s2r doctor ports {link.transport.name} --reset")  # fmt: skip
-    if event.code not in (0, 6):
-        raise LinkError("the robot refuses the reset", where=link.transport.name, expected="code 0",
+    begin = time.monotonic()
+    end, again, addressed = begin + link.handshake_timeout, begin, False
+    while (now := time.monotonic()) < end:
+        if now >= again:
+            again = now + AGAIN
+            line = link.codec.reset()
+            if line is not None:
+                link.send(line)
+                asked.add(line.seq)
+        message = link.transport.receive(max(0.0, min(again, end) - time.monotonic()))
+        if message is None:
+            continue
+        if message.source is not None and not addressed:
+            addressed, again = True, begin  # only now is it known where to ask
+        event = link.take(message)
+        if not isinstance(event, Ack) or event.of not in asked:
+            continue
+        if event.code in (0, 6):
+            return shake(link)
+        raise LinkError("the robot refuses the reset", where=port, expected="code 0",
                         received=f"code {event.code}: {CODES.get(event.code, 'unknown')}",
-                        hint=f"r2s2r doctor ports {link.transport.name}")  # fmt: skip
-    return shake(link)
+                        hint=f"r2s2r doctor ports {port}")  # fmt: skip
+    raise LinkError("the robot does not confirm the reset", where=port, expected="code 0",
+                    received=f"nothing in {link.handshake_timeout:g} s",
+                    hint=f"r2s2r doctor ports {port} --reset")  # fmt: skip

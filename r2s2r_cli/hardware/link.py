@@ -111,10 +111,14 @@ class Link:
 
     def reconnect(self, timeout: float = 10.0) -> None:
         """Open the port again, motors stopped. Raises the last LinkError after `timeout` [s]."""
+        self._persist(handshake.shake, timeout)
+
+    def _persist(self, begin: Callable[[Link], None], timeout: float) -> None:
+        """Connect, again and again for `timeout` [s]."""
         end = time.monotonic() + timeout
         while True:
             try:
-                return self._connect()
+                return self._connect(begin)
             except LinkError:
                 if time.monotonic() >= end:
                     raise
@@ -184,7 +188,7 @@ class Link:
 
     def reset(self) -> None:
         """Take the latch off, on a new connection. Raises LinkError where the device does not confirm it."""
-        self._connect(handshake.unlatch)
+        self._persist(handshake.unlatch, self.handshake_timeout)
         self._latched = ""
 
     def _say(self, what: Callable[[], Outgoing]) -> None:

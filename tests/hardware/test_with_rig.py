@@ -1,0 +1,142 @@
+"""Host and rig together: every protocol over every link, and the rig's faults against the duties of the host."""
+
+from __future__ import annotations
+
+import random
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.devices.lengths import Lengths
+from r2s2r_cli.devices.link import LinkError, LinkState, SafetyStop
+from r2s2r_cli.hardware.guard import GuardedLink
+from r2s2r_cli.hardware.open_link import open_link
+from r2s2r_cli.rig.world import World
+from tests.support.host_rig import follow, running_rig
+from tests.support.wire_robot import calibrated
+
+TARGET = np.array([0.3, 1, 1, 1, 1, 1])
+LINKS, PROTOCOLS = ("pty", "tcp", "udp"), ("checked", "boards", "legacy")
+
+
+@pytest.mark.parametrize("link", LINKS)
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_the_controller_reaches_its_target_in_every_protocol_over_every_link(link: str, protocol: str) -> None:
+    """2 s of the world: cable 0 is wound to its target, nothing is lost, what is measured is what is, motors end at 0.
+
+    The sensors are off by their own errors: 5 mm of bias, 2 mm of bend; 20 mm is four of the whole.
+    """
+    robot = calibrated()
+    with running_rig(robot, link=link, protocol=protocol) as rig:
+        with GuardedLink(open_link(rig.address, robot, protocol=protocol), robot) as host:
+            samples = follow(host, robot, TARGET, 2.0)
+            truth = rig.truth()[0]
+            counts = host.statistics
+        assert not rig.truth()[1].any()
+    lengths = Lengths.of(robot)(samples[-1].capacitance)
+    assert np.abs(lengths - truth.length).max() < 0.02
+    wanted = robot.pid.min_length_m + 0.3 * robot.pid.range_m
+    assert abs(lengths[0] - wanted) < 2 * robot.pid.tolerance * robot.pid.range_m
+    assert (counts.corrupt, counts.lost or 0, counts.overlong) == (0, 0, 0)
+    assert 90 <= sum(sample.due for sample in samples) <= 100, "the boards' own clocks give the rate"
+
+
+@pytest.mark.parametrize(
+    ("fault", "what", "limit"),
+    [
+        ({"kind": "sensor_stuck", "sensor": 3}, "0.20 pF", 0.2),
+        ({"kind": "sensor_frozen", "sensor": 3}, "frozen", 0.6),
+        ({"kind": "sensor_jump", "sensor": 3, "by_m": 0.3}, "out of range", 0.1),
+        ({"kind": "board_silent", "board": 1}, "no good reading", 0.2),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("protocol", ["checked", "boards"])
+def test_a_fault_of_the_sensors_stops_the_rig(fault: dict[str, object], what: str, limit: float, protocol: str) -> None:
+    """From 0.5 s on a sensor lies while all motors reel in: they stop within the time of that duty, and stay off."""
+    robot = calibrated()
+    world = World.model_validate({"faults": [{**fault, "at_s": 0.5}]})
+    with running_rig(robot, world, protocol=protocol) as rig:
+        with pytest.raises(SafetyStop, match=what), open_link(rig.address, robot, protocol=protocol) as link:
+            host = GuardedLink(link, robot)
+            host.restart()
+            back_and_forth(host)
+        stopped = rig.truth()[0].t
+        duty = rig.truth()[1]
+    reached = [0, 2, 4, 5] if (fault["kind"], protocol) == ("board_silent", "boards") else range(6)
+    assert not duty[reached].any(), "a board of the authors that is deaf cannot be stopped, all others are"
+    assert 0.5 < stopped <= 0.5 + limit + 0.1
+
+
+def back_and_forth(host: GuardedLink) -> None:
+    """All motors at full speed, the direction changing every 0.3 s, so that no cable leaves its range; 5 s at most."""
+    end = host.now() + 5.0
+    while host.now() < end:
+        sample = host.read(0.1)
+        if sample is not None and sample.due:
+            host.command(np.full(6, 1.0 if host.now() % 0.6 < 0.3 else -1.0))
+
+
+@pytest.mark.parametrize("link", ["pty", "udp"])
+def test_a_bad_wire_is_borne_and_counted(link: str) -> None:
+    """A fifth of all lines lost, others doubled, late, cut, damaged: the target is reached, all damage is caught.
+
+    No reading that comes through is off: what is measured stays within the noise of what is measured without faults.
+    """
+    robot = calibrated()
+    wire = {"lost": 0.2, "garbage": 0.02, "split": 0.02, "duplicate": 0.05, "reorder": 0.05, "bit_flip": 0.05}
+    world = World.model_validate({"wire": wire})
+    with running_rig(robot, world, link=link) as rig, GuardedLink(open_link(rig.address, robot), robot) as host:
+        samples = follow(host, robot, TARGET, 4.0)
+        truth, counts = rig.truth()[0], host.statistics
+    lengths = Lengths.of(robot)
+    measured = np.array([lengths(sample.capacitance) for sample in samples])
+    assert np.nanmax(np.abs(np.diff(measured, axis=0))) < 0.025, "a damaged number came through"
+    assert np.abs(measured[-1] - truth.length).max() < 0.02
+    assert counts.lost and counts.corrupt and counts.repeated and counts.device_corrupt
+    assert 0.1 < counts.lost / (counts.received + counts.lost) < 0.4
+
+
+@pytest.mark.parametrize("kind", ["link_gone", "link_stalled"])
+@pytest.mark.parametrize("link", LINKS)
+def test_a_link_that_goes_ends_as_one_error_and_comes_back(kind: str, link: str) -> None:
+    """In real time, after 0.3 s, for 0.6 s: LinkError or stale sensors; the rig's motors are off; reconnect works."""
+    robot = calibrated()
+    world = World.model_validate({"faults": [{"kind": kind, "at_s": 0.8, "for_s": 0.7}]})
+    with (
+        running_rig(robot, world, link=link, lock=False) as rig,
+        GuardedLink(open_link(rig.address, robot), robot) as host,
+    ):
+        with pytest.raises((LinkError, SafetyStop)) as caught:
+            back_and_forth(host)
+        assert rig.address in caught.value.where and caught.value.hint
+        deadline = time.monotonic() + 5
+        while rig.truth()[1].any() and time.monotonic() < deadline:
+            time.sleep(0.005)
+        assert not rig.truth()[1].any()
+        if isinstance(caught.value, SafetyStop):
+            host.reset()
+        else:
+            assert host.state is LinkState.LOST
+            host.reconnect(timeout=5.0)
+        assert len(follow(host, robot, TARGET, 0.2)) > 5
+
+
+@pytest.mark.slow
+def test_fifty_unpluggings_at_random_moments() -> None:
+    """The rig dies under a running controller at 50 moments, over all links in turn: one clear error each time."""
+    robot, draw = calibrated(), random.Random(1)
+    for i in range(50):
+        link = LINKS[i % 3]
+        with running_rig(robot, link=link, lock=False) as rig:
+            address = rig.address
+            with (
+                pytest.raises((LinkError, SafetyStop)) as caught,
+                GuardedLink(open_link(address, robot), robot) as host,
+            ):
+                killer = threading.Timer(draw.uniform(0.0, 0.3), rig.close)
+                killer.start()
+                back_and_forth(host)
+            killer.join()
+        assert address in caught.value.where and caught.value.exit_code == 5 and caught.value.hint

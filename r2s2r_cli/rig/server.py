@@ -72,13 +72,15 @@ class Server:
             time.sleep(clock.tick)
             self._pass(clock)
             return
-        for arrival in self._in_order(clock.t):
-            if arrival.kind == "opened":
-                clock.contact()
-                self._announced = -np.inf
-            k = self._obey(arrival, clock.t)
-            if k is not None:
-                self._tick(clock, k, arrival.board or 0)
+        arrivals = self._in_order(clock.t)
+        with self._port.together():
+            for arrival in arrivals:
+                if arrival.kind == "opened":
+                    clock.contact()
+                    self._announced = -np.inf
+                k = self._obey(arrival, clock.t)
+                if k is not None:
+                    self._tick(clock, k, arrival.board or 0)
         now = time.monotonic()
         if self._port.transport.connected and not clock.started and now - self._announced >= _ANNOUNCE_S:
             self._announced = now

@@ -28,6 +28,8 @@ from r2s2r_cli.hardware.watch import STALE, Watch
 if TYPE_CHECKING:
     from schemas.robot import Robot
 
+HELD_UP = 1.0
+"""[s] after which a host that never gets to the end of what waits is judged by what it has read."""
 SILENT = 5.0
 """[s] of the wall's clock without any message in lock-step, where the world's clock stands still."""
 
@@ -50,6 +52,8 @@ class GuardedLink:
         self._reason = ""
         self._start = self._heard = self._wall = -math.inf
         self._moving = np.zeros(len(robot.actuated))
+        self._next: Sample | None = None
+        self._judged = -math.inf
 
     @property
     def facts(self) -> LinkFacts:
@@ -89,12 +93,14 @@ class GuardedLink:
         self._start = self._heard = self.now()
         self._wall = time.monotonic()
         self._watch.restart(self._start)
+        self._next, self._judged = None, self._start
 
     def reconnect(self, timeout: float = 10.0) -> None:
         """Of the link; what was watched is forgotten, the time limit goes on."""
         self.inner.reconnect(timeout)
         self._heard, self._wall = self.now(), time.monotonic()
         self._watch.restart(self._heard)
+        self._next, self._judged = None, self._heard
 
     def read(self, timeout: float) -> Sample | None:
         """As of the link, but returns at least every 50 ms of silence inside to look at the clock.
@@ -105,19 +111,18 @@ class GuardedLink:
         end = self.now() + timeout
         while True:
             left = end - self.now()
-            sample = self.inner.read(max(0.0, min(left, STALE / 4)))
-            now = self.now()
+            sample, self._next = self._next or self.inner.read(max(0.0, min(left, STALE / 4))), None
             if sample is not None:
-                self._heard, self._wall = now, time.monotonic()
+                self._heard, self._wall = self.now(), time.monotonic()
                 self._object(self._watch.sample(sample, self._moving))
-            self._object(self._clock(now))
+            self._object(self._clock())
             if sample is not None or left <= STALE / 4:
                 return sample
 
     def command(self, speed: np.ndarray) -> None:
         """As of the link; nothing but zeros in a dry run. Raises SafetyStop where the robot is stopped."""
         self._refuse()
-        self._object(self._clock(self.now()))
+        self._object(self._clock())
         speed = np.asarray(speed, dtype=np.float64)
         self.inner.command(np.zeros_like(speed) if self.dry_run and np.isfinite(speed).all() else speed)
         self._moving = speed if not self.dry_run else np.zeros_like(speed)
@@ -139,15 +144,24 @@ class GuardedLink:
         self._moving = np.zeros_like(self._moving)
         self.restart()
 
-    def _clock(self, now: float) -> str:
-        """What the clock objects to; "" nothing."""
+    def _clock(self) -> str:
+        """What the clock objects to; "" nothing.
+
+        Whether something is stale is judged where nothing waits to be read: a host that was held up for a moment has
+        the boards' messages in its buffer, one after the other.
+        """
+        now = self.now()
+        if now - self._start > self.time_limit:
+            return f"time limit: the run has taken {self.time_limit:g} s"
+        self._next = self._next or self.inner.read(0.0)
+        if self._next is not None and now - self._judged < HELD_UP:
+            return ""
+        self._judged = now
         silent = now - self._heard
         if silent > STALE:
             return f"stale sensors: nothing came for {silent * 1e3:.0f} ms"
         if time.monotonic() - self._wall > SILENT:
             return f"stale sensors: nothing came for {SILENT:g} s"
-        if now - self._start > self.time_limit:
-            return f"time limit: the run has taken {self.time_limit:g} s"
         return self._watch.stale(now)
 
     def _object(self, reason: str) -> None:

@@ -21,7 +21,7 @@ TICK = 0.02
 
 
 class Clockwork:
-    """A link whose time goes on by a tick at every read; `wrong(k, capacitance)` is what becomes of tick k's values."""
+    """A link whose time goes on by a tick at every read that waits; wrong: what becomes of the values of tick k."""
 
     facts = LinkFacts(port="/dev/fake", protocol="checked")
     state = LinkState.RUNNING
@@ -31,6 +31,7 @@ class Clockwork:
         self.k = 0
         self.wrong = wrong
         self.said: list[tuple[float, object]] = []
+        self.waiting: list[Sample] = []
         self.draw = np.random.default_rng(0)
         self.length = np.full(9, 0.15)
         self.t_sensor = np.full(9, np.nan)
@@ -40,6 +41,10 @@ class Clockwork:
         return self.k * TICK
 
     def read(self, timeout: float) -> Sample | None:
+        if self.waiting:
+            return self.waiting.pop(0)
+        if timeout <= 0:
+            return None
         self.k += 1
         noisy = SLOPE * (self.length + self.draw.normal(0, 5e-4, 9)) + OFFSET
         value = self.wrong(self.k, np.round(noisy, 14))
@@ -179,3 +184,38 @@ def test_polite_kills_leave_the_context(number: signal.Signals) -> None:
         os.kill(os.getpid(), number)
         drive(link, 5.0)
     assert inner.said[-1][1] == "stop" and signal.getsignal(number) == before
+
+
+def test_a_host_that_was_held_up_is_not_a_robot_that_fell_silent() -> None:
+    """0.3 s in which nothing was read: the boards' messages wait one behind the other, and all are read before judging.
+
+    A board that is not among them is stale then; and one that only ever sends old messages is found out in the end.
+    """
+
+    def message(link: Clockwork, board: int) -> Sample:
+        fresh = np.arange(9) // 3 == board
+        link.t_sensor = np.where(fresh, link.now(), link.t_sensor)
+        return Sample(t_host=link.now(), board=board, t_board=math.nan, due=board == 0, capacitance=link.capacitance,
+                      t_sensor=link.t_sensor, fresh=fresh, encoder=np.full(6, np.nan))  # fmt: skip
+
+    for boards, healthy in (((0, 1, 2), True), ((0, 1, 0), True), ((0, 0, 2), False)):
+        inner = Clockwork()
+        with GuardedLink(inner, calibrated()) as link:
+            drive(link, 0.5, 0.0)
+            inner.k += 15
+            inner.waiting = [message(inner, board) for board in boards]
+            if healthy:
+                link.command(np.zeros(6))
+                for _ in boards:
+                    link.read(TICK)
+                link.command(np.zeros(6))
+            else:
+                with pytest.raises(SafetyStop, match="cable 3, 4, 5"):
+                    drive(link, 2.0, 0.0)
+    inner = Clockwork()
+    with GuardedLink(inner, calibrated()) as link, pytest.raises(SafetyStop, match="no good reading"):
+        drive(link, 0.5, 0.0)
+        for _ in range(200):
+            inner.k += 1
+            inner.waiting = [message(inner, 0) for _ in range(3)]
+            link.read(TICK)

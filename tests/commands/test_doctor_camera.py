@@ -1,0 +1,135 @@
+"""`r2s2r doctor camera` on the rig's camera, over a real socket, and on what can go wrong with it."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from r2s2r_cli.app import app
+from r2s2r_cli.rig.camera import pinhole
+from r2s2r_cli.rig.camera.service import CameraService
+from r2s2r_cli.rig.camera.settings import CameraSettings, Clock
+from r2s2r_cli.stages.doctor.colors import hsv_of, in_range
+from schemas.robot import Robot
+from tests.support.rig_robots import known
+
+THREE = known()
+SETTINGS = CameraSettings(position_m=(0.1, -0.3, 1.2), clock=Clock(rate_hz=30.0, lost_share=0.0))
+
+
+@pytest.fixture(scope="module")
+def spec() -> Iterator[str]:
+    """The rig's camera over a robot at rest."""
+    stop = threading.Event()
+    with CameraService(THREE, SETTINGS, seed=2) as service:
+        begin = time.monotonic()
+
+        def loop() -> None:
+            while not stop.wait(0.005):
+                service.observe(time.monotonic() - begin, np.array(THREE.rest_caps_m))
+
+        thread = threading.Thread(target=loop)
+        thread.start()
+        yield "rig://{}:{}".format(*service.address)
+        stop.set()
+        thread.join()
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A fresh project, and the working directory in it."""
+    assert CliRunner().invoke(app, ["init", str(tmp_path / "p")]).exit_code == 0
+    monkeypatch.chdir(tmp_path / "p")
+    return tmp_path / "p"
+
+
+def run(*arguments: str) -> tuple[int, str, str]:
+    """Exit code, stdout, stderr of `r2s2r doctor camera`."""
+    result = CliRunner().invoke(app, ["doctor", "camera", *arguments])
+    return result.exit_code, result.stdout, result.stderr
+
+
+def pixel(cap: int) -> str:
+    """Where a cap is in the picture, as `--click` wants it."""
+    p_C = pinhole.into(pinhole.pose(SETTINGS), np.array(THREE.rest_caps_m[cap]))
+    lens = pinhole.true(SETTINGS)
+    return f"{int(lens.fx * p_C[0] / p_C[2] + lens.cx)},{int(lens.fy * p_C[1] / p_C[2] + lens.cy)}"
+
+
+def test_what_the_camera_states_and_sees(spec: str, project: Path) -> None:
+    """Geometry as stated, the ground at its distance and tilt, two caps of each rod, and a picture of it all."""
+    code, out, _ = run("--camera", spec, "--frames", "5", "--json", "--preview", "see.png")
+    assert code == 0
+    said = json.loads(out)
+    assert (said["width"], said["height"], said["fx"], said["cx"]) == (640, 480, 607.7, 320.0)
+    assert said["depth_scale_m"] == 0.00025 and said["frames"] == 5
+    assert said["rate_hz"] == pytest.approx(30.0, rel=0.05)
+    assert said["ground"]["distance_m"] == pytest.approx(1.2, abs=0.002)
+    assert said["ground"]["tilt_rad"] == pytest.approx(np.arctan2(np.hypot(0.1, 0.3), 1.2), abs=0.002)
+    assert {rod["rod"]: rod["patches"] for rod in said["rods"]} == {"red": 2, "green": 2, "blue": 2}
+    assert (project / "see.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_clicks_and_boxes_become_ranges_in_robot_toml(spec: str, project: Path) -> None:
+    """Ranges measured from marks are written, the comments of the file stay, and they find the caps they came from."""
+    before = (project / "robot.toml").read_text()
+    u, v = (int(x) for x in pixel(2).split(","))
+    marks = ["--click", f"red:{pixel(1)}", "--box", f"green:{u - 12},{v - 12},{u + 12},{v + 12}"]
+    code, out, err = run("--camera", spec, "--frames", "5", *marks, "--save")
+    assert code == 0, err
+    assert "colour ranges written" in out
+    text = (project / "robot.toml").read_text()
+    robot = Robot.model_validate(tomllib.loads(text))
+    old = {color.rod: color for color in Robot.model_validate(tomllib.loads(before)).colors}
+    new = {color.rod: color for color in robot.colors}
+    assert new["blue"] == old["blue"] and new["red"] != old["red"] and new["green"] != old["green"]
+    assert len(text.splitlines()) == len(before.splitlines())
+    from r2s2r_cli.rig.camera.camera import RigCamera
+
+    color = RigCamera(THREE, SETTINGS, seed=2).capture(0, 0.0, np.array(THREE.rest_caps_m)).color
+    for rod, cap in (("red", 1), ("green", 2)):
+        column, row = (int(x) for x in pixel(cap).split(","))
+        assert in_range(hsv_of(color), new[rod])[row, column]
+
+
+def test_without_save_nothing_is_written(spec: str, project: Path) -> None:
+    """Marks alone show the measured ranges, and the hint says how to keep them."""
+    before = (project / "robot.toml").read_bytes()
+    code, out, err = run("--camera", spec, "--frames", "5", "--click", f"red:{pixel(1)}")
+    assert code == 0 and "measured" in out
+    assert "--save" in err.splitlines()[-1]
+    assert (project / "robot.toml").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (["--click", "red:1"], 2), (["--click", "red:1,2,3"], 2), (["--box", "red:9,9,3,3"], 2), (["--save"], 2),
+        (["--camera", "webcam"], 2), (["--click", "pink:320,240", "--camera", "SPEC"], 2),
+        (["--click", "red:5,5", "--camera", "SPEC"], 4), (["--camera", "rig://127.0.0.1:1"], 5),
+        (["--camera", "replay:nowhere"], 5),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)  # fmt: skip
+def test_mistakes_are_told(arguments: list[str], code: int, spec: str, project: Path) -> None:
+    """Each mistake has its exit code and a hint, and changes nothing."""
+    before = (project / "robot.toml").read_bytes()
+    found, _, err = run("--frames", "5", *(spec if text == "SPEC" else text for text in arguments))
+    assert found == code, err
+    assert err.splitlines()[-1].startswith("hint: ")
+    assert (project / "robot.toml").read_bytes() == before
+
+
+def test_it_works_without_a_project(spec: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Outside of a project geometry and ground are shown; there is no rod to look for."""
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = run("--camera", spec, "--frames", "2", "--json")
+    assert code == 0 and json.loads(out)["rods"] == []

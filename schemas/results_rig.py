@@ -10,17 +10,19 @@ from schemas.base import Frozen
 
 
 class RigResult(Frozen):
-    """Where the rig can be reached."""
+    """Where the rig can be reached; or, with `--points`, the table that was written."""
 
     schema_: Literal["r2s2r.rig/1"] = Field(default="r2s2r.rig/1", alias="schema")
-    device: str
-    """Device or URL to give to `record` and `doctor`."""
-    protocol: str
     robot: str
-    boards: int
-    lock_step: bool
+    device: str | None = None
+    """Device or URL to give to `record` and `doctor`."""
+    protocol: str | None = None
+    boards: int | None = None
+    lock_step: bool | None = None
     """Time goes on with the ticks that the host asks for, and with nothing else."""
     camera: str | None = None
     """URL of the camera; None: there is none."""
-    pid: int
+    pid: int | None = None
     """Of this process, for whoever ends it."""
+    points: str | None = None
+    """Table of the sensors' bench measurements, for `calibrate --points`."""

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
+from shlex import quote
 from threading import Event
 from typing import TYPE_CHECKING, Annotated
 
@@ -78,6 +79,10 @@ def rig(
     truth: Annotated[
         Path | None, typer.Option("--truth", metavar="FILE", help="Write what really happens to this CSV.")
     ] = None,
+    points: Annotated[
+        Path | None,
+        typer.Option("--points", metavar="FILE", help="Measure its sensors on the bench, for `calibrate`; and stop."),
+    ] = None,
     seconds: Annotated[
         float | None, typer.Option("--seconds", min=0.0, help="End by itself after this time of the wall clock.")
     ] = None,
@@ -97,6 +102,9 @@ def rig(
                          hint=f"r2s2r rig --link {link}")  # fmt: skip
     body, surroundings = _robot(robot, project), _world(world, seed)
     _need_mujoco()
+    if points is not None:
+        _measure(console, body, surroundings, points)
+        return
     from r2s2r_cli.rig.assembly import Outlet, Rig
 
     outlet = Outlet(
@@ -117,6 +125,22 @@ def rig(
         one.serve(stopping)
         if one.latest_s > _BEHIND_S:
             console.warn(f"the rig was up to {one.latest_s:.2f} s behind: this machine is too busy for real time")
+
+
+def _measure(console: Console, robot: Robot, world: World, target: Path) -> None:
+    from r2s2r_cli.rig.firmware import points_csv
+    from r2s2r_cli.store.atomic import write_text
+
+    if not robot.sensors:
+        raise InputError("the robot has no sensors to measure", where="robot.toml", expected="[[sensors]]",
+                         received="none", hint="r2s2r rig")  # fmt: skip
+    if target.exists():
+        raise UsageError("a file is in the way of the table", where=str(target), expected="a new file",
+                         received="a file", hint=f"r2s2r rig --points {quote(target.stem)}-2.csv")  # fmt: skip
+    write_text(target, points_csv(robot, world))
+    console.document(RigResult(robot=robot.name, points=str(target)))
+    console.data(str(target))
+    console.hint(f"r2s2r calibrate --points {quote(str(target))}")
 
 
 def _robot(path: Path | None, project: Path | None) -> Robot:

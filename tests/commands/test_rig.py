@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import time
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,7 +20,7 @@ import pytest
 
 from r2s2r_cli.errors import ExitCode
 from schemas.results_rig import RigResult
-from tests.commands.conftest import invoke
+from tests.commands.conftest import document, invoke
 from tests.support.rig_host import RawHost, line
 
 COMMAND = [sys.executable, "-m", "r2s2r_cli", "rig"]
@@ -100,6 +101,16 @@ def test_what_cannot_be_is_refused(project: Path, tmp_path: Path) -> None:
     assert invoke("rig", "--robot", "six/robot.toml", "--protocol", "legacy").exit_code == ExitCode.INPUT
 
 
+def test_the_bench_table_calibrates_the_robot(project: Path) -> None:
+    """`--points` writes what `calibrate` takes: lines within millimetres; a file in the way stays."""
+    assert document("rig", "--points", "points.csv")["points"] == "points.csv"
+    assert invoke("rig", "--points", "points.csv").exit_code == ExitCode.USAGE
+    assert invoke("calibrate", "--points", "points.csv").exit_code == 0
+    robot = tomllib.loads((project / "robot.toml").read_text())
+    assert [2e-11 < sensor["slope_f_per_m"] < 4e-11 for sensor in robot["sensors"]] == [True] * 9
+
+
+@pytest.mark.slow
 def test_a_killed_rig_leaves_a_dead_port(project: Path) -> None:
     """SIGKILL is the pulled plug: the host's reads end at once."""
     with running(project, "--seconds", "60") as child:

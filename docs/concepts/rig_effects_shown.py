@@ -177,6 +177,11 @@ def shown(k: int) -> See:
     return lambda plant: float(plant.sensed()[k] * 1e3)
 
 
+def held_back(plant: Plant) -> float:
+    """How much longer cable 0 acts than its winch has set it [mm]."""
+    return float((plant.winches.acting - plant.winches.rest)[0] * 1e3)
+
+
 def stamp(plant: Plant) -> float:
     """What the camera writes on a frame taken now, from its start [s]."""
     return plant.t + plant.world.seen().clock.stamp_delay_s
@@ -215,6 +220,9 @@ EXPERIMENTS: tuple[Experiment, ...] = (
     Experiment("tendon_set", {"lengths_m": [0, 0, 0, 0, 0, 0, 0.02, 0.02, 0.02], "slip_n": 9.0},
                "at 9 N a knot gives way, and the cable stays longer", "tension of cable 6 [N]", tension(6),
                lambda t, off, on: abs(on[2] - off[2]) < 1e-9 and on[-1] < off[-1] - 0.3, pull(0, 3)),
+    Experiment("capstan_friction", {"wrap": 0.4}, "less pull arrives while it reels in, more while it lets out",
+               "cable held back at the winch [mm]", held_back,
+               lambda t, off, on: on[2:24].min() > 0.3 and on[30:49].max() < -0.3 and not off.any(), to_and_fro),
     Experiment("attachment_offset", {"moved": [{"cable": 6, "end": 0, "by_m": [0.0, 0.0, 0.04]}]},
                "a cable that is tied elsewhere holds another shape", "height of cap 3 [mm]", cap(3, 2),
                lambda t, off, on: abs(on - off)[0] > 1, still, 1.0),
@@ -225,6 +233,9 @@ EXPERIMENTS: tuple[Experiment, ...] = (
     Experiment("friction_field", {"patches": [{"center_m": [0.25, 0.0], "radius_m": 0.15, "factor": 0.1}]},
                "slides on where the floor is slippery", "middle of the robot, x [mm]", middle(0),
                lambda t, off, on: on[-1] > off[-1] + 3, still, 1.0, shove),
+    Experiment("friction_anisotropy", {"angle_rad": 0.0, "across": 0.4, "against": 0.3},
+               "slides farther along the pile, with the nap", "middle of the robot, x [mm]", middle(0),
+               lambda t, off, on: on[-1] > off[-1] + 20, still, 1.0, shove),
     Experiment("stribeck", {"static_factor": 2.0, "speed_m_per_s": 0.3}, "grips more the slower it slides",
                "middle of the robot, x [mm]", middle(0), lambda t, off, on: on[-1] < off[-1] - 1, still, 1.0, shove),
     Experiment("viscous_contact", {"drag_n_s_per_m": 2.0}, "a fast slip is shorter", "middle of the robot, x [mm]",

@@ -13,6 +13,8 @@ import r2s2r_cli.effects
 import r2s2r_cli.rig
 from r2s2r_cli.rig.effects.base import Law, Scene
 from r2s2r_cli.rig.effects.battery import BatterySag
+from r2s2r_cli.rig.effects.cables import CapstanFriction
+from r2s2r_cli.rig.effects.friction import Soles
 from r2s2r_cli.rig.effects.motors import CommandLatency, LoadDroop, MotorDeadZone, MotorLag
 from r2s2r_cli.rig.effects.parameters import Effects
 from r2s2r_cli.rig.effects.winches import Backlash, SpoolBuildup
@@ -108,6 +110,7 @@ def test_no_function_is_a_copy_of_the_catalogues() -> None:
         ("tendon_set", {"lengths_m": []}),
         ("tendon_relaxation", {"fast_share": 0.0, "slow_share": 0.0}),
         ("tendon_hysteresis", {"force_n": 0.0}),
+        ("capstan_friction", {"wrap": 0.0}),
         ("cap_radius", {"by_m": []}),
         ("ground_slope", {}),
         ("viscous_contact", {"drag_n_s_per_m": 0.0}),
@@ -237,6 +240,46 @@ def test_friction_field_has_the_deceleration_of_its_patch() -> None:
         start = plant.truth().p_WR[:, 0]
         plant.advance(1.0, np.zeros(0))
         np.testing.assert_allclose(plant.truth().p_WR[:, 0] - start, v**2 / (2 * 9.81 * 0.4 * factor), rtol=0.04)
+
+
+def test_a_carpet_slides_by_its_direction() -> None:
+    """Along the pile, across it, with the nap and against it: mu times 1 -+ across, -+ against, v^2 / (2 g mu)."""
+    robot, v, across, against = two_rods(friction=0.4), 0.5, 0.3, 0.2
+    table = {"friction_anisotropy": {"angle_rad": 0.0, "across": across, "against": against}}
+    for way, factor in ((1.0, 1 - across - against), (-1.0, 1 - across + against)):
+        plant = Plant(robot, World.model_validate({"effects": table}))
+        plant.sim.data.qvel[0::6] = way * v
+        start = plant.truth().p_WR[:, 0]
+        plant.advance(1.0, np.zeros(0))
+        went = way * (plant.truth().p_WR[:, 0] - start)
+        np.testing.assert_allclose(went, v**2 / (2 * 9.81 * 0.4 * factor), rtol=0.05)
+
+
+def test_a_rolling_cap_does_not_slip() -> None:
+    """The point that touches stands still under a rod that rolls, and has the rod's speed under one that slides."""
+    robot = two_rods()
+    plant = Plant(robot, World())
+    soles = Soles(Scene(robot, plant.sim, np.zeros(0), np.random.default_rng(0)))
+    plant.sim.data.qvel[1::6] = 0.3
+    np.testing.assert_allclose(soles.velocity(), np.tile([0.0, 0.3, 0.0], (4, 1)), atol=1e-3)
+    plant.sim.data.qvel[5::6] = -0.3 / robot.rods[0].cap_radius_m
+    np.testing.assert_allclose(soles.velocity(), 0.0, atol=2e-3)
+
+
+def test_capstan_friction_keeps_its_share() -> None:
+    """Reeling in, the cable gets exp(-wrap) of what the winch pulls; letting out, exp(wrap); at rest as it was."""
+    law = CapstanFriction(wrap=0.3, length_m=0.001).law(SCENE)
+    k, pull, rest = 2000.0, 6.0, 0.2
+    for way in (1.0, -1.0):
+        by = np.zeros(6)
+        for _ in range(400):
+            rest -= way * 5e-5
+            # The winch pulls with `pull`; what arrives is less by what the cable is held back.
+            arrives = np.full(6, pull) - k * by
+            by = law.rest(DT, np.full(6, rest), arrives) - rest
+        np.testing.assert_allclose(pull - k * by, pull * np.exp(-0.3 * way), rtol=1e-3)
+        before = by.copy()
+        np.testing.assert_allclose(law.rest(DT, np.full(6, rest), pull - k * by) - rest, before, atol=1e-9)
 
 
 def test_a_slope_pushes_with_g_sin() -> None:

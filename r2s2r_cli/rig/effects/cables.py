@@ -175,3 +175,35 @@ class _Dahl(Law):
         x = np.sign(v) + (self._x - np.sign(v)) * decay
         self._cords.lengthen(-(x - self._x) * self._p.force_n / self._cords.stiffness)
         self._x = x
+
+
+class CapstanFriction(EffectSection):
+    """Winched cables rub where they leave their winch: part of the tension stays there."""
+
+    wrap: NonNegative = 0.2
+    """Friction coefficient times wrap angle; exp(-wrap) of the tension gets through [rad]."""
+    length_m: Positive = 0.002
+    """Motion of the cable over which the friction turns round [m]."""
+
+    def law(self, scene: Scene) -> Law:
+        """Euler and Eytelwein's law with a Dahl transition between both directions, where the catalogue has a sign."""
+        return _Rub(self, scene)
+
+
+class _Rub(Law):
+    def __init__(self, p: CapstanFriction, scene: Scene) -> None:
+        self._p, self._cords = p, Cords(scene.sim)
+        self._winched = np.array(scene.robot.actuated, dtype=int)
+        self._k = self._cords.stiffness[self._winched]
+        self._way, self._by = np.zeros(len(self._winched)), np.zeros(len(self._winched))
+        self._rest: np.ndarray | None = None
+
+    def rest(self, dt: float, rest: np.ndarray, tension: np.ndarray) -> np.ndarray:
+        # Reeling in (+1) the robot gets less than the winch pulls, letting out more.
+        step = np.zeros(len(rest)) if self._rest is None else self._rest - rest
+        self._rest = rest.copy()
+        decay = np.exp(-np.abs(step) / self._p.length_m)
+        self._way = np.sign(step) + (self._way - np.sign(step)) * decay
+        pulled = tension + self._k * self._by
+        self._by = pulled * -np.expm1(-self._p.wrap * self._way) / self._k
+        return rest + self._by

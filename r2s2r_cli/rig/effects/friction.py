@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 
 from r2s2r_cli.rig.effects.base import EffectSection, Law, Scene, per
 from r2s2r_cli.rig.effects.contact import cap_geoms
-from r2s2r_cli.rig.section import NonNegative, Positive, Section, Vector2
+from r2s2r_cli.rig.section import NonNegative, Positive, Real, Section, Vector2
 
 
 class Patch(Section):
@@ -77,18 +78,67 @@ class Stribeck(EffectSection):
     """Speed of slip at which a third of the difference is left [m/s]."""
 
     def law(self, scene: Scene) -> Law:
-        """Exponential in the speed of the cap's centre along the ground."""
+        """Exponential in the speed of the point that touches."""
         return _Slide(self, scene)
 
 
 class _Slide(Law):
     def __init__(self, p: Stribeck, scene: Scene) -> None:
-        self._p, self._data, self._geoms = p, scene.sim.data, cap_geoms(scene.sim, scene.robot.n_caps)
-        self._dt = scene.sim.model.opt.timestep
-        self._before: np.ndarray | None = None
+        self._p, self._soles = p, Soles(scene)
 
     def friction(self, mu: np.ndarray) -> np.ndarray:
-        xy = np.array(self._data.geom_xpos[self._geoms, :2])
-        speed = np.zeros(len(xy)) if self._before is None else np.linalg.norm(xy - self._before, axis=1) / self._dt
-        self._before = xy
+        speed = np.linalg.norm(self._soles.velocity(), axis=1)
         return mu * (1.0 + (self._p.static_factor - 1.0) * np.exp(-speed / self._p.speed_m_per_s))
+
+
+class FrictionAnisotropy(EffectSection):
+    """A brushed carpet: it grips more across its pile than along it, and more against the nap than with it."""
+
+    angle_rad: Real = 0.0
+    """Direction of the nap in the plane, from the world's x axis [rad]."""
+    across: NonNegative = 0.4
+    """How much the coefficient rises across the pile, and falls along it, as a part of it."""
+    against: NonNegative = 0.2
+    """How much it rises against the nap, and falls with it, as a part of it."""
+
+    def law(self, scene: Scene) -> Law:
+        """First and second harmonic of the direction of slip, where the catalogue has an ellipse."""
+        return _Pile(self, scene)
+
+
+class _Pile(Law):
+    _CREEP = 1e-3
+    """Speed below which a slip has no direction yet [m/s]."""
+
+    def __init__(self, p: FrictionAnisotropy, scene: Scene) -> None:
+        self._p, self._soles = p, Soles(scene)
+
+    def friction(self, mu: np.ndarray) -> np.ndarray:
+        v = self._soles.velocity()
+        angle = np.arctan2(v[:, 1], v[:, 0]) - self._p.angle_rad
+        share = np.tanh(np.linalg.norm(v, axis=1) / self._CREEP)
+        change = -self._p.across * np.cos(2.0 * angle) - self._p.against * np.cos(angle)
+        return mu * np.maximum(1.0 + share * change, 0.05)
+
+
+class Soles:
+    """The points of the caps that touch the floor, or would."""
+
+    def __init__(self, scene: Scene) -> None:
+        model = scene.sim.model
+        self._data, self._geoms = scene.sim.data, cap_geoms(scene.sim, scene.robot.n_caps)
+        self._bodies = model.geom_bodyid[self._geoms]
+        flat = np.zeros(9)
+        mujoco.mju_quat2Mat(flat, model.geom_quat[model.geom("ground").id])
+        self._normal = flat.reshape(3, 3)[:, 2]
+        self._down = -model.geom_size[self._geoms, :1] * self._normal
+
+    def velocity(self) -> np.ndarray:
+        """Along the floor, in frame W [m/s], (cap, 3)."""
+        data, rods = self._data, len(self._geoms) // 2
+        twist = data.qvel.reshape(rods, 6)
+        R_WR = data.xmat[self._bodies[::2]].reshape(rods, 3, 3)
+        w_W = np.einsum("rij,rj->ri", R_WR, twist[:, 3:])
+        arm = data.geom_xpos[self._geoms] - data.xpos[self._bodies] + self._down
+        v = np.repeat(twist[:, :3], 2, axis=0) + np.cross(np.repeat(w_W, 2, axis=0), arm)
+        return np.asarray(v - (v @ self._normal)[:, None] * self._normal)

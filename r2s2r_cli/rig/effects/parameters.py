@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 from r2s2r_cli.rig.effects.base import EffectSection
 from r2s2r_cli.rig.effects.battery import BatterySag
-from r2s2r_cli.rig.effects.cables import TendonHysteresis, TendonRelaxation, TendonSet, TendonStiffness
+from r2s2r_cli.rig.effects.cables import CapstanFriction, TendonHysteresis, TendonRelaxation, TendonSet, TendonStiffness
 from r2s2r_cli.rig.effects.camera import CameraDelay, CameraPose, CameraScale, Dropout
 from r2s2r_cli.rig.effects.contact import CapRadius, RollingResistance, SoftGround
-from r2s2r_cli.rig.effects.friction import CapFriction, FrictionField, Stribeck
+from r2s2r_cli.rig.effects.friction import CapFriction, FrictionAnisotropy, FrictionField, Stribeck
 from r2s2r_cli.rig.effects.mass import ComOffset, Payload
 from r2s2r_cli.rig.effects.motors import CommandLatency, LoadDroop, MotorDeadZone, MotorLag, MotorSpeedMismatch
 from r2s2r_cli.rig.effects.place import AirDrag, GroundSlope, TetherDrag, ViscousContact
@@ -33,10 +33,12 @@ class Effects(Section):
     tendon_relaxation: TendonRelaxation | None = None
     tendon_hysteresis: TendonHysteresis | None = None
     tendon_set: TendonSet | None = None
+    capstan_friction: CapstanFriction | None = None
     attachment_offset: AttachmentOffset | None = None
     com_offset: ComOffset | None = None
     payload: Payload | None = None
     friction_field: FrictionField | None = None
+    friction_anisotropy: FrictionAnisotropy | None = None
     stribeck: Stribeck | None = None
     viscous_contact: ViscousContact | None = None
     rolling_resistance: RollingResistance | None = None

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
 from schemas.base import Frozen
-from schemas.typed import Coordinate, Duration, Flag, Fraction, NonNegative, Number, Positive, Radius, Share, Wait
+from schemas.typed import Coordinate, Duration, Fraction, NonNegative, Number, Positive, Radius, Share, Wait
 
 Point = tuple[Coordinate, Coordinate, Coordinate]
 Rgb = tuple[
@@ -57,12 +57,14 @@ class ColorNoise(Frozen):
     exposure_drift: Annotated[float, Field(strict=True, ge=0, le=0.5)] = 0.06
     """The picture gets darker by up to this share and back."""
     exposure_period_s: Wait = 20.0
+    """How long that takes."""
 
 
 class Clock(Frozen):
     """The camera's own clock, and what happens between the exposure and the host."""
 
     rate_hz: Annotated[float, Field(strict=True, gt=0, le=240)] = 30.0
+    """Frames a second, by its own clock."""
     origin_s: Number = 5000.0
     """What it shows when the rig starts."""
     drift_ppm: Annotated[float, Field(strict=True, ge=-1000, le=1000)] = 40.0
@@ -83,47 +85,64 @@ class Faults(Frozen):
     gone_at_s: NonNegative | None = None
     """The camera is unplugged: the connection ends, and none is taken any more."""
     frozen_from_s: NonNegative | None = None
+    """From here the same picture comes again and again, with new stamps and numbers."""
     frozen_until_s: NonNegative | None = None
-    """The same picture comes again and again, with new stamps and numbers."""
+    """To here; None: for ever."""
     stalled_from_s: NonNegative | None = None
+    """From here nothing comes, and the connection stays."""
     stalled_until_s: NonNegative | None = None
-    """Nothing comes, and the connection stays."""
+    """To here; None: for ever."""
     clock_jump_at_s: NonNegative | None = None
+    """When the camera's clock jumps."""
     clock_jump_s: Number = 0.0
+    """And how far."""
 
 
 class Occluder(Frozen):
     """Something between camera and robot: a capsule (an arm, a cable) or, with both ends equal, a ball."""
 
     a_m: Point
+    """One end, frame W."""
     b_m: Point
+    """The other."""
     radius_m: Radius
+    """Round both and between them."""
     rgb: Rgb = (205, 160, 130)
+    """Colour in full light."""
     v_m_per_s: tuple[Number, Number, Number] = (0.0, 0.0, 0.0)
     """It moves from a_m, b_m as of `from_s`."""
     from_s: NonNegative = 0.0
+    """Rig time at which it comes."""
     until_s: NonNegative | None = None
+    """And goes; None: it stays."""
 
 
 class Distractor(Frozen):
     """A coloured disc that lies on the floor and is no robot."""
 
     center_m: tuple[Coordinate, Coordinate]
+    """On the floor, x and y of frame W."""
     radius_m: Radius
+    """Of the disc."""
     rgb: Rgb
+    """Its colour."""
 
 
 class CameraSettings(Frozen):
     """The rig's camera. Frame C: x right, y down, z forward."""
 
-    enabled: Flag = True
     width: Pixels = 640
+    """Of both pictures [px]."""
     height: Pixels = 480
+    """The same."""
     fx: Positive = 607.7
+    """Focal length along u [px], as the camera states it; it is so but for `focal_error`."""
     fy: Positive = 607.7
+    """Along v."""
     cx: Positive = 320.0
+    """Principal point [px], pixel centres at u + 0.5."""
     cy: Positive = 240.0
-    """[px], pixel centres at u + 0.5, v + 0.5. What the camera states, and what it is but for `focal_error`."""
+    """The same, v + 0.5."""
     focal_error: Annotated[float, Field(strict=True, gt=-0.5, lt=0.5)] = 0.0
     """Its true focal lengths are (1 + focal_error) of the stated ones."""
     depth_scale: Annotated[float, Field(strict=True, ge=1e-5, le=1e-2)] = 0.00025
@@ -131,20 +150,25 @@ class CameraSettings(Frozen):
     depth_error: Annotated[float, Field(strict=True, gt=-0.5, lt=0.5)] = 0.0
     """Its depths are (1 + depth_error) of the true ones."""
     position_m: Point = (0.0, 0.0, 1.44)
+    """Of its optical centre, frame W."""
     look_at_m: Point = (0.0, 0.0, 0.0)
     """In the middle of the picture if the principal point is."""
     picture_up: tuple[Number, Number, Number] = (0.0, 1.0, 0.0)
     """Direction in the world that points up in the picture, as far as it can."""
     shift_m: Point = (0.0, 0.0, 0.0)
+    """The camera is knocked at `knocked_at_s`: moved by this in the world, and stays there."""
     turn_rad: tuple[Number, Number, Number] = (0.0, 0.0, 0.0)
-    """The camera is knocked at `knocked_at_s`: shifted in the world, turned about its own x, y, z."""
+    """And turned by this rotation vector, in its own axes."""
     knocked_at_s: NonNegative = 0.0
+    """Rig time of the knock."""
     floor_rgb: Rgb = (122, 118, 112)
+    """Mean colour of the floor."""
     floor_texture: Annotated[float, Field(strict=True, ge=0, le=60)] = 10.0
     """Standard deviation of the floor's pattern, in counts."""
     floor_normal: tuple[Number, Number, Number] = (0.0, 0.0, 1.0)
+    """Of the floor as it is seen, in W; the floor that is walked on has its own slope (effect `ground_slope`)."""
     floor_offset_m: Coordinate = 0.0
-    """The floor as it is seen: normal . p = offset, in W."""
+    """The floor as it is seen: normal . p = offset."""
     cap_value: Share = 0.85
     """Brightness of the coloured caps in full light."""
     depth: DepthNoise = DepthNoise()
@@ -152,8 +176,9 @@ class CameraSettings(Frozen):
     clock: Clock = Clock()
     faults: Faults = Faults()
     occluders: tuple[Occluder, ...] = ()
+    """`[[camera.occluders]]`: arms, cables and balls between camera and robot."""
     distractors: tuple[Distractor, ...] = ()
-    model: Literal["r2s2r rig"] = "r2s2r rig"
+    """`[[camera.distractors]]`: coloured discs on the floor."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -11,6 +11,7 @@ from r2s2r_cli.rig.camera.clock import Exposure
 from r2s2r_cli.rig.camera.settings import CameraSettings
 
 PROTOCOL, VERSION = "r2s2r-camera", 1
+MODEL = "r2s2r rig"
 MAGIC = b"R2SF"
 FRAME, ALIVE = 1, 2
 _HEAD = struct.Struct("<4sHHIdII")
@@ -20,7 +21,7 @@ _HEAD = struct.Struct("<4sHHIdII")
 def greeting(settings: CameraSettings, serial: str) -> bytes:
     """The line that a host gets first: what the camera states about itself."""
     about = {
-        "protocol": PROTOCOL, "version": VERSION, "model": settings.model, "serial": serial,
+        "protocol": PROTOCOL, "version": VERSION, "model": MODEL, "serial": serial,
         "width": settings.width, "height": settings.height, "fx": settings.fx, "fy": settings.fy,
         "cx": settings.cx, "cy": settings.cy, "distortion": [], "depth_scale": settings.depth_scale,
         "rate_hz": settings.clock.rate_hz,

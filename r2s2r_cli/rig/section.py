@@ -20,5 +20,20 @@ Share = Annotated[float, Field(strict=True, ge=0, le=1)]
 """A probability, or a part of a whole."""
 Index = Annotated[int, Field(strict=True, ge=0)]
 Count = Annotated[int, Field(strict=True, gt=0)]
+Shift = Annotated[float, Field(strict=True, ge=-0.5, le=0.5)]
+"""A length on a robot, of either sign [m]; beyond half a metre it was meant in millimetres."""
+Size = Annotated[float, Field(strict=True, ge=0, le=0.5)]
+"""The same, at least 0 [m]."""
+Angle = Annotated[float, Field(strict=True, ge=0, le=10)]
+"""[rad], at least 0; beyond ten it was meant in degrees."""
+Error = Annotated[float, Field(strict=True, ge=-0.4, le=0.4)]
+"""Relative."""
+Delay = Annotated[float, Field(strict=True, ge=-1, le=1)]
+"""[s]; beyond one it was meant in milliseconds."""
+Slope = Annotated[float, Field(strict=True, ge=-0.7, le=0.7)]
+"""[rad]; beyond 40 degrees it was meant in degrees."""
+Factor = Annotated[float, Field(strict=True, ge=0.01, le=100)]
+"""How many times as much."""
+Shift3 = tuple[Shift, Shift, Shift]
 Vector3 = tuple[Real, Real, Real]
 Vector2 = tuple[Real, Real]

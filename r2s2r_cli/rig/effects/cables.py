@@ -6,7 +6,7 @@ import numpy as np
 
 from r2s2r_cli.rig.effects.base import EffectSection, Law, Scene, per
 from r2s2r_cli.rig.model.sim import MujocoSim
-from r2s2r_cli.rig.section import NonNegative, Positive, Real, Share
+from r2s2r_cli.rig.section import Angle, Factor, NonNegative, Positive, Share, Shift
 
 
 class Cords:
@@ -75,7 +75,7 @@ class Cords:
 class TendonStiffness(EffectSection):
     """Cables are softer or stiffer than `robot.toml` says."""
 
-    factors: tuple[Positive, ...]
+    factors: tuple[Factor, ...]
     """One a cable; missing ones are 1."""
 
     def law(self, scene: Scene) -> Law:
@@ -87,7 +87,7 @@ class TendonStiffness(EffectSection):
 class TendonSet(EffectSection):
     """Cables have become longer for good: as soon as a tension first reaches `slip_n`, a knot gives way."""
 
-    lengths_m: tuple[Real, ...]
+    lengths_m: tuple[Shift, ...]
     """By how much [m], one a cable; missing ones are 0."""
     slip_n: NonNegative = 0.0
     """Tension at which it happens [N]; 0: long ago."""
@@ -180,7 +180,7 @@ class _Dahl(Law):
 class CapstanFriction(EffectSection):
     """Winched cables rub where they leave their winch: part of the tension stays there."""
 
-    wrap: NonNegative = 0.2
+    wrap: Angle = 0.2
     """Friction coefficient times wrap angle; exp(-wrap) of the tension gets through [rad]."""
     length_m: Positive = 0.002
     """Motion of the cable over which the friction turns round [m]."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from r2s2r_cli.rig.camera.settings import CameraSettings
 from r2s2r_cli.rig.effects.base import EffectSection
-from r2s2r_cli.rig.section import NonNegative, Real, Share, Vector3
+from r2s2r_cli.rig.section import Delay, Error, NonNegative, Share, Shift3, Vector3
 
 
 class CameraPose(EffectSection):
@@ -12,7 +12,7 @@ class CameraPose(EffectSection):
 
     turn_rad: Vector3 = (0.0, 0.0, 0.0)
     """Angles about the axes of frame C [rad]."""
-    by_m: Vector3 = (0.0, 0.0, 0.0)
+    by_m: Shift3 = (0.0, 0.0, 0.0)
     """In frame W [m]."""
     at_s: NonNegative = 0.0
     """When it happens [s]."""
@@ -25,9 +25,9 @@ class CameraPose(EffectSection):
 class CameraScale(EffectSection):
     """Depth and focal length are not what the camera states."""
 
-    depth_error: Real = 0.02
+    depth_error: Error = 0.02
     """Depths are 1 + this of the true ones."""
-    focal_error: Real = 0.0
+    focal_error: Error = 0.0
     """Focal lengths are 1 + this of the stated ones."""
 
     def seen(self, camera: CameraSettings) -> CameraSettings:
@@ -38,7 +38,7 @@ class CameraScale(EffectSection):
 class CameraDelay(EffectSection):
     """Stamps are late: a frame shows the scene as it was earlier than its stamp says."""
 
-    delay_s: Real = 0.08
+    delay_s: Delay = 0.08
     """How much later the stamp is than the picture [s]."""
 
     def seen(self, camera: CameraSettings) -> CameraSettings:

@@ -9,15 +9,15 @@ import numpy as np
 from r2s2r_cli.rig.effects.base import EffectSection, Law, Scene, per
 from r2s2r_cli.rig.model.options import Options
 from r2s2r_cli.rig.model.sim import MujocoSim
-from r2s2r_cli.rig.section import NonNegative, Positive, Real
+from r2s2r_cli.rig.section import Positive, Shift, Size
 
 
 class RollingResistance(EffectSection):
     """Caps do not roll freely, nor turn freely on the spot."""
 
-    rolling_m: NonNegative = 0.001
+    rolling_m: Size = 0.001
     """Lever arm of the normal force against rolling [m]."""
-    turning_m: NonNegative = 0.001
+    turning_m: Size = 0.001
     """The same against turning about the normal [m]."""
 
     def law(self, scene: Scene) -> Law:
@@ -45,7 +45,7 @@ class SoftGround(EffectSection):
 class CapRadius(EffectSection):
     """Caps are smaller or larger than `robot.toml` says: worn rubber."""
 
-    by_m: tuple[Real, ...]
+    by_m: tuple[Shift, ...]
     """One a cap [m]; missing ones are 0."""
 
     def law(self, scene: Scene) -> Law:

@@ -9,7 +9,7 @@ import numpy as np
 
 from r2s2r_cli.rig.effects.base import EffectSection, Law, Scene
 from r2s2r_cli.rig.model.options import Options
-from r2s2r_cli.rig.section import Index, Positive, Vector3
+from r2s2r_cli.rig.section import Index, Positive, Shift3
 
 
 class ComOffset(EffectSection):
@@ -17,7 +17,7 @@ class ComOffset(EffectSection):
 
     rod: Index
     """Its number."""
-    by_m: Vector3
+    by_m: Shift3
     """In the rod's frame R [m]."""
 
     def options(self, options: Options) -> Options:
@@ -39,7 +39,7 @@ class Payload(EffectSection):
     """Its number."""
     mass_kg: Positive = 0.03
     """[kg]"""
-    at_m: Vector3 = (0.0, 0.0, 0.0)
+    at_m: Shift3 = (0.0, 0.0, 0.0)
     """In the rod's frame R [m]."""
 
     def options(self, options: Options) -> Options:

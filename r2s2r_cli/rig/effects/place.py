@@ -12,15 +12,15 @@ from r2s2r_cli.rig.camera.settings import CameraSettings
 from r2s2r_cli.rig.effects.base import EffectSection, Law, Scene
 from r2s2r_cli.rig.effects.contact import cap_geoms
 from r2s2r_cli.rig.model.options import Options
-from r2s2r_cli.rig.section import Index, NonNegative, Real, Vector3
+from r2s2r_cli.rig.section import Index, NonNegative, Slope, Vector3
 
 
 class GroundSlope(EffectSection):
     """The floor is not level. W stays upright: it is the floor that is turned, about the origin of W."""
 
-    angle_x_rad: Real = 0.0
+    angle_x_rad: Slope = 0.0
     """Turn about the world's x axis [rad] ..."""
-    angle_y_rad: Real = 0.0
+    angle_y_rad: Slope = 0.0
     """... and after it about the world's y axis [rad]."""
 
     def options(self, options: Options) -> Options:

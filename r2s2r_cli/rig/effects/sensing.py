@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from r2s2r_cli.rig.effects.base import EffectSection, Law, Scene, per
-from r2s2r_cli.rig.section import Positive, Real
+from r2s2r_cli.rig.section import Positive, Shift
 
 
 class SensorBias(EffectSection):
     """Sensors show too long or too short."""
 
-    lengths_m: tuple[Real, ...]
+    lengths_m: tuple[Shift, ...]
     """One a cable [m]; missing ones are 0."""
     settles_s: Positive | None = None
     """With this time constant the bias comes in after the start [s]; left out: it is there from the start."""

@@ -7,13 +7,13 @@ from typing import Literal
 import numpy as np
 
 from r2s2r_cli.rig.effects.base import EffectSection, Law, Scene, per
-from r2s2r_cli.rig.section import Index, NonNegative, Positive, Section, Vector3
+from r2s2r_cli.rig.section import Index, NonNegative, Positive, Section, Share, Shift3, Size
 
 
 class SpoolBuildup(EffectSection):
     """Cable winds over cable: after every `wraps` turns the spool is thicker by one layer."""
 
-    layer_m: NonNegative = 0.0005
+    layer_m: Size = 0.0005
     """Thickness of a layer [m]."""
     wraps: Positive = 2.0
     """Turns a layer."""
@@ -40,16 +40,16 @@ class _Layers(Law):
 class Backlash(EffectSection):
     """Play of the gears: after a reversal the winch turns without effect until the play is used up."""
 
-    play_m: NonNegative | tuple[NonNegative, ...] = 0.005
+    play_m: Size | tuple[Size, ...] = 0.005
     """Length of cable that a reversal loses [m]; one, or one a winched cable."""
-    soft_share: NonNegative = 0.3
+    soft_share: Share = 0.3
     """Part of the play in which the winch takes hold little by little."""
 
     def law(self, scene: Scene) -> Law:
         """A play operator with a soft end, where the catalogue's is hard."""
         n = len(scene.r)
         play = per(self.play_m, n, 0.0) if isinstance(self.play_m, tuple) else np.full(n, float(self.play_m))
-        return _Play(play, min(self.soft_share, 1.0))
+        return _Play(play, self.soft_share)
 
 
 class _Play(Law):
@@ -80,7 +80,7 @@ class Moved(Section):
     """Its number."""
     end: Literal[0, 1] = 0
     """0 or 1: which of its two caps."""
-    by_m: Vector3
+    by_m: Shift3
     """In the rod's frame R [m]."""
 
 

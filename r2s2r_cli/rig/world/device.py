@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from r2s2r_cli.rig.section import Count, NonNegative, Positive, Real, Section, Share
+from r2s2r_cli.rig.section import Count, NonNegative, Positive, Real, Section, Share, Size
 
 
 class Sensors(Section):
@@ -17,14 +17,14 @@ class Sensors(Section):
     """Of a sensor that `robot.toml` has no calibration for [F/m]; 3e-11 is 0.03 pF/mm."""
     offset_f: Positive = 1.4e-11
     """The same: capacitance at length 0 [F]."""
-    day_sd_m: NonNegative = 0.005
+    day_sd_m: Size = 0.005
     """Offset of today against the calibration, drawn once a sensor from the seed [m], standard deviation."""
-    drift_sd_m: NonNegative = 0.001
+    drift_sd_m: Size = 0.001
     """Slow drift: a random walk with this standard deviation after a minute, growing with the root of time [m]."""
-    bow_sd_m: NonNegative = 0.002
+    bow_sd_m: Size = 0.002
     """Quadratic error: largest deviation from the calibrated line within the controller's range (passive cables:
     within 5 cm of their length at rest), beyond it constant; drawn once a sensor [m], standard deviation."""
-    noise_sd_m: NonNegative = 0.0005
+    noise_sd_m: Size = 0.0005
     """White, every sample [m], standard deviation."""
     lag_s: NonNegative = 0.03
     """Time constant of the first-order lag [s]."""

@@ -165,9 +165,11 @@ def _current(
         extra: dict[str, Scalar] = {"recovered": True} if recovered and path.count("/") == 1 else {}
         told = late.attributes.get(path, {}) if late is not None else {}
         groups[path] = Group({}, {**attributes, **extra, **told})
+    groups_with_rows = {head.streams[n].path for n in rows}
     for number, stream in enumerate(head.streams):
-        if number in rows:
-            values = {column.name: _value(journal, stream, column, rows[number]) for column in stream.fields}
+        if stream.path in groups_with_rows:  # a stream without rows, beside one that has some, is empty, not missing
+            found = rows.get(number, Rowset())
+            values = {column.name: _value(journal, stream, column, found) for column in stream.fields}
             before = groups.get(stream.path, Group())
             groups[stream.path] = Group({**before.datasets, **values}, {**before.attributes, **stream.attributes})
     for _, step in chain(head.kind, head.schema_version):

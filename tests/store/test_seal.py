@@ -17,7 +17,7 @@ from r2s2r_cli.store.seal import Late, seal
 from r2s2r_cli.store.write import write_artifact
 from schemas.versions import KINDS, MIGRATIONS
 from tests.support.builders import materialised, provenance, recording
-from tests.support.recorder import RUN, append, counts, head, image, write
+from tests.support.recorder import COLOR, RUN, append, counts, head, image, write
 
 
 def paths(folder: Path) -> tuple[Path, Path]:
@@ -64,6 +64,17 @@ def test_what_is_known_late_is_sealed_with_it(tmp_path: Path) -> None:
     assert (made.wall_s, made.report, made.drawings) == (12.5, {"runs": 1}, ("10-record.html",))
     _, data = read_artifact(target, "recording")
     assert data.runs() == ["walk"] and data.groups[RUN].attributes["start_unix"] == 7.0
+
+
+def test_a_stream_without_rows_beside_one_with_some_is_empty(tmp_path: Path) -> None:
+    """Killed after the first picture and before its depth: the group is whole, its depth has no frame."""
+    journal, target = paths(tmp_path)
+    with Journal(journal, head()) as rows:
+        rows.append(COLOR, {"t": 0.0, "color": image(0)})
+    seal(journal, target)
+    camera = content(target)[f"{RUN}/camera"]
+    assert camera["color"] == [image(0)] and camera["depth"] == [] and len(camera["t_depth"]) == 0
+    assert f"{RUN}/sensors" not in content(target)
 
 
 def test_a_recovery_after_sealing_knows_its_own_artifact(tmp_path: Path) -> None:

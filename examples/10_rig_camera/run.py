@@ -95,7 +95,7 @@ def draw(path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     drawn = io.BytesIO()
     sheet.savefig(drawn, metadata={"Software": None})
-    Image.open(drawn).convert("RGB").quantize(64).save(path, optimize=True)  # noise does not compress
+    Image.open(drawn).convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE).save(path, optimize=True)  # noise does not compress
 
 
 def main(out: Path, say: Callable[[str], None] = print, count: int = 60) -> None:

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from types import TracebackType
 from typing import Self
 
 
-class Closing:
+class Closing(ABC):
     """Makes a camera a context manager, given `open` and `close`."""
 
+    @abstractmethod
     def open(self) -> None:
         """See `devices.camera.Camera`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def close(self) -> None:
         """See `devices.camera.Camera`."""
-        raise NotImplementedError
 
     def __enter__(self) -> Self:
         """Open."""

@@ -11,6 +11,7 @@ from typing import Literal, Self
 import numpy as np
 
 from r2s2r_cli.rig.camera.service import CameraService
+from r2s2r_cli.rig.camera_process import CameraProcess
 from r2s2r_cli.rig.clock import RealClock, TickClock
 from r2s2r_cli.rig.firmware import Firmware
 from r2s2r_cli.rig.plant import Plant, Truth
@@ -66,7 +67,7 @@ class Rig:
         self._codec, self._world = codec, world
         self.boards = firmware.boards
         """How many boards it has."""
-        self._camera: CameraService | None = None
+        self._camera: CameraService | CameraProcess | None = None
         self._truth: TruthLog | None = None
         self._transport = open_transport(
             outlet.link, host=outlet.host, port=outlet.port, boards=firmware.boards, shared=outlet.shared,
@@ -79,8 +80,11 @@ class Rig:
             if outlet.camera_port is not None:
                 # Over UDP `host` is somebody else, to whom the boards send.
                 at = outlet.host if outlet.link == "tcp" else _LOCALHOST
-                self._camera = CameraService(robot, world.seen(), seed=world.seed, host=at,
-                                             port=outlet.camera_port, lossless=outlet.lock)  # fmt: skip
+                self._camera = (
+                    CameraService(robot, world.seen(), seed=world.seed, host=at, port=outlet.camera_port, lossless=True)
+                    if outlet.lock
+                    else CameraProcess(robot, world.seen(), seed=world.seed, host=at, port=outlet.camera_port)
+                )
         except BaseException:
             self.close()
             raise

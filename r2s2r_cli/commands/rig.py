@@ -168,9 +168,15 @@ def _need_mujoco() -> None:
 
 @contextmanager
 def _until_told(seconds: float | None) -> Iterator[Callable[[], bool]]:
-    """A function that says whether it is time to end: Ctrl-C, SIGTERM, or the time asked for."""
+    """A function that says whether it is time to end: Ctrl-C, SIGTERM, or the time asked for. A second signal insists."""
     told = Event()
-    before = {number: signal.signal(number, lambda *_: told.set()) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def tell(*_: object) -> None:
+        if told.is_set():
+            raise KeyboardInterrupt
+        told.set()
+
+    before = {number: signal.signal(number, tell) for number in (signal.SIGINT, signal.SIGTERM)}
     end = None if seconds is None else time.monotonic() + seconds
     try:
         yield lambda: told.is_set() or (end is not None and time.monotonic() >= end)

@@ -29,7 +29,11 @@ _BOX = re.compile(r"([^:]+):(\d{1,5}),(\d{1,5}),(\d{1,5}),(\d{1,5})")
 def camera(
     source: Annotated[
         str,
-        typer.Option("--camera", metavar="CAMERA", help="rig://HOST:PORT, realsense[:SERIAL], open3d, replay:FOLDER."),
+        typer.Option(
+            "--camera",
+            metavar="CAMERA",
+            help="rig://HOST:PORT, realsense[:SERIAL], open3d, replay:FOLDER, replay:FILE.h5[:RUN].",
+        ),
     ] = "realsense",
     frames: Annotated[int, typer.Option("--frames", min=1, max=900, help="How many frames are looked at.")] = 30,
     preview: Annotated[
@@ -56,6 +60,7 @@ def camera(
 
     Example: r2s2r doctor camera --camera rig://127.0.0.1:9000 --preview see.png
     """
+    from r2s2r_cli.commands.cameras import camera_of
     from r2s2r_cli.stages.doctor.camera import look
 
     console = Console(json=json, quiet=quiet)
@@ -64,7 +69,7 @@ def camera(
     if save and not boxes:
         raise UsageError("there is nothing to save", where="--save", expected="--click or --box, on a cap of each rod",
                          received="neither", hint="r2s2r doctor camera --preview see.png")  # fmt: skip
-    device = _device(source)
+    device = camera_of(source)
     with device:
         taken, statistics = _take(device, frames, console)
         looked = look(
@@ -103,12 +108,6 @@ def _robot(project: Path | None, *, needed: bool) -> tuple[Path | None, Robot | 
             raise
         return None, None
     return here.robot_path, here.robot()
-
-
-def _device(source: str) -> Camera:
-    from r2s2r_cli.hardware.camera.choose import choose_camera
-
-    return choose_camera(source)
 
 
 def _take(device: Camera, count: int, console: Console) -> tuple[list[Frame], FeedStatistics]:

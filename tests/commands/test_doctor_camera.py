@@ -9,12 +9,14 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from r2s2r_cli.app import app
 from r2s2r_cli.rig.camera import pinhole
+from r2s2r_cli.rig.camera.camera import RigCamera
 from r2s2r_cli.rig.camera.service import CameraService
 from r2s2r_cli.rig.camera.settings import CameraSettings, Clock
 from r2s2r_cli.stages.doctor.colors import hsv_of, in_range
@@ -92,7 +94,6 @@ def test_clicks_and_boxes_become_ranges_in_robot_toml(spec: str, project: Path) 
     new = {color.rod: color for color in robot.colors}
     assert new["blue"] == old["blue"] and new["red"] != old["red"] and new["green"] != old["green"]
     assert len(text.splitlines()) == len(before.splitlines())
-    from r2s2r_cli.rig.camera.camera import RigCamera
 
     color = RigCamera(THREE, SETTINGS, seed=2).capture(0, 0.0, np.array(THREE.rest_caps_m)).color
     for rod, cap in (("red", 1), ("green", 2)):
@@ -133,3 +134,32 @@ def test_it_works_without_a_project(spec: str, tmp_path: Path, monkeypatch: pyte
     monkeypatch.chdir(tmp_path)
     code, out, _ = run("--camera", spec, "--frames", "2", "--json")
     assert code == 0 and json.loads(out)["rods"] == []
+
+
+def test_a_recording_is_played_back(project: Path) -> None:
+    """The pictures of 10-record.h5 stand for a camera, by its run or without; a run without pictures is refused."""
+    picture = RigCamera(THREE, SETTINGS.ideal()).capture(0, 0.0, np.array(THREE.rest_caps_m))
+    folder = project / "rgbd"
+    for name, image in (("color", picture.color[..., ::-1]), ("depth", picture.depth)):
+        (folder / name).mkdir(parents=True)
+        for i in range(3):
+            assert cv2.imwrite(str(folder / name / f"{i:04d}.png"), image)
+    (folder / "data").mkdir()
+    for i in range(3):
+        frame = {"header": {"secs": 10 + 0.1 * i, "seq": i}, "info": {}, "sensors": {}, "motors": {}}
+        (folder / "data" / f"{i:04d}.json").write_text(json.dumps(frame))
+    K = [[607.7, 0, 319.5], [0, 607.7, 239.5], [0, 0, 1]]
+    config = {"cam_intr": K, "depth_scale": 4000, "im_w": 640, "im_h": 480}
+    (folder / "config.json").write_text(json.dumps(config))
+    sidecar = 'robot = "threebar"\nsource = "the rig"\nnature = "simulated"\n'
+    (project / "rgbd.toml").write_text(sidecar)
+    imported = CliRunner().invoke(app, ["import", str(folder), "--no-draw"])
+    assert imported.exit_code == 0, imported.stderr
+    record = "iterations/001/10-record.h5"
+    for spec in (f"replay:{record}", f"replay:{record}:rgbd", f"replay:{folder}"):
+        code, out, err = run("--camera", spec, "--frames", "3", "--json")
+        assert code == 0, err
+        said = json.loads(out)
+        assert said["fx"] == 607.7 and said["cx"] == 320.0
+        assert said["ground"]["distance_m"] == pytest.approx(1.2, abs=0.002)
+    assert run("--camera", f"replay:{record}:other")[0] == 5

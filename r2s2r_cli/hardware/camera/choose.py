@@ -9,7 +9,7 @@ from pathlib import Path
 from r2s2r_cli.devices.camera import Camera
 from r2s2r_cli.errors import UsageError
 
-KINDS = "rig://HOST:PORT, realsense[:SERIAL], open3d[:SERIAL] or replay:FOLDER"
+KINDS = "rig://HOST:PORT, realsense[:SERIAL], open3d[:SERIAL] or replay:FOLDER or FILE.h5[:RUN]"
 
 
 def choose_camera(spec: str, *, now: Callable[[], float] = time.monotonic) -> Camera:

@@ -26,10 +26,14 @@ class LockStepClock:
         self.k = 0
 
     def read(self, link: Link, timeout: float) -> Sample | None:
-        """The next sample; the world goes on until there is one, by `timeout` [s] of its time at most."""
-        end = self.t + timeout
-        while (sample := link.next_sample()) is None and self.t < end - 1e-9:
+        """The next sample; the world goes on until there is one, by `timeout` [s] of its time and a tick at most.
+
+        A time-out above 0 is a tick at least, be it as short as a rounding error: a loop until some time gets there.
+        """
+        end, waits = self.t + timeout, timeout > 0
+        while (sample := link.next_sample()) is None and waits:
             self.tick(link)
+            waits = self.t < end - 1e-9
         return sample
 
     def tick(self, link: Link) -> None:

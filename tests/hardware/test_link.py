@@ -276,4 +276,6 @@ def test_lock_step_goes_by_the_world() -> None:
         robot.sample = lambda **_: None  # type: ignore[method-assign, assignment]
         assert link.read(0.1) is None, "the world has gone on for 0.1 s and nobody has sent a sample"
         assert link.now() == pytest.approx(0.18)
+        assert link.read(1e-20) is None and link.now() == pytest.approx(0.2), "any time-out above 0 goes on"
+        assert link.read(0.0) is None and link.now() == pytest.approx(0.2)
         assert link.statistics.clock_offset is None

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import random
+import re
 import threading
 import time
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -156,3 +159,18 @@ def test_fifty_unpluggings_at_random_moments(protocol: str) -> None:
             error = caught.value
             assert address in error.where and error.exit_code == 5 and error.hint
             assert isinstance(error, SafetyStop) or "stop" in error.received.lower() or "handshake" in error.where
+
+
+def test_the_library_of_the_guide_works() -> None:
+    """The Python block of docs/guides/connect.md, as it stands there, drives the rig to a target."""
+    page = (Path(__file__).parents[2] / "docs" / "guides" / "connect.md").read_text()
+    found = re.search(r"^```python\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL)
+    assert found is not None
+    names: dict[str, Any] = {}
+    exec(found[1], names)  # the guide is ours
+    robot = calibrated()
+    with running_rig(robot) as rig:
+        length = names["to_target"](rig.address, robot, TARGET)
+        assert not rig.truth()[1].any()
+    position = (length[:6] - robot.pid.min_length_m) / robot.pid.range_m
+    assert np.abs(position - TARGET).max() < 1.5 * robot.pid.tolerance

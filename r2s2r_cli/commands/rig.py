@@ -168,7 +168,10 @@ def _need_mujoco() -> None:
 
 @contextmanager
 def _until_told(seconds: float | None) -> Iterator[Callable[[], bool]]:
-    """A function that says whether it is time to end: Ctrl-C, SIGTERM, or the time asked for. A second signal insists."""
+    """A function that says whether it is time to end: Ctrl-C, SIGTERM, or the time asked for.
+
+    A second signal insists: it interrupts whatever the loop may hang in.
+    """
     told = Event()
 
     def tell(*_: object) -> None:

@@ -74,6 +74,8 @@ class Plant:
         self._sense = tuple(law for law in self.laws if overrides(law, "sense"))
         self.winches.use(self.laws)
         self._ground, self._caps = int(self.sim.model.geom("ground").id), self._cap_geoms()
+        ridges = range(len(options.ridges))
+        self._floor = {self._ground, *(int(self.sim.model.geom(f"ridge{i}").id) for i in ridges)}
         self._cap_of = {int(geom): i for i, geom in enumerate(self._caps)}
         self._mu = np.full(len(self._caps), self.sim.model.geom_friction[self._ground, 0])
         if self._friction:
@@ -151,12 +153,15 @@ class Plant:
         data, force, six = self.sim.data, np.zeros((len(self._caps), 3)), np.zeros(6)
         for i in range(data.ncon):
             a, b = (int(x) for x in data.contact.geom[i])
-            if self._ground not in (a, b) or data.contact.efc_address[i] < 0:
+            if (a in self._cap_of) == (b in self._cap_of) or data.contact.efc_address[i] < 0:
+                continue
+            cap, of_cap = (b, 1.0) if b in self._cap_of else (a, -1.0)
+            if (a if cap == b else b) not in self._floor:
                 continue
             mujoco.mj_contactForce(self.sim.model, data, i, six)
             # The first axis of a contact's frame points from its first geom to its second.
             f = data.contact.frame[i].reshape(3, 3).T @ six[:3]
-            force[self._cap_of[b if a == self._ground else a]] += f if a == self._ground else -f
+            force[self._cap_of[cap]] += of_cap * f
         return force
 
     def _laws(self) -> tuple[Law, ...]:

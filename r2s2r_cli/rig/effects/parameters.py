@@ -12,7 +12,7 @@ from r2s2r_cli.rig.effects.contact import CapRadius, RollingResistance, SoftGrou
 from r2s2r_cli.rig.effects.friction import CapFriction, FrictionAnisotropy, FrictionField, Stribeck
 from r2s2r_cli.rig.effects.mass import ComOffset, Payload
 from r2s2r_cli.rig.effects.motors import CommandLatency, LoadDroop, MotorDeadZone, MotorLag, MotorSpeedMismatch
-from r2s2r_cli.rig.effects.place import AirDrag, GroundSlope, TetherDrag, ViscousContact
+from r2s2r_cli.rig.effects.place import AirDrag, GroundSlope, Obstacle, TetherDrag, ViscousContact
 from r2s2r_cli.rig.effects.sensing import SensorBias, SensorGain, SensorSaturation
 from r2s2r_cli.rig.effects.winches import AttachmentOffset, Backlash, SpoolBuildup
 from r2s2r_cli.rig.section import Section
@@ -46,6 +46,7 @@ class Effects(Section):
     cap_friction: CapFriction | None = None
     cap_radius: CapRadius | None = None
     ground_slope: GroundSlope | None = None
+    obstacle: Obstacle | None = None
     tether_drag: TetherDrag | None = None
     air_drag: AirDrag | None = None
     sensor_bias: SensorBias | None = None

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Annotated
 
 import mujoco
 import numpy as np
+from pydantic import Field
 
-from r2s2r_cli.rig.camera.settings import CameraSettings
+from r2s2r_cli.rig.camera.settings import CameraSettings, Occluder, Rgb
 from r2s2r_cli.rig.effects.base import EffectSection, Law, Scene
 from r2s2r_cli.rig.effects.contact import cap_geoms
-from r2s2r_cli.rig.model.options import Options
-from r2s2r_cli.rig.section import Index, NonNegative, Slope, Vector3
+from r2s2r_cli.rig.model.mjcf_text import ground_rotation
+from r2s2r_cli.rig.model.options import Options, Ridge
+from r2s2r_cli.rig.section import Index, NonNegative, Slope, Vector2, Vector3
 
 
 class GroundSlope(EffectSection):
@@ -36,6 +39,36 @@ class GroundSlope(EffectSection):
         x, y, z = 0.0, -math.sin(self.angle_x_rad), math.cos(self.angle_x_rad)
         a = self.angle_y_rad
         return (math.cos(a) * x + math.sin(a) * z, y, math.cos(a) * z - math.sin(a) * x)
+
+
+class Obstacle(EffectSection):
+    """A ridge: a round bar that lies half sunk in the floor."""
+
+    from_m: Vector2 = (0.2, -0.5)
+    """Where it begins [m], along the floor ..."""
+    to_m: Vector2 = (0.2, 0.5)
+    """... and where it ends [m]."""
+    height_m: Annotated[float, Field(strict=True, gt=0, le=0.1)] = 0.01
+    """How far it stands out of the floor: its radius [m]."""
+    rgb: Rgb = (90, 85, 80)
+    """Its colour in the picture."""
+
+    def options(self, options: Options) -> Options:
+        """A capsule of MuJoCo's in the plane of the floor, whatever its slope."""
+        a, b = self.ends(options.ground_normal)
+        return replace(options, ridges=(*options.ridges, Ridge(a, b, self.height_m)))
+
+    def seen(self, camera: CameraSettings) -> CameraSettings:
+        """It is in the picture."""
+        a, b = self.ends(camera.floor_normal)
+        bar = Occluder(a_m=a, b_m=b, radius_m=self.height_m, rgb=self.rgb)
+        return camera.model_copy(update={"occluders": (*camera.occluders, bar)})
+
+    def ends(self, normal: Vector3) -> tuple[Vector3, Vector3]:
+        """In frame W [m], on a floor with this normal."""
+        R_WG = ground_rotation(normal)
+        a, b = (R_WG @ np.array([*xy, 0.0]) for xy in (self.from_m, self.to_m))
+        return (a[0], a[1], a[2]), (b[0], b[1], b[2])
 
 
 class TetherDrag(EffectSection):

@@ -115,6 +115,11 @@ def _world(robot: Robot, options: Options, pose: Pose) -> Iterator[str]:
         f'    <geom name="ground" class="ground" pos="{_n(*(options.ground_offset_m * R_WG[:, 2]))}" '
         f'quat="{_n(*wxyz(quaternion(R_WG)))}"/>'
     )
+    for i, ridge in enumerate(options.ridges):
+        yield (
+            f'    <geom name="ridge{i}" class="ground" type="capsule" fromto="{_n(*ridge.a, *ridge.b)}" '
+            f'size="{_n(ridge.radius)}"/>'
+        )
     for i, rod in enumerate(robot.rods):
         yield from _rod(robot, rod, i, pose, options)
     yield "  </worldbody>"
@@ -126,7 +131,7 @@ def _rod(robot: Robot, rod: Rod, i: int, pose: Pose, options: Options) -> Iterat
     yield f"    <!-- rod {i}, end caps {2 * i} and {2 * i + 1} -->"
     kind = ' simple="false"' if options.movable_mass else ""
     place = f'pos="{_n(*pose.p_WR[i])}" quat="{_n(*wxyz(pose.q_WR[i]))}"'
-    yield f'    <body name={quoteattr("rod_" + rod.name)} {place}{kind}>'
+    yield f"    <body name={quoteattr('rod_' + rod.name)} {place}{kind}>"
     yield "      <freejoint/>"
     yield f'      <inertial mass="{_n(body.mass)}" pos="{_n(*body.p_RB)}" diaginertia="{_n(*body.inertia)}"/>'
     yield (

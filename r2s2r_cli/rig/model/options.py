@@ -15,6 +15,15 @@ Cone = Literal["elliptic", "pyramidal"]
 Integrator = Literal["Euler", "implicitfast"]
 
 
+@dataclass(frozen=True)
+class Ridge:
+    """A round bar that lies fixed on the ground: a line from a to b [m], frame W, and its radius [m]."""
+
+    a: Vector
+    b: Vector
+    radius: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class Options:
     """World and numerics. The defaults are close to MuJoCo's own; `STIFF` is for comparisons."""
@@ -26,6 +35,8 @@ class Options:
     """Upwards from the ground, frame W; of any length above 0."""
     ground_offset_m: float = 0.0
     """Distance of the ground plane from the origin of W along its normal."""
+    ridges: tuple[Ridge, ...] = ()
+    """Part of the ground: of its friction, met by caps alone."""
     friction: float | None = None
     """Coulomb coefficient of caps on the ground; None: that of robot.toml."""
     restitution: float | None = None

@@ -67,8 +67,8 @@ class MujocoSim:
         self._zero = rest_pose(robot).rest
         self._half = np.array([rod.length_m / 2 for rod in robot.rods])
         self._caps = np.array([cable.caps for cable in robot.cables])
-        self._ground = self.model.geom("ground").id
         names = [self.model.geom(i).name for i in range(self.model.ngeom)]
+        self._ground = {i for i, name in enumerate(names) if name == "ground" or name.startswith("ridge")}
         self._cap_of = {i: int(name[3:]) for i, name in enumerate(names) if name.startswith("cap")}
         self.reset()
 
@@ -142,8 +142,8 @@ class MujocoSim:
         touching = np.zeros(len(p_WE), dtype=bool)
         collisions = 0
         for a, b in scratch.contact.geom[scratch.contact.efc_address >= 0]:
-            if self._ground in (a, b):
-                touching[self._cap_of[int(b if a == self._ground else a)]] = True
+            if a in self._ground or b in self._ground:
+                touching[self._cap_of[int(b if a in self._ground else a)]] = True
             else:
                 collisions += 1
         return Reading(

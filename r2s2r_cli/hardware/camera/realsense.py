@@ -14,6 +14,7 @@ import numpy as np
 
 from r2s2r_cli.devices.camera import CameraError, Frame, Intrinsics
 from r2s2r_cli.hardware.camera.closing import Closing
+from r2s2r_cli.hardware.camera.rectify import Rectifier
 
 _HALF_PIXEL = 0.5
 """Librealsense puts the centre of the first pixel at 0, this project at 0.5."""
@@ -22,7 +23,11 @@ _LATE = ("didn't arrive", "did not arrive", "timeout")
 
 
 class RealSenseCamera(Closing):
-    """Colour and depth of one device, depth aligned to colour by librealsense."""
+    """Colour and depth of one device, depth aligned to colour by librealsense, both rectified here.
+
+    A lens of librealsense's model `inverse_brown_conrady` is taken for OpenCV's, from which it differs in second order;
+    such devices have small coefficients or none.
+    """
 
     def __init__(
         self, serial: str = "", *, width: int = 640, height: int = 480, rate_hz: int = 30,
@@ -36,6 +41,7 @@ class RealSenseCamera(Closing):
         self.rate_hz = float(rate_hz)
         self.depth_scale = 0.0
         self.intrinsics = Intrinsics(width, height, 1.0, 1.0, width / 2, height / 2)
+        self._rectify = Rectifier(self.intrinsics)
 
     def open(self) -> None:
         """Start the streams. Raises CameraError: no library, no device, a mode that it does not have."""
@@ -58,8 +64,10 @@ class RealSenseCamera(Closing):
         self._pipeline, self._align = pipeline, rs.align(rs.stream.color)
         self.depth_scale = float(device.first_depth_sensor().get_depth_scale())
         k = profile.get_stream(rs.stream.color).as_video_stream_profile().get_intrinsics()
-        self.intrinsics = Intrinsics(int(k.width), int(k.height), float(k.fx), float(k.fy), float(k.ppx) + _HALF_PIXEL,
-                                     float(k.ppy) + _HALF_PIXEL, _distortion(k))  # fmt: skip
+        lens = Intrinsics(int(k.width), int(k.height), float(k.fx), float(k.fy), float(k.ppx) + _HALF_PIXEL,
+                          float(k.ppy) + _HALF_PIXEL, _distortion(k))  # fmt: skip
+        self._rectify = Rectifier(lens)
+        self.intrinsics = self._rectify.intrinsics
         about = rs.camera_info
         self.name = f"{device.get_info(about.name)} {device.get_info(about.serial_number)}"
 
@@ -77,10 +85,11 @@ class RealSenseCamera(Closing):
         color, depth = pair.get_color_frame(), pair.get_depth_frame()
         if not color or not depth:
             return None
-        return Frame(
-            np.array(color.get_data(), dtype=np.uint8), np.array(depth.get_data(), dtype=np.uint16),
-            float(color.get_timestamp()) / 1000.0, self._now(), int(color.get_frame_number()),
-        )  # fmt: skip
+        arrived, stamp = self._now(), float(color.get_timestamp()) / 1000.0
+        straight = self._rectify(
+            np.array(color.get_data(), dtype=np.uint8), np.array(depth.get_data(), dtype=np.uint16)
+        )
+        return Frame(*straight, stamp, arrived, int(color.get_frame_number()))
 
     def close(self) -> None:
         """Stop the streams."""

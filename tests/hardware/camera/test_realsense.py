@@ -6,12 +6,14 @@ import sys
 from types import SimpleNamespace
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
-from r2s2r_cli.devices.camera import CameraError
+from r2s2r_cli.devices.camera import CameraError, Intrinsics
 from r2s2r_cli.hardware.camera.realsense import RealSenseCamera
 from r2s2r_cli.hardware.camera.realsense_open3d import Open3DCamera
+from r2s2r_cli.hardware.camera.rectify import Rectifier
 
 COLOR = np.arange(4 * 6 * 3, dtype=np.uint8).reshape(4, 6, 3)
 DEPTH = np.arange(24, dtype=np.uint16).reshape(4, 6)
@@ -161,3 +163,25 @@ def test_open3d_without_a_device_is_a_clear_error() -> None:
     """init_sensor that fails names the camera."""
     with pytest.raises(CameraError, match="does not start"), Open3DCamera(library=FakeOpen3D(started=False)):
         pass
+
+
+def test_pictures_of_a_distorted_lens_are_straightened() -> None:
+    """Points seen through barrel distortion come out where a pinhole has them, in colour and in depth."""
+    lens = Intrinsics(320, 240, 250.0, 250.0, 160.5, 120.5, (-0.15, 0.02, 0.001, -0.001, 0.0))
+    K = np.array([[250.0, 0, 160.0], [0, 250.0, 120.0], [0, 0, 1]])
+    points = np.array([[x, y, 1.0] for x in (-0.5, -0.2, 0.3) for y in (-0.35, 0.1, 0.33)])
+    distorted, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), K, np.array(lens.distortion))
+    color, depth = np.zeros((240, 320, 3), np.uint8), np.full((240, 320), 500, np.uint16)
+    for k, (u, v) in enumerate(distorted[:, 0]):
+        cv2.circle(color, (round(u), round(v)), 4, (255, 255, 255), -1)
+        cv2.circle(depth, (round(u), round(v)), 4, 1000 + k, -1)
+    rectifier = Rectifier(lens)
+    straight, far = rectifier(color, depth)
+    assert rectifier.intrinsics == Intrinsics(320, 240, 250.0, 250.0, 160.5, 120.5)
+    for k, (x, y, _) in enumerate(points):
+        rows, columns = np.nonzero(far == 1000 + k)
+        seen = np.array([columns.mean(), rows.mean()]) + 0.5
+        assert seen == pytest.approx([160.5 + 250 * x, 120.5 + 250 * y], abs=1.0)
+        assert straight[round(rows.mean()), round(columns.mean())].min() > 200
+    moved = np.abs(distorted[:, 0] + 0.5 - [[160.5 + 250 * x, 120.5 + 250 * y] for x, y, _ in points]).max()
+    assert moved > 3  # the distortion was there

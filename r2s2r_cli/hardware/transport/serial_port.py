@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import select
 import time
 from typing import Any
@@ -86,10 +87,22 @@ class SerialPort:
         import serial
 
         with port_errors(self.name, "writing"):
+            port, number = self._opened(), self._number()
+            if number is not None:
+                return self._write(number, data)
             try:
-                self._opened().write(data)
+                port.write(data)
             except serial.SerialTimeoutException:
                 raise not_taken(self.name, WRITE_TIMEOUT) from None
+
+    def _write(self, number: int, data: bytes) -> None:
+        """Without pyserial, which calls it a time-out where this process was held up after all had been written."""
+        end = time.monotonic() + WRITE_TIMEOUT
+        while data:
+            with contextlib.suppress(BlockingIOError):
+                data = data[os.write(number, data) :]
+            if data and not select.select([], [number], [], max(0.0, end - time.monotonic()))[1]:
+                raise not_taken(self.name, WRITE_TIMEOUT)
 
     def close(self) -> None:
         """Never raises."""

@@ -115,14 +115,16 @@ def read_truth(path: Path) -> Truth:
     """Of the log, without a last row that was cut off."""
     lines = path.read_text().splitlines()
     names = lines[0].split(",")
-    rows = [row for row in (line.split(",") for line in lines[1:]) if len(row) == len(names)]
-    table = np.array(rows, dtype=float)
+    rows = [row for row in (line.split(",") for line in lines[1:]) if len(row) == len(names) and row[-1]]
+    table = np.array(rows, dtype=float).reshape(-1, len(names))
 
     def columns(word: str) -> np.ndarray:
         return table[:, [i for i, name in enumerate(names) if re.fullmatch(word, name)]]
 
     caps = columns(r"cap\d+_[xyz]_m")
-    return Truth(table[:, 0], columns(r"length\d+_m"), columns(r"duty\d+"), caps.reshape(len(table), -1, 3))
+    return Truth(
+        table[:, 0], columns(r"length\d+_m"), columns(r"duty\d+"), caps.reshape(len(table), caps.shape[1] // 3, 3)
+    )
 
 
 def aligned_error(t: np.ndarray, length: np.ndarray, truth: Truth) -> np.ndarray:

@@ -122,7 +122,9 @@ def _robot(robot: Robot, health: LinkHealth) -> Iterator[Probe]:
                     found=f"median {typical:.1f} ms, 99 % below {most:.1f} ms")  # fmt: skip
     if counts.clock_offset is not None:
         drift = f", drift {counts.clock_drift * 1e6:+.0f} ppm" if counts.clock_drift is not None else ""
-        yield Probe(name="clock offset", state="ok", found=f"host minus board {counts.clock_offset:.4f} s{drift}")
+        jumps = f", {counts.clock_jumps} jumps" if counts.clock_jumps else ""
+        yield Probe(name="clock offset", state="warning" if jumps else "ok",
+                    found=f"host minus board {counts.clock_offset:.4f} s{drift}{jumps}")  # fmt: skip
     if health.voltage is not None:
         yield Probe(name="battery", state="ok", found=f"{health.voltage:.2f} V")
 

@@ -79,11 +79,12 @@ class LinkStatistics:
     """Health of a link since it was opened. A number that the protocol cannot tell is None.
 
     received: good messages; sent: commands and stops. lost, repeated, reordered: by sequence number. corrupt: a wrong
-    check sum, or no line of the protocol. other: status texts. overlong: lines cut. reconnects:
-    how often the port was opened again. refused: commands that the device did not take; held: how often its watchdog
-    stopped the motors; device_corrupt, device_lost: what it counted in our lines. latency_median, latency_p99: a line
-    of ours to its acknowledgement [s]. clock_offset: host minus board clock [s], clock_drift: its slope [1]. gap_max:
-    longest silence while running [s]. last_status: the last text that a board said.
+    check sum, or no line of the protocol. other: status texts. overlong: lines cut. reconnects: how often the port was
+    opened again. refused: commands that the device did not take; held: how often its watchdog stopped the motors;
+    device_corrupt, device_lost: what it counted in our lines. latency_median, latency_p99: a line of ours to its
+    acknowledgement [s]. clock_offset: host minus board clock [s], clock_drift: its slope [1]; clock_jumps: how often a
+    board's clock jumped, or the board started anew. gap_max: longest silence while running [s]. last_status: the last
+    text that a board said.
     """
 
     received: int = 0
@@ -103,6 +104,7 @@ class LinkStatistics:
     latency_p99: float | None = None
     clock_offset: float | None = None
     clock_drift: float | None = None
+    clock_jumps: int = 0
     gap_max: float = 0.0
     last_status: str = ""
 

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 HELD_UP = 1.0
 """[s] after which a host that never gets to the end of what waits is judged by what it has read."""
+BACKLOG = 100_000
+"""Messages that are thrown away at the beginning of a run at most."""
 SILENT = 5.0
 """[s] of the wall's clock without any message in lock-step, where the world's clock stands still."""
 
@@ -87,7 +89,13 @@ class GuardedLink:
         self.inner.__exit__(kind, value, trace)
 
     def restart(self, *, time_limit: float | None = None) -> None:
-        """A new run: the time limit begins anew, what was watched is forgotten."""
+        """A new run: the time limit begins anew, what was watched is forgotten, and so is what waits to be read.
+
+        Raises LinkError.
+        """
+        for _ in range(BACKLOG):
+            if self.inner.read(0.0) is None:
+                break
         if time_limit is not None:
             self.time_limit = time_limit
         self._start = self._heard = self.now()

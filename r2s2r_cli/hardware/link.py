@@ -236,6 +236,8 @@ class Link:
         match event:
             case Reading():
                 self._note(event.state)
+                if not self.lock_step:
+                    self._tally.stamped(event.board, message.t, event.t_board)
                 self._samples.append(self._picture.add(event, message.t if t is None else t))
             case Ack():
                 self._tally.answered(event.of, message.t, event.t_board)
@@ -258,6 +260,7 @@ class Link:
         """The readings of one tick in lock-step, at the time of its end [s]: the last one is due."""
         last = max((i for i, (reading, _) in enumerate(messages) if reading.measures), default=-1)
         for i, (reading, t) in enumerate(messages):
+            self._tally.stamped(reading.board, t, reading.t_board)
             self._samples.append(self._picture.add(reading, t, due=i == last))
 
     def next_sample(self) -> Sample | None:

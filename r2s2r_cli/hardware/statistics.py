@@ -17,6 +17,9 @@ _PENDING = 512
 _LATENCIES = 4096
 _POINTS = 2048
 """Points of the clock comparison; then every other one is dropped."""
+JUMP = 1.0
+"""[s] by which a board's clock goes otherwise than ours from one message to the next, when it is said to have jumped.
+More than a host is ever held up: then messages come late all together."""
 _WINDOW = 1.0
 """[s] of which the quickest answer is kept: it says most about the clocks."""
 
@@ -76,10 +79,15 @@ class Clocks:
         self._points: list[tuple[float, float]] = []
         self._best = (float("inf"), 0.0, 0.0)
         self._end = -float("inf")
+        self._last: float | None = None
 
     def answer(self, sent: float, received: float, t_board: float) -> None:
         """One question and its answer [s]."""
         round_trip, middle = received - sent, (sent + received) / 2
+        if self._last is not None and abs(middle - t_board - self._last) > JUMP:
+            # From here on it is another clock.
+            self._points, self._best = [], (float("inf"), 0.0, 0.0)
+        self._last = middle - t_board
         if received > self._end and np.isfinite(self._best[0]):
             self._points.append(self._best[1:])
             if len(self._points) > _POINTS:
@@ -117,6 +125,8 @@ class Tally:
         self._pending: dict[int, float] = {}
         self._latency: deque[float] = deque(maxlen=_LATENCIES)
         self._clocks = Clocks()
+        self._stamps: dict[int, tuple[float, float]] = {}
+        self.clock_jumps = 0
 
     def restart(self) -> None:
         """The port was opened again: numbers, clocks and silences begin anew, counts go on."""
@@ -124,6 +134,7 @@ class Tally:
             self.numbers.restart()
         self._pending.clear()
         self._clocks = Clocks()
+        self._stamps.clear()
         self._last_t = None
 
     def heard(self, t: float) -> None:
@@ -131,6 +142,14 @@ class Tally:
         if self._last_t is not None:
             self.gap_max = max(self.gap_max, t - self._last_t)
         self._last_t = t
+
+    def stamped(self, board: int, t: float, t_board: float) -> None:
+        """A board's message came at t with its own stamp [s], NaN: none."""
+        if t_board != t_board:
+            return
+        before, self._stamps[board] = self._stamps.get(board), (t, t_board)
+        if before is not None and abs((t_board - before[1]) - (t - before[0])) > JUMP:
+            self.clock_jumps += 1
 
     def silent(self, t: float) -> float:
         """How long nothing has come [s]; counts as a gap. 0 before the first message."""
@@ -167,5 +186,6 @@ class Tally:
             device_corrupt=self.device_corrupt, device_lost=self.device_lost,
             latency_median=float(np.median(latency)) if len(latency) else None,
             latency_p99=float(np.percentile(latency, 99)) if len(latency) else None,
-            clock_offset=offset, clock_drift=drift, gap_max=self.gap_max, last_status=self.last_status,
+            clock_offset=offset, clock_drift=drift, clock_jumps=self.clock_jumps,
+            gap_max=self.gap_max, last_status=self.last_status,
         )  # fmt: skip

@@ -78,3 +78,21 @@ def test_boards_may_overtake_each_other() -> None:
     assert [numbers.new(seq, board) for seq, board in arrivals] == [True, True, True, True, False, True]
     assert (numbers.lost, numbers.reordered) == (0, 2)
     assert not numbers.new(0, 0) and numbers.repeated == 1
+
+
+def test_a_clock_that_jumps_is_counted_and_its_past_forgotten() -> None:
+    """Forwards, and back to 0 as after a restart; a host that is held up for half a second is no jump."""
+    tally = Tally(numbered=True)
+    t_board = 50.0
+    for i in range(3000):
+        t = 0.02 * i + (0.5 if 1000 <= i < 1010 else 0)
+        t_board += 0.02 * (1 + 1e-4) + {500: 7.0, 2000: -t_board}.get(i, 0.0)
+        tally.stamped(0, t, t_board)
+        tally.stamped(1, t, 0.02 * i)
+        tally.stamped(2, t, math.nan)
+        tally.asked(i, t - 0.002)
+        tally.answered(i, t, t_board)
+    found = tally.snapshot(0)
+    assert found.clock_jumps == 2
+    assert found.clock_drift == pytest.approx(-1e-4, abs=2e-5)
+    assert found.clock_offset == pytest.approx(t - 0.001 - t_board, abs=1e-3)

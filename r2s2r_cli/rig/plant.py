@@ -64,6 +64,7 @@ class Plant:
         self.sim = MujocoSim(robot, options)
         self.winches = Winches(robot)
         self._n = len(robot.actuated)
+        self._ends = np.array([cable.caps for cable in robot.cables])
         self._h = float(self.sim.model.opt.timestep)
         self._zero = rest_pose(robot).rest
         self._pose = _placed(rest_pose(robot), world, options)
@@ -107,8 +108,7 @@ class Plant:
     def lengths(self) -> np.ndarray:
         """Distances of cap centres [m], (cable,): what the sensors are stretched by, laws of sensing apart."""
         p = self.sim.data.geom_xpos[self._caps]
-        pairs = self.sim._caps
-        return np.asarray(np.linalg.norm(p[pairs[:, 1]] - p[pairs[:, 0]], axis=-1))
+        return np.asarray(np.linalg.norm(p[self._ends[:, 1]] - p[self._ends[:, 0]], axis=-1))
 
     def sensed(self) -> np.ndarray:
         """The same with the laws of sensing [m], (cable,)."""

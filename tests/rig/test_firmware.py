@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from r2s2r_cli.errors import UsageError
 from r2s2r_cli.rig.firmware import BoardSample, Firmware, nominal_calibration, points_csv
 from r2s2r_cli.rig.firmware.inertial import InertialUnit
 from r2s2r_cli.rig.firmware.layout import posts
@@ -347,6 +348,14 @@ def test_a_reset_board_forgets_everything() -> None:
     assert [s.status for s in mine[1:]] == [None] * (len(mine) - 1)
     assert mine[0].t_board == pytest.approx(mine[0].t - 0.5, abs=1e-4)
     assert plant.truth().angle[0] / plant.winches._full[0] == pytest.approx(0.5 * 0.2, rel=0.03)
+
+
+def test_a_fault_of_a_board_that_is_not_there_is_refused() -> None:
+    """The message names the key, the numbers that there are, and why."""
+    with pytest.raises(UsageError) as error:
+        make(boards={"layout": "central"}, faults=[{"kind": "board_silent", "board": 1, "at_s": 0.0}])
+    assert error.value.where.endswith("faults.0.board")
+    assert "central" in error.value.expected
 
 
 def test_a_central_board_has_everything_in_each_sample() -> None:

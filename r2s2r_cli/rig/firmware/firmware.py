@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from r2s2r_cli.errors import UsageError
 from r2s2r_cli.rig.firmware.board import Board
 from r2s2r_cli.rig.firmware.generators import generator
 from r2s2r_cli.rig.firmware.inertial import InertialUnit
@@ -24,10 +25,11 @@ class Firmware:
     """The boards. Their time is the plant's; `tick` moves both on. Deterministic from the world's seed.
 
     A motor keeps its duty until it gets another: the authors' boards have no watchdog, and the one of our protocol is
-    part of the protocol.
+    part of the protocol. Raises UsageError for a fault of a board that is not there.
     """
 
     def __init__(self, robot: Robot, world: World, plant: Plant) -> None:
+        _check(world, len(posts(robot, world.boards.layout)))
         self._plant, self._settings = plant, world.boards
         self._rods, self._motors, self._sensors = len(robot.rods), len(robot.motors), len(robot.sensors)
         self._sign = np.array([motor.sign for motor in robot.motors], dtype=float)
@@ -130,3 +132,14 @@ class Firmware:
             board=board.number, t=t, t_board=board.clock(t), pF=pF, encoder=encoder, a_B=a_B, w_WB=w_WB, q_WB=q_WB,
             battery=self._settings.supply_v * self._plant.winches.share, status=board.greeting(t),
         )  # fmt: skip
+
+
+def _check(world: World, boards: int) -> None:
+    for i, fault in enumerate(world.faults):
+        board = getattr(fault, "board", 0)
+        if board >= boards:
+            raise UsageError(
+                f"the robot has no board {board}", where=f"world file: faults.{i}.board",
+                expected=f"0 to {boards - 1} (boards.layout is {world.boards.layout})", received=str(board),
+                hint=f"correct faults.{i}.board in the world file",
+            )  # fmt: skip

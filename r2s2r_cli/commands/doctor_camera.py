@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -37,7 +38,10 @@ def camera(
     ] = "realsense",
     frames: Annotated[int, typer.Option("--frames", min=1, max=900, help="How many frames are looked at.")] = 30,
     preview: Annotated[
-        Path | None, typer.Option("--preview", metavar="PNG", help="Draw what the camera sees, with pixel coordinates.")
+        Path | None,
+        typer.Option(
+            "--preview", metavar="FILE", help="What the camera sees: a .png, or a .html page to mark caps on."
+        ),
     ] = None,
     click: Annotated[
         list[str] | None, typer.Option("--click", metavar="ROD:U,V", help="A pixel on a cap of this rod; repeatable.")
@@ -56,7 +60,7 @@ def camera(
     """Look through a camera: geometry, pace, ground, and how the rods' colours are seen.
 
     Colour ranges are measured anew for rods whose caps are marked with --click or --box, at the coordinates that the
-    preview shows; --save writes them into robot.toml.
+    preview shows; a preview that is a page takes the clicks. --save writes them into robot.toml.
 
     Example: r2s2r doctor camera --camera rig://127.0.0.1:9000 --preview see.png
     """
@@ -78,7 +82,7 @@ def camera(
         )  # fmt: skip
     result = looked.result
     if preview is not None:
-        _draw(looked, device, preview)
+        _draw(looked, device, preview, f"r2s2r doctor camera --camera {shlex.quote(source)}")
         result = result.model_copy(update={"preview": str(preview)})
     if save and path is not None:
         _save(path, looked, len(boxes))
@@ -94,7 +98,7 @@ def camera(
     if any(rod.measured for rod in result.rods) and not save:
         console.hint("the same command with --save writes the measured ranges into robot.toml")
     elif preview is None:
-        console.hint("--preview see.png draws what the camera sees, with coordinates for --click")
+        console.hint("--preview see.html shows what the camera sees, and takes clicks on the caps")
 
 
 def _robot(project: Path | None, *, needed: bool) -> tuple[Path | None, Robot | None]:
@@ -137,16 +141,20 @@ def _take(device: Camera, count: int, console: Console) -> tuple[list[Frame], Fe
     return found, statistics
 
 
-def _draw(looked: Looked, device: Camera, target: Path) -> None:
+def _draw(looked: Looked, device: Camera, target: Path, command: str) -> None:
     import numpy as np
 
     from r2s2r_cli.store.atomic import write_bytes
+    from r2s2r_cli.views.camera_marks import marks_page
     from r2s2r_cli.views.camera_preview import draw_preview
 
     depth = looked.frame.depth
     z = np.where(depth > 0, depth * device.depth_scale, np.nan)
     title = f"{looked.result.name}, frame {looked.frame.number}"
     picture = draw_preview(looked.frame.color, z, looked.height, masks=looked.masks, title=title)
+    if target.suffix.lower() in (".html", ".htm"):
+        rods = [rod.rod for rod in looked.result.rods] or ["red", "green", "blue"]
+        picture = marks_page(looked.frame.color, rods, command=command, preview=picture, title=title)
     write_bytes(target, picture)
 
 

@@ -101,6 +101,15 @@ def test_clicks_and_boxes_become_ranges_in_robot_toml(spec: str, project: Path) 
         assert in_range(hsv_of(color), new[rod])[row, column]
 
 
+def test_the_page_takes_clicks(spec: str, project: Path) -> None:
+    """A preview that is a page holds the picture, the rods and the command that marks are appended to."""
+    code, _, err = run("--camera", spec, "--frames", "2", "--preview", "see.html")
+    assert code == 0, err
+    text = (project / "see.html").read_text()
+    assert f'"command": "r2s2r doctor camera --camera {spec}"' in text
+    assert all(f'value="{rod}"' in text for rod in ("red", "green", "blue"))
+
+
 def test_without_save_nothing_is_written(spec: str, project: Path) -> None:
     """Marks alone show the measured ranges, and the hint says how to keep them."""
     before = (project / "robot.toml").read_bytes()

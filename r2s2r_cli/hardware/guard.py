@@ -6,7 +6,7 @@ The robots of the authors have no watchdog, so nobody else stops them. Stopped i
 |---|---|
 | stale sensors | a winched cable's sensor, or a board, was not heard for 200 ms |
 | impossible sensors | a winched cable's sensor sends 0.20 pF (its chip is not set up) for 200 ms |
-| frozen sensor | the same value for 0.6 s while its motor was driven through 20 mm |
+| frozen sensor | the same value for 0.8 s while its motor was driven through 20 mm |
 | length out of range | outside the limits of robot.toml by more than 20 mm, three messages in a row |
 | time limit | the run takes longer than it was given |
 | exit, exception, SIGINT, SIGTERM | leaving the context; `signals.py` turns both signals into exceptions |
@@ -28,6 +28,8 @@ from r2s2r_cli.hardware.watch import STALE, Watch
 if TYPE_CHECKING:
     from schemas.robot import Robot
 
+LOOK = 0.02
+"""[s] after which the clock is looked at where nothing comes."""
 HELD_UP = 1.0
 """[s] after which a host that never gets to the end of what waits is judged by what it has read."""
 BACKLOG = 100_000
@@ -111,7 +113,7 @@ class GuardedLink:
         self._next, self._judged = None, self._heard
 
     def read(self, timeout: float) -> Sample | None:
-        """As of the link, but returns at least every 50 ms of silence inside to look at the clock.
+        """As of the link, but looks at the clock in between while nothing comes.
 
         Raises SafetyStop once a duty asks for it; the motors are stopped by then.
         """
@@ -119,12 +121,12 @@ class GuardedLink:
         end = self.now() + timeout
         while True:
             left = end - self.now()
-            sample, self._next = self._next or self.inner.read(max(0.0, min(left, STALE / 4))), None
+            sample, self._next = self._next or self.inner.read(max(0.0, min(left, LOOK))), None
             if sample is not None:
                 self._heard, self._wall = self.now(), time.monotonic()
                 self._object(self._watch.sample(sample, self._moving))
             self._object(self._clock())
-            if sample is not None or left <= STALE / 4:
+            if sample is not None or left <= LOOK:
                 return sample
 
     def command(self, speed: np.ndarray) -> None:

@@ -14,10 +14,11 @@ if TYPE_CHECKING:
 
 STALE = 0.2
 """[s] after which a reading is too old to drive on."""
-FROZEN_FOR = 0.6
-"""[s] of one and the same value ..."""
+FROZEN_FOR = 0.8
+"""[s] of one and the same value. Not less: a step of the authors' 10-bit chip is 1 mm, so that at rest it sends the same
+value up to 18 times in a row (measured on the rig's, in 1,000 readings of noise 0.55 mm) ..."""
 FROZEN_PATH = 0.02
-"""... while the winch was driven through this [m]. A living sensor changes by its noise alone."""
+"""... while the winch was driven through this [m]."""
 OUT_FOR = 3
 """Messages in a row: one bad number is no reason."""
 MARGIN = 0.02

@@ -94,7 +94,7 @@ def stuck(value: float) -> Callable[[int, np.ndarray], np.ndarray]:
     ("wrong", "what", "after"),
     [
         (stuck(NOT_INITIALISED), "sends 0.20 pF", 0.2), (stuck(np.nan), "no good reading of cable 3", 0.2),
-        (stuck(SLOPE * 0.15 + OFFSET), "frozen sensor: that of cable 3", 0.6),
+        (stuck(SLOPE * 0.15 + OFFSET), "frozen sensor: that of cable 3", 0.8),
         (stuck(SLOPE * 0.45 + OFFSET), "cable 3 measures 450 mm", 0.04),
         (stuck(SLOPE * 0.01 + OFFSET), "cable 3 measures 10 mm", 0.04),
         (lambda k, c: None if k * TICK > 1 else c, "nothing came for", 0.2),

@@ -188,3 +188,16 @@ def test_bugs_stay_bugs() -> None:
     """What is no matter of the port goes through."""
     with pytest.raises(KeyError), port_errors("/dev/ttyX", "reading"):
         raise KeyError("bug")
+
+
+def test_other_urls_of_pyserial_work_without_a_file_descriptor() -> None:
+    """loop:// gives back what it is sent: whole lines, silence as None, one error once closed."""
+    port = transport("loop://")
+    port.open()
+    port.send(b"part\nwhole ")
+    assert port.receive(0.03) is None
+    port.send(b"line\n")
+    assert lines(port, 1) == [b"whole line"]
+    port.close()
+    with pytest.raises(LinkError):
+        port.send(b"x")

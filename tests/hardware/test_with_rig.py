@@ -56,8 +56,8 @@ def test_the_controller_reaches_its_target_in_every_protocol_over_every_link(lin
     ("fault", "what", "limit"),
     [
         ({"kind": "sensor_stuck", "sensor": 3}, "0.20 pF", 0.2),
-        ({"kind": "sensor_frozen", "sensor": 3}, "frozen", 0.6),
-        ({"kind": "sensor_jump", "sensor": 3, "by_m": 0.3}, "out of range", 0.1),
+        ({"kind": "sensor_frozen", "sensor": 3}, "frozen", 0.8),
+        ({"kind": "sensor_jump", "sensor": 3, "by_m": 0.3}, "out of range", 0.08),
         ({"kind": "board_silent", "board": 1}, "no good reading", 0.2),
     ],
 )  # fmt: skip
@@ -75,7 +75,7 @@ def test_a_fault_of_the_sensors_stops_the_rig(fault: dict[str, object], what: st
         duty = rig.truth()[1]
     reached = [0, 2, 4, 5] if (fault["kind"], protocol) == ("board_silent", "boards") else range(6)
     assert not duty[reached].any(), "a board of the authors that is deaf cannot be stopped, all others are"
-    assert 0.5 < stopped <= 0.5 + limit + 0.1
+    assert 0.5 < stopped <= 0.5 + limit + 0.05, "two ticks for the question, the stop and the goodbye"
 
 
 def back_and_forth(host: GuardedLink) -> None:

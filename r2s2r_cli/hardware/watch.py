@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 STALE = 0.2
 """[s] after which a reading is too old to drive on."""
 FROZEN_FOR = 0.8
-"""[s] of one and the same value. Not less: a step of the authors' 10-bit chip is 1 mm, so that at rest it sends the same
-value up to 18 times in a row (measured on the rig's, in 1,000 readings of noise 0.55 mm) ..."""
+"""[s] of one and the same value. Not less: a step of the authors' 10-bit chip is 1 mm, so that at rest it sends the
+same value up to 18 times in a row (measured on the rig's, in 1,000 readings of noise 0.55 mm) ..."""
 FROZEN_PATH = 0.02
 """... while the winch was driven through this [m]."""
 OUT_FOR = 3

@@ -65,13 +65,16 @@ def test_exact_sensors_tell_the_length_through_the_calibration() -> None:
 
 
 def test_the_calibration_of_robot_toml_comes_first() -> None:
-    """A calibrated sensor has the slope and offset of robot.toml; the world file's are for the others."""
+    """A calibrated sensor has the slope and offset of robot.toml, unless the world file says otherwise; the world file's
+    are for the others."""
     sensor = ROBOT.sensors[0].model_copy(update={"slope_f_per_m": 2e-11, "offset_f": 1e-11})
-    slope, offset = nominal_calibration(
-        ROBOT.model_copy(update={"sensors": (sensor, *ROBOT.sensors[1:])}), World().sensors
-    )
+    robot = ROBOT.model_copy(update={"sensors": (sensor, *ROBOT.sensors[1:])})
+    slope, offset = nominal_calibration(robot, World().sensors)
     assert (slope[0], offset[0]) == (2e-11, 1e-11)
     assert (slope[1], offset[1]) == (3e-11, 1.4e-11)
+    slope, offset = nominal_calibration(robot, World().sensors.model_copy(update={"line": "own"}))
+    assert (slope == 3e-11).all()
+    assert (offset == 1.4e-11).all()
 
 
 def test_the_converter_is_that_of_the_robot() -> None:

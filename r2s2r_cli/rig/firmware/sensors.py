@@ -22,10 +22,16 @@ _PASSIVE_HALF_M = 0.05
 
 
 def nominal_calibration(robot: Robot, settings: Sensors) -> tuple[np.ndarray, np.ndarray]:
-    """Slope [F/m] and offset [F] of every sensor, (sensor,): that of `robot.toml`, else that of the world file."""
-    slope = [settings.slope_f_per_m if s.slope_f_per_m is None else s.slope_f_per_m for s in robot.sensors]
-    offset = [settings.offset_f if s.offset_f is None else s.offset_f for s in robot.sensors]
-    return np.array(slope, dtype=float), np.array(offset, dtype=float)
+    """Slope [F/m] and offset [F] of every sensor, (sensor,): that of `robot.toml` if it has one and the world file does
+    not refuse it, else that of the world file."""
+    lines = []
+    for sensor in robot.sensors:
+        if settings.line == "own" or sensor.slope_f_per_m is None or sensor.offset_f is None:
+            lines.append((settings.slope_f_per_m, settings.offset_f))
+        else:
+            lines.append((sensor.slope_f_per_m, sensor.offset_f))
+    slope, offset = np.array(lines, dtype=float).reshape(-1, 2).T
+    return slope, offset
 
 
 def converted(pF: np.ndarray) -> np.ndarray:

@@ -13,8 +13,11 @@ class Sensors(Section):
     C = slope (length + day + drift + bow) + offset, followed by lag, noise and the converter.
     """
 
+    line: Literal["robot.toml", "own"] = "robot.toml"
+    """Which line a calibrated sensor follows: that of `robot.toml`, so that any calibrated robot can be simulated; or the
+    line below, whatever the host believes: then a calibration with `r2s2r rig --points` has its own errors too."""
     slope_f_per_m: Positive = 3e-11
-    """Of a sensor that `robot.toml` has no calibration for [F/m]; 3e-11 is 0.03 pF/mm."""
+    """Of a sensor that has no calibration [F/m]; 3e-11 is 0.03 pF/mm."""
     offset_f: Positive = 1.4e-11
     """The same: capacitance at length 0 [F]."""
     day_sd_m: Size = 0.005

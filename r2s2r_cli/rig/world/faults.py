@@ -86,7 +86,7 @@ class MotorDead(Timed):
 
 
 class CableTorn(Timed):
-    """A cable no longer pulls."""
+    """A cable no longer pulls; for good, whatever `for_s`."""
 
     kind: Literal["cable_torn"]
     cable: Index

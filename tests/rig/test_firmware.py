@@ -65,8 +65,8 @@ def test_exact_sensors_tell_the_length_through_the_calibration() -> None:
 
 
 def test_the_calibration_of_robot_toml_comes_first() -> None:
-    """A calibrated sensor has the slope and offset of robot.toml, unless the world file says otherwise; the world file's
-    are for the others."""
+    """A calibrated sensor has the slope and offset of robot.toml, unless the world file says otherwise; the others have
+    those of the world file."""
     sensor = ROBOT.sensors[0].model_copy(update={"slope_f_per_m": 2e-11, "offset_f": 1e-11})
     robot = ROBOT.model_copy(update={"sensors": (sensor, *ROBOT.sensors[1:])})
     slope, offset = nominal_calibration(robot, World().sensors)

@@ -14,8 +14,8 @@ class Sensors(Section):
     """
 
     line: Literal["robot.toml", "own"] = "robot.toml"
-    """Which line a calibrated sensor follows: that of `robot.toml`, so that any calibrated robot can be simulated; or the
-    line below, whatever the host believes: then a calibration with `r2s2r rig --points` has its own errors too."""
+    """Which line a calibrated sensor follows: that of `robot.toml`, so that any calibrated robot can be simulated; or
+    its own, below, whatever the host believes: then a calibration with `r2s2r rig --points` has errors of its own."""
     slope_f_per_m: Positive = 3e-11
     """Of a sensor that has no calibration [F/m]; 3e-11 is 0.03 pF/mm."""
     offset_f: Positive = 1.4e-11

@@ -94,7 +94,7 @@ def sensors_received(run: Run) -> Iterator[Found]:
         values = run.array("sensors", name)
         if values is None or not len(values):
             continue
-        lost = np.isnan(values).mean(axis=0)
+        lost = _lost(np.isnan(values), run.array("sensors", "board"))
         for sensor in np.flatnonzero(lost > LOST_SHARE).tolist():
             yield Found(run.at("sensors", name), f"sensor {sensor} was mostly not received",
                         f"at least {100 * (1 - LOST_SHARE):g} % of the samples",
@@ -167,6 +167,21 @@ def gravity_is_seen(run: Run) -> Iterator[Found]:
         if len(own) and beyond(np.array(np.median(own)), *GRAVITY_M_PER_S2) > 0:
             yield Found(run.at("imu", "a_B"), f"board {index} does not feel gravity", "a median of 8 .. 12 m/s^2",
                         f"{number(float(np.median(own)))} m/s^2")  # fmt: skip
+
+
+def _lost(missing: np.ndarray, board: np.ndarray | None) -> np.ndarray:
+    """Share of the samples that a sensor is missing in, (sensor,); of boards that take turns, of those of its own board.
+
+    missing: (sample, sensor), bool. board: that sent each sample; None where all come at once.
+    """
+    if board is None:
+        return np.asarray(missing.mean(axis=0))
+    found = np.ones(missing.shape[1])
+    for sensor in range(missing.shape[1]):
+        own = np.isin(board, np.unique(board[~missing[:, sensor]]))
+        if own.any():
+            found[sensor] = missing[own, sensor].mean()
+    return found
 
 
 def _columns(run: Run, name: str) -> Iterator[tuple[int, np.ndarray]]:

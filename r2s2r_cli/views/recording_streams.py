@@ -64,6 +64,8 @@ def _panels(data: ArtifactData, run: str) -> Iterator[Panel]:
         ):
             if name in motors and name not in drawn_already:
                 yield from _columns(motors["t"], scale * motors[name], title, "motor")
+        if "voltage" in motors:
+            yield from _columns(motors["t"], motors["voltage"][:, None], "battery [V]", "battery")
     sensors = data.group(run, "sensors")
     if sensors is not None:
         for name, title, scale in (
@@ -78,6 +80,11 @@ def _panels(data: ArtifactData, run: str) -> Iterator[Panel]:
         size = np.linalg.norm(imu["a_B"], axis=1)
         names = [f"board {board}" for board in boards]
         yield Panel("specific force [m/s²]", [imu["t"][r] for r in rows], [size[r] for r in rows], names)
+    link = data.group(run, "link")
+    if link is not None:
+        names = ["lost", "repeated", "corrupt", "late"]
+        if any(link[name].any() for name in names):
+            yield Panel("link, counts\nsince the start", [link["t"]] * 4, [link[name] for name in names], names)
     mocap = data.group(run, "mocap")
     if mocap is not None:
         yield from _columns(mocap["t"], 1e3 * mocap["p_ME"][:, :, 2], "motion capture,\nheight [mm]", "cap")

@@ -183,6 +183,20 @@ def test_what_cannot_be_recorded_is_said(robot_project: Path, arguments: tuple[s
     assert word in json.loads(result.stdout)["what"]
 
 
+def test_a_policy_file_is_run_as_it_stands(robot_project: Path, link: Maker) -> None:
+    """Its targets between the rest shapes, its repeats one after the other; one for another robot is refused."""
+    link()
+    text = 'schema_version = 1\nrobot = "threebar"\nname = "bend"\nrepeat = 2\n[[steps]]\ntarget = {}\n'
+    (robot_project / "bend.toml").write_text(text.format([0.4, 1.0, 1.0, 1.0, 1.0, 1.0]))
+    document("record", "bend.toml", "--port", "fake", "--no-draw", "--set", "record.rest_s=0.2")
+    _, data = read_artifact(robot_project / RECORDING, "recording")
+    policy = data.group("bend", "policy")
+    assert policy is not None and policy["target"][:, 0].tolist() == [1.0, 0.4, 0.4, 1.0]
+    (robot_project / "other.toml").write_text(text.format([0.4]).replace("threebar", "sixbar"))
+    refused = invoke("record", "other.toml", "--port", "fake")
+    assert refused.exit_code == 4 and "another robot" in refused.stderr
+
+
 def test_an_uncalibrated_robot_is_refused_before_it_moves(
     tmp_path: Path, link: Maker, monkeypatch: pytest.MonkeyPatch
 ) -> None:

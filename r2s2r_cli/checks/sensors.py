@@ -170,9 +170,9 @@ def gravity_is_seen(run: Run) -> Iterator[Found]:
 
 
 def _lost(missing: np.ndarray, board: np.ndarray | None) -> np.ndarray:
-    """Share of the samples that a sensor is missing in, (sensor,); of boards that take turns, of those of its own board.
+    """Share of the samples that a sensor is missing in, (sensor,); of its own board where they take turns.
 
-    missing: (sample, sensor), bool. board: that sent each sample; None where all come at once.
+    missing: (sample, sensor), bool. board: that sent each sample, None where all come at once.
     """
     if board is None:
         return np.asarray(missing.mean(axis=0))

@@ -153,6 +153,15 @@ EDGES: tuple[Edge, ...] = (
         lambda: edited(recording(), "sensors/capacitance", put((slice(0, 12), 7), np.nan)),
     ),
     Edge(
+        "sensors_received",
+        "three boards take turns",
+        lambda: edited(
+            edited(recording(), "sensors/board", put(slice(None), np.arange(25) % 3)),
+            "sensors/capacitance",
+            put(np.arange(25)[:, None] % 3 != np.arange(9) % 3, np.nan),
+        ),
+    ),
+    Edge(
         "depth_pairs_close",
         "pairs that do not exist are for another check",
         lambda: edited(recording(), "camera/pair", put(2, 99)),

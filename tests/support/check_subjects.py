@@ -87,7 +87,8 @@ def recording() -> Run:
             {"ground_offset": 0.0, "stamp_jitter": 0.0},
         ),
         "sensors": Group(
-            {"t": samples, "capacitance": 1.2e-11 + 3e-11 * lengths, "length": lengths, "cable": np.arange(9)}
+            {"t": samples, "capacitance": 1.2e-11 + 3e-11 * lengths, "length": lengths, "cable": np.arange(9),
+             "board": np.full(SAMPLES, -1)}
         ),
         "motors": Group(
             {

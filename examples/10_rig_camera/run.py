@@ -95,7 +95,9 @@ def draw(path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     drawn = io.BytesIO()
     sheet.savefig(drawn, metadata={"Software": None})
-    Image.open(drawn).convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE).save(path, optimize=True)  # noise does not compress
+    # Noise does not compress; 256 colours do.
+    few = Image.open(drawn).convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE)
+    few.save(path, optimize=True)
 
 
 def main(out: Path, say: Callable[[str], None] = print, count: int = 60) -> None:

@@ -137,12 +137,12 @@ def test_a_recording_is_played_back() -> None:
 
 def test_the_pace_is_that_of_the_stamps() -> None:
     """A frame comes no earlier than its stamp says; a read that ends before gives None."""
-    with ReplayCamera(film(rate=10.0)) as camera:
+    with ReplayCamera(film(rate=3.0)) as camera:
         begin = time.monotonic()
         assert camera.read(1.0) is not None
         assert camera.read(0.01) is None
         assert camera.read(1.0) is not None
-        assert time.monotonic() - begin >= 0.099
+        assert time.monotonic() - begin >= 0.33
 
 
 def test_a_film_begins_again_with_rising_stamps() -> None:

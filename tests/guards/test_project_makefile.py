@@ -18,7 +18,8 @@ IDENTIFY = "iterations/001/30-identify.h5"
 # Stands in for r2s2r: writes the artifact of the stage that make asks for, logs the call, fails where told to.
 STAND_IN = """#!/bin/sh
 echo "$@" >> calls.txt
-case "$1" in import|record) f=10-record.h5 ;; estimate) f=20-estimate.h5 ;; identify) f=30-identify.h5 ;; *) exit 0 ;; esac
+case "$1" in import|record) f=10-record.h5 ;; estimate) f=20-estimate.h5 ;;
+identify) f=30-identify.h5 ;; *) exit 0 ;; esac
 mkdir -p iterations/$3 && echo "$1" > iterations/$3/$f
 [ "$1" != "$FAIL_IN" ]
 """

@@ -12,7 +12,7 @@ from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError, GateError
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from r2s2r_cli.store.again import command_again
-from r2s2r_cli.store.header import sealed_header, whole_header
+from r2s2r_cli.store.header import read_header, sealed_header, whole_header
 from r2s2r_cli.store.project import Iteration, Project
 from r2s2r_cli.store.staleness import reasons
 from schemas.header import Header
@@ -133,6 +133,8 @@ def _forward(project: Project) -> str:
     latest = project.iterations()[-1:]
     if not latest or not latest[0].artifact("recording").exists():
         return "r2s2r import run.csv"
+    if not any(name.endswith("/caps/p_WE") for name in read_header(latest[0].artifact("recording")).datasets):
+        return "" if project.artifact("floor", None).exists() else "r2s2r floor"  # nothing to estimate states from yet
     for kind, command in (("estimate", "estimate"), ("identification", "identify")):
         if not latest[0].artifact(kind).exists():
             return f"r2s2r {command} --iteration {latest[0].number}"

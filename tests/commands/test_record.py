@@ -82,8 +82,10 @@ def test_a_recording_does_not_go_stale(robot_project: Path, link: Maker) -> None
     (robot_project / "project.toml").write_text(text.replace("rest_s = 2.0", "rest_s = 9.0"))
     path = robot_project / "robot.toml"
     path.write_text(path.read_text().replace("rate_hz = 50.0", "rate_hz = 40.0"))
-    (state,) = document("status")["artifacts"]
+    status = document("status")
+    (state,) = status["artifacts"]
     assert state["state"] == "fresh" and state["stage"] == "record"
+    assert status["next"] == "r2s2r floor"
 
 
 def test_nothing_is_overwritten(robot_project: Path, link: Maker) -> None:

@@ -16,7 +16,7 @@ from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
 from r2s2r_cli.stages.identify.residuals import CapResiduals
 from r2s2r_cli.stages.identify.settled import settle, solution_at, spread_of
-from r2s2r_cli.stages.identify.solve.found_twice import cool_growing
+from r2s2r_cli.stages.identify.solve.found_twice import Begin, cool_growing
 from r2s2r_cli.stages.identify.solve.horizon import Limits, solve_growing
 from r2s2r_cli.stages.identify.solve.levenberg import levenberg_marquardt
 from r2s2r_cli.stages.identify.solve.loss import LOSSES
@@ -151,10 +151,11 @@ def first_round(
         last=BEFORE_POPULATION if few else last, progress=progress, checkpoint=checkpoint, resume=resume,
     )  # fmt: skip
     if few:
-        rest = slice(smooth, None) if smooth < len(stages) else slice(-1, None)
         cooling = Cooling(members=members_for(problem))
-        hear = None if progress is None else partial(_heard, progress, names[rest], cooling.generations)
-        ways = cool_growing(stages[rest], solution.z, solution.normal, loss=loss, seed=seed, cooling=cooling, told=hear)
+        led = Begin(solution.z, solution.normal, min(smooth, len(stages) - 1))
+        anew = Begin(started(problem, values), wide_about(problem, cooling), min(1, len(stages) - 1))
+        hear = None if progress is None else partial(_heard, progress, names, cooling.generations)
+        ways = cool_growing(stages, [led, anew], loss=loss, seed=seed, cooling=cooling, told=hear)
         return _settled(problem, ways.best, recipe, seed, cooling.generations, ways.others)
     if problem.misfit(solution.z) < EXACT:
         # The model explains the data to their noise: no filter knows these start states as well as the fit does.
@@ -222,6 +223,12 @@ def more_starts(
         end = cool(problem, z0, wide, loss=loss, seed=seed + number + 1, cooling=cooling, told=hear)
         found.append((z0, solution_at(problem, end.z, end, loss, cooling.generations)))
     return found
+
+
+def wide_about(problem: CapResiduals, cooling: Cooling) -> np.ndarray:
+    """A curvature (n, n) of which the first draw is as wide as the priors, where those are flat as starts are drawn."""
+    prior = problem.prior_sd**-2.0
+    return np.diag(prior + cooling.hottest * (np.minimum(problem.prior_sd, START_SPREAD) ** -2.0 - prior))
 
 
 def members_for(problem: CapResiduals) -> int:

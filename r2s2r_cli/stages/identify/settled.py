@@ -35,23 +35,24 @@ def settle(
 ) -> Settled:
     """generations: that were allowed. others: unknowns where other ways ended that are about as good.
 
-    With too many unknowns to draw for, the ends of the ways show where else the best may lie: their scatter comes to
-    the curvature that the population saw. Raises NumericalError where the mean cannot be simulated.
+    Ends of ways show where else the best may lie: their scatter comes to what was drawn about the best, and, with too
+    many unknowns to draw for, to the curvature that the population saw. Raises NumericalError where the mean cannot be simulated.
     """
     own = solution_at(problem, cooled.z, cooled, loss, generations)
     inflation = spread_of(problem, own, loss).inflation
     narrow = np.linalg.inv(cooled.normal)
     found = posterior(problem, cooled.z, narrow, loss=loss, temperature=inflation, seed=seed)
+    off = np.array([cooled.z, *others]) - np.mean([cooled.z, *others], axis=0)
+    scatter = off.T @ off / max(len(others), 1)
     if found is None:
-        off = np.array([cooled.z, *others]) - np.mean([cooled.z, *others], axis=0)
-        return Settled(own, inflation * narrow + off.T @ off / max(len(others), 1))
+        return Settled(own, inflation * narrow + scatter)
     best = cooled.z if cooled.cost <= found.cost else found.best
     lowest = min(cooled.cost, found.cost)
     mean = np.clip(found.mean, problem.lower, problem.upper)
     at_mean = solution_at(problem, mean, cooled, loss, generations)
     if at_mean.cost <= lowest + AS_GOOD * inflation * len(problem.names):
-        return Settled(at_mean, found.covariance)
-    return Settled(solution_at(problem, best, cooled, loss, generations), found.covariance)
+        return Settled(at_mean, found.covariance + scatter)
+    return Settled(solution_at(problem, best, cooled, loss, generations), found.covariance + scatter)
 
 
 def spread_of(problem: CapResiduals, solution: Solution, loss: Loss, drawn: np.ndarray | None = None) -> Covariance:

@@ -13,9 +13,9 @@ from r2s2r_cli.stages.identify.solve.population import Cooled, Cooling, Populati
 
 AGREE = 3.0
 """[nats] Costs of two ways that ended in the same place, or in one as likely."""
-EASY = 6
+EASY = 8
 """A first way that took at most so many generations at the end, and was not rough there, needs no second."""
-ROUGH = 1.5
+ROUGH = 1.3
 """Temperature of the last draw beyond which a cost is rough on the scale of its own standard deviations."""
 HOTTER = 1.5
 """Each way begins so much hotter than the one before."""
@@ -42,10 +42,18 @@ class Ways:
         return bool(self.others)
 
 
+@dataclass(frozen=True)
+class Begin:
+    """Where a way begins: unknowns z (n,), curvature there, normal (n, n) with priors, and the number of its stage."""
+
+    z: np.ndarray
+    normal: np.ndarray
+    stage: int = 0
+
+
 def cool_growing(
     stages: Sequence[Population],
-    z0: np.ndarray,
-    normal: np.ndarray,
+    begins: Sequence[Begin],
     *,
     loss: Loss,
     seed: int = 0,
@@ -55,21 +63,22 @@ def cool_growing(
 ) -> Ways:
     """Cool each of the stages, problems over the same unknowns, short horizon first, from the one before.
 
-    A cost that is rough has minima beside the best; which one a way ends in is chance. So ways are begun anew from z0
-    with other draws until two end within `AGREE` of the best, at most `chances`; unless the first was `EASY`. told is
-    called with the number of the way, the name of the stage and the cost after each stage. Raises as `cool`.
+    A cost that is rough has minima beside the best; which one a way ends in is chance. So ways are begun anew, from
+    each of `begins` in turn, with other draws until two end within `AGREE` of the best, at most `chances`; unless the
+    first was `EASY`. told is called with the numbers of the way, the stage and the generation, and the cost. Raises as
+    `cool`.
     """
     ends: list[Cooled] = []
     spent = 0
     for chance in range(chances):
-        z, curvature = z0, normal
-        for number, problem in enumerate(stages):
-            own = replace(
-                cooling, hottest=cooling.hottest * HOTTER**chance, members=cooling.members + MORE * (chance > 0)
-            )
+        begin = begins[chance % len(begins)]
+        z, curvature = begin.z, begin.normal
+        for number in range(begin.stage, len(stages)):
+            members = cooling.members + (MORE if chance else 0)
+            own = replace(cooling, members=members, hottest=cooling.hottest * HOTTER**chance)
             heard = None if told is None else partial(told, chance, number)
             own_seed = 1000 * seed + 100 * chance + number
-            at = cool(problem, z, curvature, loss=loss, seed=own_seed, cooling=own, told=heard)
+            at = cool(stages[number], z, curvature, loss=loss, seed=own_seed, cooling=own, told=heard)
             z, curvature, spent = at.z, at.normal, spent + at.evaluations
         ends.append(at)
         best = min(ends, key=lambda one: one.cost)

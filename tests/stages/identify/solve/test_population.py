@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.errors import NumericalError
-from r2s2r_cli.stages.identify.solve.found_twice import AGREE, cool_growing
+from r2s2r_cli.stages.identify.solve.found_twice import AGREE, Begin, cool_growing
 from r2s2r_cli.stages.identify.solve.levenberg import levenberg_marquardt
 from r2s2r_cli.stages.identify.solve.loss import LOSSES
 from r2s2r_cli.stages.identify.solve.population import (
@@ -162,16 +162,16 @@ def wells(depth: float = 30.0) -> Formula:
 def test_ways_are_begun_anew_until_the_best_is_found_twice() -> None:
     """A smooth problem needs one way; what it ends in, and the list of costs, belong to the best of all ways."""
     problem, _, _ = linear(prior_sd=2.0)
-    ways = cool_growing([problem, problem], np.ones(4), np.eye(4), loss=SQUARES, seed=0)
+    ways = cool_growing([problem, problem], [Begin(np.ones(4), np.eye(4))], loss=SQUARES, seed=0)
     assert len(ways.costs) == 1
     assert not ways.twice
     rough = cool_growing(
-        [wells()], np.zeros(1), np.array([[100.0]]), loss=SQUARES, seed=0, cooling=Cooling(hottest=300.0)
+        [wells()], [Begin(np.zeros(1), np.array([[100.0]]))], loss=SQUARES, seed=0, cooling=Cooling(hottest=300.0)
     )
     assert rough.best.cost == min(rough.costs)
     assert rough.best.z[0] == pytest.approx(6.0, abs=1.5)
     many = [
-        cool_growing([stairs()], np.array([3.0, -2.0]), np.eye(2), loss=SQUARES, seed=seed, chances=4)
+        cool_growing([stairs()], [Begin(np.array([3.0, -2.0]), np.eye(2))], loss=SQUARES, seed=seed, chances=4)
         for seed in range(3)
     ]
     for one in many:

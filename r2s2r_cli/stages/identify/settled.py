@@ -36,7 +36,8 @@ def settle(
     """generations: that were allowed. others: unknowns where other ways ended that are about as good.
 
     Ends of ways show where else the best may lie: their scatter comes to what was drawn about the best, and, with too
-    many unknowns to draw for, to the curvature that the population saw. Raises NumericalError where the mean cannot be simulated.
+    many unknowns to draw for, to the curvature that the population saw. Raises NumericalError where the mean cannot be
+    simulated.
     """
     own = solution_at(problem, cooled.z, cooled, loss, generations)
     inflation = spread_of(problem, own, loss).inflation

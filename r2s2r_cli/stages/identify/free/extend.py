@@ -15,8 +15,8 @@ def extended(asked: Sequence[str], default: Sequence[str]) -> tuple[str, ...]:
     """The specs of a request, in order. asked: as after --free; default: what is free where nothing is asked for.
 
     Specs without a plus take the place of the default. Those with one come to what is there; of a name that is there
-    they change the parts that they name, and `+FAMILY.*` takes the place of all elements of its family. Raises
-    UsageError for a spec that cannot be read.
+    they change the parts that they name, and `+FAMILY.*` takes the place of all elements of its family, as does the
+    name of a whole (`+mass`) that of its parts. Raises UsageError for a spec that cannot be read.
     """
     plain = [text for text in asked if not text.startswith(PLUS)]
     if asked and len(plain) == len(asked):
@@ -26,8 +26,9 @@ def extended(asked: Sequence[str], default: Sequence[str]) -> tuple[str, ...]:
         if not text.startswith(PLUS):
             continue
         more = parse(text[len(PLUS) :])
-        if more.name.endswith(".*"):
-            element = re.compile(re.escape(more.name[:-1]) + r"(cap)?\d+")
+        family = more.name.removesuffix(".*")
+        if more.name not in found and "." not in family:
+            element = re.compile(re.escape(family) + r"\.(cap)?\d+")
             found = {name: one for name, one in found.items() if not element.fullmatch(name)}
         found[more.name] = written(_over(parse(found[more.name]), more) if more.name in found else more)
     return tuple(found.values())

@@ -22,6 +22,7 @@ DEFAULT = ("motor_speed_in.0,~0.2", "friction,~0.3", "rest_length.6,~0.02", "res
         (("+friction,0.01..9",), (DEFAULT[0], "friction,0.01..9.0,~0.3", *DEFAULT[2:])),
         (("+delay=0.2,~0.1",), (*DEFAULT[:4], "delay=0.2,0.0..0.5,~0.1")),
         (("+rest_length.*,~0.1",), (*DEFAULT[:2], DEFAULT[4], "rest_length.*,~0.1")),
+        (("mass.2", "+mass"), ("mass",)),
         (("friction", "+friction,~inf", "+mass=2"), ("friction,~inf", "mass=2.0")),
     ],
 )

@@ -36,8 +36,8 @@ def settle(
     """generations: that were allowed. others: unknowns where other ways ended that are about as good.
 
     Ends of ways show where else the best may lie: their scatter comes to what was drawn about the best, and, with too
-    many unknowns to draw for, to the curvature that the population saw. Raises NumericalError where the mean cannot be
-    simulated.
+    many unknowns to draw for, to the curvature that the population saw, as flat as its last draw was rough. Raises
+    NumericalError where the mean cannot be simulated.
     """
     own = solution_at(problem, cooled.z, cooled, loss, generations)
     inflation = spread_of(problem, own, loss).inflation
@@ -46,7 +46,7 @@ def settle(
     off = np.array([cooled.z, *others]) - np.mean([cooled.z, *others], axis=0)
     scatter = off.T @ off / max(len(others), 1)
     if found is None:
-        return Settled(own, inflation * narrow + scatter)
+        return Settled(own, inflation * max(cooled.rough, 1.0) * narrow + scatter)
     best = cooled.z if cooled.cost <= found.cost else found.best
     lowest = min(cooled.cost, found.cost)
     mean = np.clip(found.mean, problem.lower, problem.upper)

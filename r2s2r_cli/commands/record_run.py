@@ -124,11 +124,11 @@ def _camera(spec: str | None, stack: ExitStack) -> tuple[CameraFeed | None, Came
     """The camera, open and read by a thread of its own until the stack ends. Raises CameraError, UsageError."""
     if spec is None:
         return None, None
-    from r2s2r_cli.hardware.camera.choose import choose_camera
+    from r2s2r_cli.commands.cameras import camera_of
     from r2s2r_cli.hardware.camera.feed import Feed
     from r2s2r_cli.stages.record import CameraFacts
 
-    camera = stack.enter_context(choose_camera(spec))
+    camera = stack.enter_context(camera_of(spec))
     names = ("width", "height", "fx", "fy", "cx", "cy")
     intrinsics = {name: getattr(camera.intrinsics, name) for name in names}
     return stack.enter_context(Feed(camera)), CameraFacts(intrinsics, camera.depth_scale)

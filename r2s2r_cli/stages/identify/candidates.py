@@ -16,6 +16,8 @@ from r2s2r_cli.stages.identify.windows import Window
 if TYPE_CHECKING:
     from torch import Tensor
 
+    from r2s2r_cli.engine import Parameters, Structure
+
 TINY = 1e-6
 """Of a step: stamps are decimal numbers, and not exact."""
 MOST = 256
@@ -74,16 +76,17 @@ def _together(
     from r2s2r_cli.engine.flat import pack_parameters, pack_state, unpack_state
 
     structure, step, k = predictor.structure, predictor.step, len(values)
-    theta = predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64)).map(
-        lambda x: x.expand(k, *x.shape[1:]).repeat_interleave(len(windows), dim=0)
-    )
+    own = predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64))
+    theta = own.map(lambda x: x.expand(k, *x.shape[1:]).repeat_interleave(len(windows), dim=0))
     s0 = torch.cat([pack_state(structure, window.state) for window in windows]).repeat(k, 1)
     if offsets is not None:
         s0 = displaced(structure, s0, torch.as_tensor(offsets.reshape(len(s0), -1)))
     duration = max(window.duration for window in windows)
     stride = _stride(windows, step)
     rows = stride * (math.ceil(duration / step / stride - TINY) + 1)
-    u = _commands(predictor, windows, values, rows)
+    seen = [predictor.mapping.observation(value) for value in values]
+    u = _commands(predictor, windows, [one.command_delay + one.camera_delay for one in seen], rows)
+    up = np.array([one.ground_height for one in seen])
     predictor.rollouts += len(s0)
     n = predictor.simulator.substeps(theta, unpack_state(structure, s0), step)
     with torch.no_grad():
@@ -91,7 +94,7 @@ def _together(
             s0, u, pack_parameters(structure, theta), h=step / n, hold=n, every=stride * n
         )  # fmt: skip
         return [
-            _caps(predictor, flat[place :: len(windows)], window, values, stride * step)
+            _caps(predictor.structure, own, up, flat[place :: len(windows)], window, stride * step)
             for place, window in enumerate(windows)
         ]
 
@@ -103,23 +106,26 @@ def _stride(windows: Sequence[Window], step: float) -> int:
     return common if common > STRIDE and np.abs(at - np.round(at)).max() < TINY else STRIDE
 
 
-def _commands(predictor: Predictor, windows: Sequence[Window], values: np.ndarray, rows: int) -> Tensor:
-    """Commands (k W, row, actuated) of each candidate with its own delay."""
+def _commands(predictor: Predictor, windows: Sequence[Window], delays: Sequence[float], rows: int) -> Tensor:
+    """Commands (k W, row, actuated) of each candidate with its own of the delays (k,) [s]."""
     import torch
 
-    seen = [predictor.mapping.observation(value) for value in values]
-    delays = np.array([one.command_delay + one.camera_delay for one in seen])
     logs = {id(window.run): CommandLog(window.run) for window in windows}
     made = {
         (place, delay): logs[id(window.run)].means(window.start, rows, step=predictor.step, delay=delay)
         for place, window in enumerate(windows)
-        for delay in set(delays.tolist())
+        for delay in set(delays)
     }
-    return torch.as_tensor(np.stack([made[place, delay] for delay in delays.tolist() for place in range(len(windows))]))
+    return torch.as_tensor(np.stack([made[place, delay] for delay in delays for place in range(len(windows))]))
 
 
-def _caps(predictor: Predictor, flat: Tensor, window: Window, values: np.ndarray, every: float) -> np.ndarray:
-    """End caps (k, frame, cap, 3) at the frames of a window, from its states (k, stored, NS) every so many seconds."""
+def _caps(
+    structure: Structure, own: Parameters, up: np.ndarray, flat: Tensor, window: Window, every: float
+) -> np.ndarray:
+    """End caps (k, frame, cap, 3) at the frames of a window, from its states (k, stored, NS) every so many seconds.
+
+    own: parameters of the candidates, batch k or 1; up: height of the ground that each is seen on, (k,) [m].
+    """
     import torch
 
     from r2s2r_cli.engine import end_caps
@@ -131,8 +137,7 @@ def _caps(predictor: Predictor, flat: Tensor, window: Window, values: np.ndarray
     share = (at - low)[None, :, None]
     states = flat[:, low] * (1 - share) + flat[:, low + 1] * share
     k, frames = states.shape[:2]
-    theta = effective(predictor.structure, predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64)))
-    theta = theta.map(lambda x: x.expand(k, *x.shape[1:]).repeat_interleave(frames, dim=0))
-    caps = end_caps(theta, unpack_state(predictor.structure, states.flatten(0, 1))).unflatten(0, (k, frames)).numpy()
-    caps[..., 2] += np.array([predictor.mapping.observation(value).ground_height for value in values])[:, None, None]
+    theta = effective(structure, own).map(lambda x: x.expand(k, *x.shape[1:]).repeat_interleave(frames, dim=0))
+    caps = end_caps(theta, unpack_state(structure, states.flatten(0, 1))).unflatten(0, (k, frames)).numpy()
+    caps[..., 2] += up[:, None, None]
     return np.asarray(caps)

@@ -20,7 +20,7 @@ from r2s2r_cli.stages.identify.solve.found_twice import Begin, cool_growing
 from r2s2r_cli.stages.identify.solve.horizon import Limits, solve_growing
 from r2s2r_cli.stages.identify.solve.levenberg import levenberg_marquardt
 from r2s2r_cli.stages.identify.solve.loss import LOSSES
-from r2s2r_cli.stages.identify.solve.population import HELD, MEMBERS, TRIED, Cooled, Cooling, cool
+from r2s2r_cli.stages.identify.solve.population import MEMBERS, TRIED, Cooled, Cooling, cool, moving_of
 from r2s2r_cli.stages.identify.solve.record import Checkpoint, Counts, Progress, Solution
 from r2s2r_cli.stages.identify.solve.starts import multi_start, starts
 from r2s2r_cli.stages.identify.training import filtered_windows, training_windows
@@ -142,7 +142,7 @@ def first_round(
     lengths = recipe.horizons(max(len(one.intervals) for one in windows))
     stages = [problem_of(predictor, [one.until(length) for one in windows], recipe) for length in lengths[:-1]]
     stages.append(problem)
-    few = np.count_nonzero(problem.prior_sd > HELD) <= MOST_UNKNOWNS
+    few = len(moving_of(problem)) <= MOST_UNKNOWNS
     smooth = max(1, sum(length <= SMOOTH for length in lengths)) if few else len(lengths)
     names = [*(f"{length} intervals" for length in lengths[:-1]), "all"]
     last = Limits(max_iterations=recipe.max_iterations, tolerance=FROM_AFAR, step_sd=0.05)
@@ -208,7 +208,7 @@ def more_starts(
     spread = np.zeros(len(problem.z0))
     spread[:n] = np.minimum(problem.prior_sd[:n], START_SPREAD)
     z0s = starts(problem.lower, problem.upper, problem.z0, n=count + 1, seed=seed, spread=spread)[1:]
-    if np.count_nonzero(problem.prior_sd > HELD) > MOST_UNKNOWNS:
+    if len(moving_of(problem)) > MOST_UNKNOWNS:
         last = Limits(max_iterations=recipe.max_iterations // 2, tolerance=1e-4, step_sd=0.1)
         trials = multi_start([("all", problem)], z0s, loss=loss, seed=seed, last=last, progress=progress)
         return [(z0s[index], one) for one, index in zip(trials.solutions, trials.order, strict=True)]
@@ -233,8 +233,7 @@ def wide_about(problem: CapResiduals, cooling: Cooling) -> np.ndarray:
 
 def members_for(problem: CapResiduals) -> int:
     """Candidates of a generation: more unknowns need more, or the regression cannot tell their effects apart."""
-    moving = int(np.count_nonzero(problem.prior_sd > HELD))
-    return max(MEMBERS, LANES * math.ceil((3 * moving + TRIED) / LANES) - TRIED)
+    return max(MEMBERS, LANES * math.ceil((3 * len(moving_of(problem)) + TRIED) / LANES) - TRIED)
 
 
 def problem_of(

@@ -29,12 +29,11 @@ CHANCES = 6
 @dataclass(frozen=True)
 class Ways:
     """best: where the best way ended. others: unknowns (n,) at the ends of those that are about as good. costs: of all
-    ways at the end. evaluations: of all, of points at any horizon."""
+    ways at the end."""
 
     best: Cooled
     others: tuple[np.ndarray, ...]
     costs: tuple[float, ...]
-    evaluations: int
 
     @property
     def twice(self) -> bool:
@@ -69,7 +68,6 @@ def cool_growing(
     `cool`.
     """
     ends: list[Cooled] = []
-    spent = 0
     for chance in range(chances):
         begin = begins[chance % len(begins)]
         z, curvature = begin.z, begin.normal
@@ -79,11 +77,11 @@ def cool_growing(
             heard = None if told is None else partial(told, chance, number)
             own_seed = 1000 * seed + 100 * chance + number
             at = cool(stages[number], z, curvature, loss=loss, seed=own_seed, cooling=own, told=heard)
-            z, curvature, spent = at.z, at.normal, spent + at.evaluations
+            z, curvature = at.z, at.normal
         ends.append(at)
         best = min(ends, key=lambda one: one.cost)
         others = tuple(one.z for one in ends if one is not best and one.cost < best.cost + AGREE)
-        ways = Ways(best, others, tuple(one.cost for one in ends), spent)
+        ways = Ways(best, others, tuple(one.cost for one in ends))
         easy = chance == 0 and at.generations <= EASY and at.rough <= ROUGH
         if easy or ways.twice:
             break

@@ -17,8 +17,8 @@ from typing import Protocol
 import numpy as np
 
 from r2s2r_cli.errors import NumericalError
-from r2s2r_cli.stages.identify.solve.loss import Loss
-from r2s2r_cli.stages.identify.solve.problem import Problem
+from r2s2r_cli.stages.identify.solve.loss import Loss, robust_sum
+from r2s2r_cli.stages.identify.solve.problem import Evaluation, Problem
 
 HELD = 1e-6
 """An unknown with a narrower prior does not move and needs no candidates."""
@@ -103,7 +103,7 @@ def cool(
     Raises NumericalError where not even a few candidates can be evaluated.
     """
     rng = np.random.default_rng([seed, len(z0)])
-    moving = np.flatnonzero(problem.prior_sd > HELD)
+    moving = moving_of(problem)
     prior = np.diag(problem.prior_sd[moving] ** -2.0)
     data = normal[np.ix_(moving, moving)] - prior
     temperature, best, best_cost = cooling.hottest, z0.copy(), np.inf
@@ -134,7 +134,7 @@ def cool(
         least = max(1.5 * len(moving), cooling.members / 3)
         rough = temperature_of(cost, least, cooling.coldest)
         middle, at, slopes = regressed(z[:, moving], r, weights_at(cost, rough), root)
-        weight = _weights(problem, at, loss)
+        _, weight = robust_sum(loss, Evaluation(at, None, problem.block))
         data = (slopes * weight[:, None]).T @ slopes
         pull = (slopes * weight[:, None]).T @ at + prior @ (middle - problem.prior_mean[moving])
         step = -np.linalg.solve(data + prior, pull)
@@ -152,6 +152,11 @@ def cool(
     whole = np.diag(problem.prior_sd**-2.0)
     whole[np.ix_(moving, moving)] += data
     return Cooled(best, best_cost, residual, jacobian, whole, len(costs), spent, rough, tuple(costs))
+
+
+def moving_of(problem: Problem) -> np.ndarray:
+    """Numbers of the unknowns that no prior holds, ascending."""
+    return np.flatnonzero(problem.prior_sd > HELD)
 
 
 def covariance_at(data: np.ndarray, prior: np.ndarray, temperature: float) -> np.ndarray:
@@ -217,13 +222,6 @@ def regressed(
     ridge = RIDGE * np.diag([0.0, *np.ones(z.shape[1])])
     found = np.linalg.solve(columns.T @ (columns * weight[:, None]) + ridge, columns.T @ (residual * weight[:, None]))
     return middle, found[0], np.linalg.solve(root.T, found[1:]).T
-
-
-def _weights(problem: Population, residual: np.ndarray, loss: Loss) -> np.ndarray:
-    """Weight of every residual under the loss, (m,)."""
-    _, place, size = np.unique(problem.block, return_inverse=True, return_counts=True)
-    square = np.bincount(place, weights=residual**2, minlength=len(size))
-    return np.asarray(loss.weight(square, size)[place])
 
 
 def _tried(problem: Problem, best: np.ndarray, moving: np.ndarray, middle: np.ndarray, step: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.stages.identify.solve.loss import Loss
-from r2s2r_cli.stages.identify.solve.population import HELD, Population, costs_of, drawn
+from r2s2r_cli.stages.identify.solve.population import Population, costs_of, drawn, moving_of
 
 MEMBERS, ROUNDS = 32, 3
 """Of a draw, and draws; up to `MOST_ROUNDS` where few of the candidates count."""
@@ -45,7 +45,7 @@ def posterior(
 
     temperature: variance of the residuals over that of the noise as given, which makes a misfit count as noise.
     """
-    moving = np.flatnonzero(problem.prior_sd > HELD)
+    moving = moving_of(problem)
     n = len(moving)
     if not n or n > MOST_UNKNOWNS:
         return None

@@ -8,9 +8,9 @@ import select
 import time
 from typing import Any
 
-from r2s2r_cli.hardware.transport.base import WRITE_TIMEOUT, Address, Message
+from r2s2r_cli.hardware.transport.base import WRITE_TIMEOUT, Address
 from r2s2r_cli.hardware.transport.gone import not_taken, port_errors
-from r2s2r_cli.hardware.transport.lines import LineBuffer
+from r2s2r_cli.hardware.transport.line_stream import LineStream
 from r2s2r_cli.hardware.transport.name import PortName
 
 BAUD = 115200
@@ -18,44 +18,26 @@ _POLL = 0.02
 """[s] between looks where the port cannot be waited for (Windows, loop://)."""
 
 
-class SerialPort:
+class SerialPort(LineStream):
     """Opened for this process alone. DTR and RTS are left as they are: a pty has none, a board may reset on them."""
 
     def __init__(self, name: PortName) -> None:
-        self.name = name.text
+        super().__init__(name.text)
         self._url = "://" in name.text
         self._port: Any = None
-        self._lines = LineBuffer()
-        self._overlong = 0
-
-    @property
-    def overlong(self) -> int:
-        """Lines thrown away because they did not end, since this object was made."""
-        return self._overlong + self._lines.overlong
 
     def open(self) -> None:
         """Raises LinkError: no such port, no permission, held by another program."""
         import serial
 
         self.close()
-        self._overlong, self._lines = self.overlong, LineBuffer()
+        self.renew()
         options: dict[str, Any] = {"baudrate": BAUD, "timeout": 0, "write_timeout": WRITE_TIMEOUT}
         if not self._url:
             options["exclusive"] = True
         with port_errors(self.name, "opening"):
             self._port = serial.serial_for_url(self.name, **options)
             self._port.reset_input_buffer()
-
-    def receive(self, timeout: float) -> Message | None:
-        """The next complete line. Raises LinkError where the plug is out."""
-        end = time.monotonic() + timeout
-        while (line := self._lines.take()) is None:
-            left = end - time.monotonic()
-            data = self._bytes(max(left, 0.0))
-            self._lines.feed(data)
-            if not data and left <= 0:
-                return None
-        return Message(line, time.monotonic())
 
     def _bytes(self, timeout: float) -> bytes:
         with port_errors(self.name, "reading"):

@@ -7,49 +7,31 @@ import select
 import socket
 import time
 
-from r2s2r_cli.hardware.transport.base import WRITE_TIMEOUT, Address, Message
+from r2s2r_cli.hardware.transport.base import WRITE_TIMEOUT, Address
 from r2s2r_cli.hardware.transport.gone import hung_up, not_taken, port_errors
-from r2s2r_cli.hardware.transport.lines import LineBuffer
+from r2s2r_cli.hardware.transport.line_stream import LineStream
 from r2s2r_cli.hardware.transport.name import PortName
 
 CONNECT_TIMEOUT = 3.0
 """[s]"""
 
 
-class TcpStream:
+class TcpStream(LineStream):
     """Small lines go out at once (no Nagle)."""
 
     def __init__(self, name: PortName) -> None:
-        self.name = name.text
+        super().__init__(name.text)
         self._address = (name.host, name.port)
         self._socket: socket.socket | None = None
-        self._lines = LineBuffer()
-        self._overlong = 0
-
-    @property
-    def overlong(self) -> int:
-        """Lines thrown away because they did not end, since this object was made."""
-        return self._overlong + self._lines.overlong
 
     def open(self) -> None:
         """Raises LinkError: nobody there, no such host."""
         self.close()
-        self._overlong, self._lines = self.overlong, LineBuffer()
+        self.renew()
         with port_errors(self.name, "opening"):
             self._socket = socket.create_connection(self._address, CONNECT_TIMEOUT)
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self._socket.setblocking(False)
-
-    def receive(self, timeout: float) -> Message | None:
-        """The next complete line. Raises LinkError where the other side is gone."""
-        end = time.monotonic() + timeout
-        while (line := self._lines.take()) is None:
-            left = end - time.monotonic()
-            data = self._bytes(max(left, 0.0))
-            self._lines.feed(data)
-            if not data and left <= 0:
-                return None
-        return Message(line, time.monotonic())
 
     def _bytes(self, timeout: float) -> bytes:
         with port_errors(self.name, "reading"):

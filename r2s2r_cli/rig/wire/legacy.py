@@ -7,8 +7,8 @@ import re
 
 import numpy as np
 
+from r2s2r_cli.rig.wire.authors import FULL, GRAVITY, AuthorsCodec, finite, like_strtod, tick_asked
 from r2s2r_cli.rig.wire.base import BoardReading, Line, Motors, Received, duties
-from r2s2r_cli.rig.wire.boards import FULL, GRAVITY, like_strtod, tick_asked
 
 MOTORS = 6
 _PF_PER_COUNT = 42.0 * 1024.0 / 3.3
@@ -20,29 +20,13 @@ _DRIVE = re.compile(rb" *d +([1-6]) +(\S+) *\n?")
 _STOP = re.compile(rb" *s *\n?")
 
 
-class LegacyCodec:
+class LegacyCodec(AuthorsCodec):
     """Device side of `legacy`. The samples of several boards are gathered: a line `S` has all nine."""
-
-    datagrams_end = False
 
     def __init__(self, motors: Motors, *, sensors: int, board: int = 0) -> None:
         self._motors = motors
         self._pF = np.full(sensors, np.nan)
         self._board = board
-
-    def opened(self, t: float) -> None:
-        """Nothing: the bridge does not know its host."""
-
-    def closed(self, t: float) -> None:
-        """Nothing: the motors keep what they have."""
-
-    def tick_of(self, line: bytes) -> int | None:
-        """The tick that a line asks for."""
-        return tick_asked(line)
-
-    def untouched(self, line: bytes) -> bool:
-        """A tick is."""
-        return tick_asked(line) is not None
 
     def receive(self, line: bytes, board: int | None, t: float) -> Received:
         """One motor, or the stop; everything else is passed over."""
@@ -57,10 +41,6 @@ class LegacyCodec:
             self._motors.command(asked, t)
         return Received()
 
-    def advance(self, t: float) -> list[Line]:
-        """Nothing: there is no watchdog."""
-        return []
-
     def sample(self, reading: BoardReading, t: float) -> list[Line]:
         """Capacitances of all sensors with every reading of the board that leads, attitude and force with each."""
         if reading.status is not None:
@@ -70,9 +50,9 @@ class LegacyCodec:
         lines = []
         if reading.board == self._board:
             lines.append("S " + " ".join(f"0x{_count(x):x}" for x in self._pF))
-            lines.append("A " + " ".join(f"{_finite(x / GRAVITY):.2f}" for x in reading.a_B))
+            lines.append("A " + " ".join(f"{finite(x / GRAVITY):.2f}" for x in reading.a_B))
         if reading.q_WB is not None and reading.board < _IMUS:
-            x, y, z, w = (_finite(number) for number in reading.q_WB)
+            x, y, z, w = (finite(number) for number in reading.q_WB)
             lines.append(f"q {reading.board + 1} {w:.4f} {x:.4f} {y:.4f} {z:.4f}")
         return [Line(reading.board, _PADDING + line.encode() + b"\n") for line in lines]
 
@@ -80,15 +60,7 @@ class LegacyCodec:
         """A line that no host of the real robot knows."""
         return [Line(self._board, b"#lockstep %d\n" % tick_us, safe=True)]
 
-    def ticked(self, k: int, t: float, board: int) -> Line:
-        """The same, at the end of a tick."""
-        return Line(board, b"#tick %d %d\n" % (k, round(t * 1e6)), safe=True)
-
 
 def _count(pF: float) -> int:
     """The converter's count; 0: nothing was measured yet."""
     return min(round(_PF_PER_COUNT / pF), _COUNT_MAX) if math.isfinite(pF) and pF > 0 else 0
-
-
-def _finite(x: float) -> float:
-    return float(x) if math.isfinite(x) else 0.0

@@ -1,0 +1,96 @@
+"""Which blob is which cap: all labellings against the nine cable lengths, or against the shape at rest."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.robot import Robot
+
+SENSOR_SD = 0.008
+"""[m] Of one sensor length against the distance seen: offset of the day, noise, lag."""
+REST_SD = 0.015
+"""[m] Of a distance against that of the shape at rest."""
+ROD_SD = 0.008
+"""[m] Of the distance between two blobs against the rod length."""
+SURE = 4.0
+"""Least difference of half the squared deviations (log likelihood) to the next labelling: 55 to 1."""
+FIT = 5.0
+"""Most that half the squared deviations may be per constraint; beyond, the blobs are not the robot."""
+
+
+@dataclass(frozen=True)
+class Labelling:
+    """The best labelling of one frame."""
+
+    p_WE: np.ndarray
+    """[m], shape (cap, 3)."""
+    pick: np.ndarray
+    """Candidate of each cap among those of its rod, shape (cap,)."""
+    cost: float
+    """Half the sum of squared deviations over standard deviations."""
+    margin: float
+    """Cost of the next best labelling minus this one; inf where there is no other."""
+    sure: bool
+    """The margin is at least SURE and the cost fits."""
+
+
+def label(candidates: Sequence[np.ndarray], robot: Robot, length: np.ndarray | None = None) -> Labelling | None:
+    """Tell the caps apart.
+
+    candidates: of each rod, centres of the blobs of its colour [m], shape (blob, 3), in any frame whose z points up;
+    two or more (distractors). length: of the cables by their sensors [m], shape (cable,), NaN where there is none;
+    None or all NaN: the shape at rest of robot.toml is compared instead, mirror images told apart, which holds only
+    while the robot rests. None where some rod has no two blobs a rod length apart.
+    """
+    pairs = [_pairs(np.asarray(blobs, dtype=float), rod.length_m) for blobs, rod in zip(candidates, robot.rods, strict=True)]
+    if not all(pairs):
+        return None
+    picks = np.array([np.concatenate(choice) for choice in itertools.product(*pairs)])
+    sets = [np.asarray(candidates[cap // 2], dtype=float)[picks[:, cap]] for cap in range(robot.n_caps)]
+    p_WE = np.stack(sets, axis=1)
+    rods = np.linalg.norm(p_WE[:, 1::2] - p_WE[:, 0::2], axis=-1) - [rod.length_m for rod in robot.rods]
+    cost = 0.5 * np.sum((rods / ROD_SD) ** 2, axis=1)
+    count = len(robot.rods)
+    known = np.zeros(0, dtype=int) if length is None else np.flatnonzero(np.isfinite(length))
+    if len(known):
+        ends = np.array([cable.caps for cable in robot.cables])[known]
+        seen = np.linalg.norm(p_WE[:, ends[:, 1]] - p_WE[:, ends[:, 0]], axis=-1)
+        cost += 0.5 * np.sum(((seen - np.asarray(length)[known]) / SENSOR_SD) ** 2, axis=1)
+        count += len(known)
+    else:
+        cost += 0.5 * _from_rest(p_WE, np.array(robot.rest_caps_m))
+        count += 2 * robot.n_caps
+    order = np.argsort(cost)
+    best = int(order[0])
+    margin = float(cost[order[1]] - cost[best]) if len(order) > 1 else float("inf")
+    return Labelling(
+        p_WE=p_WE[best], pick=picks[best], cost=float(cost[best]), margin=margin,
+        sure=bool(margin >= SURE and cost[best] <= FIT * count),
+    )  # fmt: skip
+
+
+def _pairs(blobs: np.ndarray, length: float) -> list[tuple[int, int]]:
+    """Ordered pairs of blobs about a rod length apart."""
+    if len(blobs) < 2:
+        return []
+    apart = np.linalg.norm(blobs[:, None] - blobs[None], axis=-1)
+    return [(int(i), int(j)) for i, j in np.argwhere(np.abs(apart - length) < 5 * ROD_SD)]
+
+
+def _from_rest(p_WE: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Squared distance over REST_SD to the shape at rest, turned about the vertical and moved; shape (labelling,).
+
+    Rotations about the vertical only: the robot stands on the same caps at rest, so that symmetries of the prism that
+    turn it over do not count as the same pose.
+    """
+    a = p_WE - p_WE.mean(axis=1, keepdims=True)
+    b = rest - rest.mean(axis=0)
+    across = np.einsum("kci,ci->k", a[:, :, :2], b[:, :2])
+    turned = np.einsum("kc,c->k", a[:, :, 1], b[:, 0]) - np.einsum("kc,c->k", a[:, :, 0], b[:, 1])
+    flat = np.sum(a[:, :, :2] ** 2, axis=(1, 2)) + np.sum(b[:, :2] ** 2) - 2 * np.hypot(across, turned)
+    high = np.sum((a[:, :, 2] - b[:, 2]) ** 2, axis=1)
+    return np.asarray((flat + high) / REST_SD**2)

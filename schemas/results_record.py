@@ -38,6 +38,8 @@ class RecordRun(Frozen):
     """Control ticks a second."""
     late: int = 0
     """Control ticks more than half a period late."""
+    held: int = 0
+    """Control ticks in which the motors were held, since a sensor might have been frozen or the camera gave no frames."""
     samples: int
     lost: int | None = None
     repeated: int | None = None

@@ -1,12 +1,13 @@
 """The duties of the host: what must stop the robot, whatever the controller wants. A `RobotLink` around another.
 
-The robots of the authors have no watchdog, so nobody else stops them. Stopped is latched: only `reset` goes on.
+The robots of the authors have no watchdog, so nobody else stops them. Stopped is latched: only `reset` goes on. Held is
+not: the motors are off while a sensor is in doubt (`Sample.doubt`), and go on with its next change.
 
 | duty | when |
 |---|---|
 | stale sensors | a winched cable's sensor, or a board, was not heard for 200 ms |
 | impossible sensors | a winched cable's sensor sends 0.20 pF (its chip is not set up) for 200 ms |
-| frozen sensor | the same value for 0.8 s while its motor was driven through 20 mm |
+| frozen sensor | not one change in 0.18 s in which its motor was driven: held; none in 0.8 s: stopped |
 | length out of range | outside the limits of robot.toml by more than 20 mm, three messages in a row |
 | time limit | the run takes longer than it was given |
 | exit, exception, SIGINT, SIGTERM | leaving the context; `signals.py` turns both signals into exceptions |
@@ -14,6 +15,7 @@ The robots of the authors have no watchdog, so nobody else stops them. Stopped i
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 from types import TracebackType
@@ -58,6 +60,7 @@ class GuardedLink:
         self._moving = np.zeros(len(robot.actuated))
         self._next: Sample | None = None
         self._judged = -math.inf
+        self._held = ""
 
     @property
     def facts(self) -> LinkFacts:
@@ -103,14 +106,14 @@ class GuardedLink:
         self._start = self._heard = self.now()
         self._wall = time.monotonic()
         self._watch.restart(self._start)
-        self._next, self._judged = None, self._start
+        self._next, self._judged, self._held = None, self._start, ""
 
     def reconnect(self, timeout: float = 10.0) -> None:
         """Of the link; what was watched is forgotten, the time limit goes on."""
         self.inner.reconnect(timeout)
         self._heard, self._wall = self.now(), time.monotonic()
         self._watch.restart(self._heard)
-        self._next, self._judged = None, self._heard
+        self._next, self._judged, self._held = None, self._heard, ""
 
     def read(self, timeout: float) -> Sample | None:
         """As of the link, but looks at the clock in between while nothing comes.
@@ -125,17 +128,20 @@ class GuardedLink:
             if sample is not None:
                 self._heard, self._wall = self.now(), time.monotonic()
                 self._object(self._watch.sample(sample, self._moving))
+                sample = self._hold(sample)
             self._object(self._clock())
             if sample is not None or left <= LOOK:
                 return sample
 
     def command(self, speed: np.ndarray) -> None:
-        """As of the link; nothing but zeros in a dry run. Raises SafetyStop where the robot is stopped."""
+        """As of the link; nothing but zeros in a dry run, and while the motors are held. Raises SafetyStop where the
+        robot is stopped."""
         self._refuse()
         self._object(self._clock())
         speed = np.asarray(speed, dtype=np.float64)
-        self.inner.command(np.zeros_like(speed) if self.dry_run and np.isfinite(speed).all() else speed)
-        self._moving = speed if not self.dry_run else np.zeros_like(speed)
+        still = self.dry_run or bool(self._held)
+        self.inner.command(np.zeros_like(speed) if still and np.isfinite(speed).all() else speed)
+        self._moving = np.zeros_like(speed) if still else speed
 
     def stop(self) -> None:
         """Of the link. Not latched: the next command moves again."""
@@ -173,6 +179,14 @@ class GuardedLink:
         if time.monotonic() - self._wall > SILENT:
             return f"stale sensors: nothing came for {SILENT:g} s"
         return self._watch.stale(now)
+
+    def _hold(self, sample: Sample) -> Sample:
+        """The sample, with what is in doubt; where something newly is, after the motors were told to stop."""
+        doubt = self._watch.doubt
+        if doubt and not self._held:
+            self.stop()
+        self._held = doubt
+        return dataclasses.replace(sample, doubt=doubt) if doubt else sample
 
     def _object(self, reason: str) -> None:
         if reason:

@@ -14,13 +14,20 @@ if TYPE_CHECKING:
 
 STALE = 0.2
 """[s] after which a reading is too old to drive on."""
-FROZEN_FOR = 0.8
-"""[s] of one and the same value. Not less: a step of the authors' 10-bit chip is 1 mm, so that at rest it sends the
-same value up to 18 times in a row (measured on the rig's, in 1,000 readings of noise 0.55 mm) ..."""
-FROZEN_PATH = 0.02
-"""... while the winch was driven through this [m]."""
+DOUBTED = 0.18
+"""[s] that a winch is driven without any change of its sensor, after which the motors are held: a sensor may be frozen,
+and with what the next reading and the way of the stop take they are off within 250 ms ..."""
+DOUBTED_PATH = 0.004
+"""... if the winch was driven through this [m]: four steps of the authors' 10-bit converter. A healthy sensor in motion
+changes with nearly every reading, one whose cable is held back by its noise (0.18 s without a change did not occur in
+390 s of driving on the rig) ..."""
+FROZEN = 0.8
+"""[s], driven or held, after which it is frozen for certain. Not less: at rest the 10-bit converter sends the same value
+up to 18 times in a row (measured on the rig's, in 1,000 readings of noise 0.55 mm), and then was merely doubted."""
 OUT_FOR = 3
 """Messages in a row: one bad number is no reason."""
+_ROUNDING = 1e-9
+"""[s]: ticks of 20 ms add up to a little less or more."""
 MARGIN = 0.02
 """[m] beyond the limits. Assumption: 90 % of recalibrations a day later differ by less than 18 mm."""
 
@@ -47,7 +54,8 @@ class Watch:
         self._good = np.full(n, now)
         self._out = np.zeros(n, dtype=np.int64)
         self._value, self._raw = np.full(n, np.nan), np.full(n, np.nan)
-        self._since, self._path = np.full(n, now), np.zeros(n)
+        self._unchanged, self._path = np.zeros(n), np.zeros(n)
+        self._doubted = np.zeros(n, dtype=bool)
         self._last = now
 
     def sample(self, sample: Sample, moving: np.ndarray) -> str:
@@ -56,15 +64,29 @@ class Watch:
         self._raw = np.where(fresh, value, self._raw)
         good = fresh & (np.abs(value - NOT_INITIALISED) > 1e-15)
         self._good = np.where(good, now, self._good)
-        self._path = self._path + np.abs(moving[self._motor]) * self._speed * max(0.0, now - self._last)
-        self._last = max(now, self._last)
-        changed = good & (value != self._value)
-        self._value = np.where(changed, value, self._value)
-        self._since, self._path = np.where(changed, now, self._since), np.where(changed, 0.0, self._path)
-        frozen = good & (now - self._since > FROZEN_FOR) & (self._path > FROZEN_PATH)
+        frozen = self._frozen(now, value, good, np.abs(moving[self._motor]))
         if frozen.any():
             return f"frozen sensor: that of cable {self._name(frozen)} has not changed while its motor ran"
         return self._range(sample.capacitance, good)
+
+    @property
+    def doubt(self) -> str:
+        """Why the motors should be held for now, "" nothing: a sensor that may be frozen. Goes when it changes."""
+        return f"the sensor of cable {self._name(self._doubted)} may be frozen" if self._doubted.any() else ""
+
+    def _frozen(self, now: float, value: np.ndarray, good: np.ndarray, moving: np.ndarray) -> np.ndarray:
+        """Which sensors are, (watched,), bool; those that may be are doubted. moving: size of the speed, (watched,)."""
+        passed = max(0.0, now - self._last)
+        self._last = max(now, self._last)
+        changed = good & (value != self._value)
+        self._value = np.where(changed, value, self._value)
+        tested = (moving > 0) | self._doubted
+        self._unchanged = np.where(changed, 0.0, self._unchanged + np.where(tested, passed, 0.0))
+        self._path = np.where(changed, 0.0, self._path + moving * self._speed * passed)
+        # Judged at a reading of its own: what is not heard is stale, not frozen.
+        seems = good & (self._unchanged > DOUBTED - _ROUNDING) & (self._path > DOUBTED_PATH)
+        self._doubted = (self._doubted | seems) & ~changed
+        return self._doubted & good & (self._unchanged > FROZEN)
 
     def stale(self, now: float) -> str:
         """A reason to stop at the time `now` [s]: a sensor without a good reading for too long."""

@@ -94,13 +94,12 @@ def stuck(value: float) -> Callable[[int, np.ndarray], np.ndarray]:
     ("wrong", "what", "after"),
     [
         (stuck(NOT_INITIALISED), "sends 0.20 pF", 0.2), (stuck(np.nan), "no good reading of cable 3", 0.2),
-        (stuck(SLOPE * 0.15 + OFFSET), "frozen sensor: that of cable 3", 0.8),
         (stuck(SLOPE * 0.45 + OFFSET), "cable 3 measures 450 mm", 0.04),
         (stuck(SLOPE * 0.01 + OFFSET), "cable 3 measures 10 mm", 0.04),
         (lambda k, c: None if k * TICK > 1 else c, "nothing came for", 0.2),
         (lambda k, c: np.where(np.arange(9) // 3 == 1, np.nan, c) if k * TICK > 1 else c, "cable 3, 4, 5 for 200", 0.2),
     ],
-    ids=["not set up", "drop-out", "frozen", "too long", "too short", "silence", "a board gone"],
+    ids=["not set up", "drop-out", "too long", "too short", "silence", "a board gone"],
 )  # fmt: skip
 def test_each_failure_of_sensors_stops_the_motors(
     wrong: Callable[[int, np.ndarray], np.ndarray | None], what: str, after: float
@@ -113,6 +112,44 @@ def test_each_failure_of_sensors_stops_the_motors(
     first = next(t for t, said in inner.said if isinstance(said, str) and said == "stop")
     assert 1.0 < first <= 1.0 + after + 2 * TICK + 1e-9
     assert all(isinstance(said, str) for t, said in inner.said if t >= first)
+
+
+@pytest.mark.parametrize("begins", [-1.0, 1.0], ids=["before it is driven", "in motion"])
+def test_a_frozen_sensor_holds_the_motors_at_once_and_stops_them_for_good(begins: float) -> None:
+    """Nothing is driven for longer than 200 ms on a value that does not change; after 0.8 s of that it is a stop."""
+    inner = Clockwork(lambda k, c: np.where((np.arange(9) == 3) & (k * TICK > begins), SLOPE * 0.15 + OFFSET, c))
+    with pytest.raises(SafetyStop, match="frozen sensor: that of cable 3"), GuardedLink(inner, calibrated()) as link:
+        drive(link, 0.5, 0.0)
+        drive(link, 5.0)
+    first = max(begins, 0.5)
+    moved = [t for t, said in inner.said if not isinstance(said, str) and np.any(said)]
+    assert moved[0] == pytest.approx(0.5, abs=1.5 * TICK) and moved[-1] <= first + 0.2 + 1e-9
+    assert first + 0.8 < inner.now() <= first + 0.9
+
+
+def test_a_cable_that_stands_still_is_no_frozen_sensor() -> None:
+    """Driven for 200 s in vain, read in the steps of a 10-bit converter with noise of half a step: a run of equal values
+    long enough to hold the motors is rare, ends with the next value, and is told; none stops the robot."""
+    step = SLOPE * 0.001
+    inner = Clockwork(lambda k, c: np.round(c / step) * step)
+    told = set()
+    with GuardedLink(inner, calibrated()) as link:
+        while link.now() < 200.0:
+            sample = link.read(TICK)
+            assert sample is not None
+            told.add(sample.doubt)
+            link.command(np.ones(6))
+    held = [t for t, said in inner.said if not isinstance(said, str) and not np.any(said)]
+    assert 0 < len(held) * TICK < 0.05 * 200.0  # six cables at once, each in the middle of a step
+    assert "" in told and all(text in told for text in (f"the sensor of cable {i} may be frozen" for i in range(6)))
+
+
+def test_a_sensor_without_noise_that_moves_is_not_doubted() -> None:
+    """A value that changes by a step of the converter every 0.1 s, as at a sixth of the speed, holds nothing."""
+    inner = Clockwork(lambda k, c: SLOPE * (0.15 + 0.001 * np.full(9, k // 5 % 40)) + OFFSET)
+    with GuardedLink(inner, calibrated()) as link:
+        drive(link, 5.0)
+    assert all(np.all(said == 1) for _, said in inner.said if not isinstance(said, str))
 
 
 def test_a_healthy_robot_is_left_alone() -> None:

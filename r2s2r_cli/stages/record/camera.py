@@ -23,13 +23,15 @@ _PNG_LEVEL = 1
 class Pictures:
     """Frames of one run into its `camera` stream, until the context ends.
 
-    feed: frames as they come. stamp: from a frame to its time in the run [s]. Counts: `written`, `lost` (gaps in the
-    camera's own count).
+    feed: frames as they come. stamp: from a frame to its time in the run [s]. waits: a robot in lock-step, whose time does
+    not go on while the camera is slow. Counts: `written`, `lost` (gaps in the camera's own count).
     """
 
     def __init__(
-        self, feed: CameraFeed, writer: Writer, stream: str, settings: RecordSettings, stamp: Callable[[Frame], float]
-    ) -> None:
+        self, feed: CameraFeed, writer: Writer, stream: str, settings: RecordSettings, stamp: Callable[[Frame], float],
+        *, waits: bool = False,
+    ) -> None:  # fmt: skip
+        self._waits = waits
         self._feed, self._writer, self._stream, self._settings, self._stamp = feed, writer, stream, settings, stamp
         self._ended = threading.Event()
         self._error: BaseException | None = None
@@ -39,6 +41,12 @@ class Pictures:
         self.written = 0
         self.lost = 0
         self._thread = threading.Thread(target=self._work, name="record-camera", daemon=True)
+
+    @property
+    def doubt(self) -> str:
+        """Why the motors should be held for now, "" nothing: no frame for longer than camera_hold_s."""
+        late = not self._waits and self._feed.statistics.silent_s > self._settings.camera_hold_s
+        return "the camera gave no frames" if late else ""
 
     def check(self) -> None:
         """Raises HardwareError where the camera is gone, or gives no frames any more."""

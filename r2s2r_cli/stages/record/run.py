@@ -110,7 +110,7 @@ class RunLoop:
         self.t = t
         self.tally.sample(t, sample)
         if sample.due:
-            self._control(t, sample)
+            self._control(t, sample, pictures)
         self._write(t, sample)
         if t >= self._next_link_row:
             self._put("link", self.tally.link_row(t, self.link.statistics))
@@ -119,17 +119,19 @@ class RunLoop:
             self._watch(self._now(t, sample, pictures))
             self._next_look = t + LOOK_S
 
-    def _control(self, t: float, sample: Sample) -> None:
+    def _control(self, t: float, sample: Sample, pictures: Pictures | None) -> None:
         if not sample.complete:  # a sensor has never been heard: nothing to act on yet
             self.link.command(np.zeros(len(self._winched)))
             return
         target = self._sequence.target[self.steps.index]
         lengths = self._lengths(sample.capacitance)
         length = lengths[self._winched]
-        control = self._pid.tick(length, target)
+        doubt = sample.doubt or ("" if pictures is None else pictures.doubt)
+        # Held: what is recorded is what the motors were told, and the controller has not seen this tick.
+        control = np.zeros(len(self._winched)) if doubt else self._pid.tick(length, target)
         self.link.command(control)
         done = self._pid.done.copy()
-        self.tally.tick(t, lengths[self._lengths.cable])
+        self.tally.tick(t, lengths[self._lengths.cable], doubt)
         for stream, row in self._interval.tick(t, target, control, done):
             self._put(stream, row)
         self._put("commands", {"t": t, "target": target, "control": control, "done": done})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 
@@ -74,7 +74,10 @@ class Session:
                 stack.callback(self.link.stop)
                 if self.feed is not None:
                     stamp = _stamp(loop, lock_step=self.link.facts.lock_step)
-                    pictures = Pictures(self.feed, writer, f"runs/{plan.name}/camera", self.settings, stamp)
+                    pictures = Pictures(
+                        self.feed, writer, f"runs/{plan.name}/camera", self.settings, stamp,
+                        waits=self.link.facts.lock_step,
+                    )  # fmt: skip
                     stack.enter_context(pictures)
                 loop.run(pictures)
         except BaseException as error:
@@ -112,17 +115,17 @@ def _report(loop: RunLoop, pictures: Pictures | None, ended: str) -> RecordRun:
     done = RecordRun(
         run=loop.plan.name, policy=loop.plan.policy.name, repeat=loop.plan.repeat, ended=ended, targets=loop.targets,
         targets_done=loop.steps.index, timed_out=tuple(loop.timed_out), duration_s=loop.t, ticks=tally.ticks,
-        rate_hz=tally.rate, late=tally.late, samples=tally.samples, lost=tally.since("lost", now),
+        rate_hz=tally.rate, late=tally.late, held=tally.held, samples=tally.samples, lost=tally.since("lost", now),
         repeated=tally.since("repeated", now), reordered=tally.since("reordered", now),
         corrupt=now.corrupt - tally.before.corrupt, gap_max_s=tally.gap_max, latency_median_s=now.latency_median,
         latency_p99_s=now.latency_p99, clock_drift=now.clock_drift, clock_jumps=tally.jumps,
         silent_share=tuple((tally.silent / max(1, tally.ticks)).tolist()), voltage_first_v=tally.voltage_first,
         voltage_last_v=tally.voltage_last, camera=camera,
     )  # fmt: skip
-    return done.model_copy(update={"warnings": tuple(_warnings(done, loop.link.facts.watchdog is not None))})
+    return done.model_copy(update={"warnings": tuple(_warnings(done, tally.doubts, loop.link.facts.watchdog is not None))})
 
 
-def _warnings(run: RecordRun, stops_by_itself: bool) -> list[str]:
+def _warnings(run: RecordRun, doubts: Mapping[str, int], stops_by_itself: bool) -> list[str]:
     found = []
     if not run.complete:
         left = "" if stops_by_itself else "; the protocol cannot guarantee that the motors stopped"
@@ -132,6 +135,7 @@ def _warnings(run: RecordRun, stops_by_itself: bool) -> list[str]:
         found.append(f"targets given up after their time-out, not all cables were done: {numbers}")
     if run.late > (1 - CONTROL_SHARE) * max(run.ticks, 1):
         found.append(f"{run.late} of {run.ticks} control ticks came more than half a period late")
+    found += [f"the motors were held for {count} control ticks: {why}" for why, count in doubts.items()]
     if run.lost:
         found.append(f"{run.lost} of {run.lost + run.samples} samples were lost on the way")
     if run.corrupt:

@@ -28,6 +28,8 @@ class Tally:
     samples: int = 0
     ticks: int = 0
     late: int = 0
+    held: int = 0
+    doubts: dict[str, int] = field(default_factory=dict)
     gap_max: float = 0.0
     jumps: int = 0
     silent: np.ndarray = field(init=False)
@@ -57,9 +59,13 @@ class Tally:
                 self.jumps += own < 0 or abs(own - step) > JUMP_S
             self._clocks[sample.board] = (t, sample.t_board)
 
-    def tick(self, t: float, length: np.ndarray) -> None:
-        """A control tick at t [s] with the lengths of all sensors [m], (sensor,), NaN: no reading."""
+    def tick(self, t: float, length: np.ndarray, doubt: str = "") -> None:
+        """A control tick at t [s] with the lengths of all sensors [m], (sensor,), NaN: no reading. doubt: why the motors
+        were held."""
         self.ticks += 1
+        if doubt:
+            self.held += 1
+            self.doubts[doubt] = self.doubts.get(doubt, 0) + 1
         self._first_tick = t if self._first_tick is None else self._first_tick
         if self._t_tick is not None:
             self.late += t - self._t_tick > LATE * self.period

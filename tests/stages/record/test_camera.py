@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.devices.camera import CameraError, FeedStatistics, Frame
+from r2s2r_cli.devices.link import Sample
 from r2s2r_cli.errors import ArtifactError, HardwareError
 from r2s2r_cli.stages.record import Session, plans
 from r2s2r_cli.stages.record.camera import Pictures, encode_color, encode_depth
@@ -114,6 +115,28 @@ def test_a_camera_that_is_gone_ends_the_run() -> None:
     assert len(rows.of["runs/random-0/camera"]) == 6
     run = session.runs[0]
     assert run.ended == "the camera is gone" and run.camera is not None and run.camera.frames == 6
+
+
+@pytest.mark.parametrize("lock_step", [False, True])
+def test_a_camera_that_hesitates_holds_the_motors(lock_step: bool) -> None:
+    """No frame for longer than camera_hold_s: nothing is driven, until the next frame; in lock-step time itself waits."""
+    robot = calibrated()
+    link, feed = FakeLink(robot, lock_step=lock_step), Still([])
+    feed.statistics = FeedStatistics(silent_s=0.5)
+
+    def come(number: int, sample: Sample) -> Sample:
+        if number > 50:
+            feed.statistics = FeedStatistics(silent_s=0.0)
+        return sample
+
+    link.on_read = come
+    plan = plans([random_policy(robot, 1, 0)], repeats=1, rest=0.0)
+    session = Session(plan, robot, link, RecordSettings(camera_gone_s=60.0), feed=feed)
+    session.record(Rows())
+    (run,) = session.runs
+    held = 0 if lock_step else 50
+    assert run.held == held and run.complete and ("gave no frames" in "".join(run.warnings)) == bool(held)
+    assert not np.array(link.commands[:held]).any() and np.any(link.commands[held])
 
 
 def test_a_silent_camera_ends_the_run() -> None:

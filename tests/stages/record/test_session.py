@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 
 import numpy as np
@@ -70,6 +71,22 @@ def test_every_command_is_written_as_it_was_sent() -> None:
     control = rows.column("runs/gait/commands", "control")
     assert np.array_equal(control, np.array(link.commands)[-len(control) :])
     assert len(control) == session.runs[0].ticks == pytest.approx(session.runs[0].samples / 3, abs=2)
+
+
+def test_held_motors_are_written_as_held() -> None:
+    """Ten samples in doubt in mid-motion: zeros are sent and written, counted and said; then the run goes on to its end."""
+    doubt = "the sensor of cable 3 may be frozen"
+    link = FakeLink(calibrated())
+    link.on_read = lambda number, sample: dataclasses.replace(sample, doubt=doubt if 45 <= number < 55 else "")
+    session, rows = recorded(link, policy(link.robot, 0.0))
+    control = rows.column("runs/gait/commands", "control")
+    still = np.flatnonzero((control == 0).all(axis=1))
+    at = still[(still > 40) & (still < 60)]
+    assert len(at) == 10 and np.ptp(at) == 9 and control[at[0] - 1].all() and control[at[-1] + 1].all()
+    assert np.array_equal(control, np.array(link.commands)[-len(control) :])
+    (run,) = session.runs
+    assert run.held == 10 and run.ended == "complete"
+    assert run.warnings == (f"the motors were held for 10 control ticks: {doubt}",)
 
 
 def test_unsynchronised_boards_leave_gaps_in_their_rows() -> None:

@@ -42,10 +42,13 @@ _VERSION = 3
 
 @dataclass(frozen=True)
 class Setting:
-    """What is asked of a case. height_m: of the camera [m]. hide_cap: one cap is hidden half of the time. blind_s: all caps
-    are hidden so long during motion [s]. bias_m: standard deviation of the sensors' bias [m]. cables: whether the
-    recording has cable sensors. model: "plain" (depth noise 1.2 mm z^2, half correlated, flying pixels, holes; sensors
-    with bias and 3 mm of white noise) or "full" (depth of the D435, misregistration, all faults of the sensors)."""
+    """What is asked of a case.
+
+    height_m: of the camera [m]. hide_cap: one cap is hidden half of the time. blind_s: all caps are hidden so long
+    during motion [s]. bias_m: standard deviation of the sensors' bias [m]. cables: whether the recording has cable
+    sensors. model: "plain" (depth noise 1.2 mm z^2, half correlated, flying pixels, holes; sensors with bias and 3 mm
+    of white noise) or "full" (depth of the D435, misregistration, all faults of the sensors).
+    """
 
     height_m: float = 1.44
     hide_cap: bool = False
@@ -72,11 +75,14 @@ SETTINGS: dict[str, Setting] = {
 
 @dataclass(frozen=True)
 class Truth:
-    """What is, at the frames' exposures. t: as the recording stamps the frames [s], (frame,). p_WE: [m], (frame, cap, 3); W
-    of the rig. force: of the ground on the caps [N], (frame, cap). weight: of the robot [N]. X_WC: the camera's pose
-    (4, 4). length: of the cables [m], (frame, cable). delay_s: by which the sensors' lengths are later than the
-    pictures', lag of the sensors and offset of the clocks together. hidden: caps behind something that is not robot,
-    bool (frame, cap). blind: frames in which all are."""
+    """What is, at the frames' exposures.
+
+    t: as the recording stamps the frames [s], (frame,). p_WE: [m], (frame, cap, 3); W of the rig. force: of the ground
+    on the caps [N], (frame, cap). weight: of the robot [N]. X_WC: the camera's pose (4, 4). length: of the cables [m],
+    (frame, cable). delay_s: by which the sensors' lengths are later than the pictures', lag of the sensors and offset
+    of the clocks together. hidden: caps behind something that is not robot, bool (frame, cap). blind: frames in which
+    all are.
+    """
 
     t: np.ndarray
     p_WE: np.ndarray
@@ -91,7 +97,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Case:
-    """One run. streams: by name, as in `schemas/recording.py`, pictures apart. frames: the pictures as they were kept."""
+    """One run. streams: by name, as in `schemas/recording.py`, without pictures. frames: those."""
 
     setting: Setting
     seed: int
@@ -119,7 +125,7 @@ class PictureFile:
 
 
 def make_case(seed: int, folder: Path, *, run_s: float = RUN_S, robot: str = "threebar", **asked: Any) -> Case:
-    """The case of a seed; asked: fields of `Setting`. Its pictures lie in `folder`, and are used again if they are there.
+    """The case of a seed; asked: fields of `Setting`. Pictures that lie in `folder` are used again.
 
     The same arguments make the same run, to the last bit.
     """
@@ -199,9 +205,8 @@ def _hide_one(camera: CameraSettings, motion: Motion, cap: int) -> Iterator[Occl
         if len(t) > 1:
             line = np.polynomial.polynomial.polyfit(t, way, 1)
             off = np.linalg.norm(way - (line[0] + t[:, None] * line[1]), axis=1).max()
-            a = tuple(map(float, line[0]))
-            yield Occluder(a_m=a, b_m=a, radius_m=float(1.25 * share * radius + off + 0.004), from_s=float(start),
-                           until_s=float(start + HIDE_S), v_m_per_s=tuple(map(float, line[1])))  # fmt: skip
+            yield Occluder(a_m=_point(line[0]), b_m=_point(line[0]), v_m_per_s=_point(line[1]), from_s=start,
+                           until_s=start + HIDE_S, radius_m=float(1.25 * share * radius + off + 0.004))  # fmt: skip
         start += 2 * HIDE_S
 
 
@@ -216,10 +221,14 @@ def _hide_all(camera: CameraSettings, motion: Motion, seconds: float) -> Iterato
     first = int(np.argmax(np.where(where, gone, -1.0)))
     p = motion.p_WE[first : first + n + 1]
     centre = p.mean(axis=(0, 1))
-    a = tuple(map(float, eye + share * (centre - eye)))
+    a = _point(eye + share * (centre - eye))
     reach = np.linalg.norm((p - centre)[..., :2], axis=-1).max() + 0.06
     yield Occluder(a_m=a, b_m=a, radius_m=float(1.3 * share * reach), from_s=float(motion.t[first]),
                    until_s=float(motion.t[first] + seconds))  # fmt: skip
+
+
+def _point(p: np.ndarray) -> tuple[float, float, float]:
+    return float(p[0]), float(p[1]), float(p[2])
 
 
 def _exposures(camera: CameraSettings, seed: int, run_s: float) -> np.ndarray:
@@ -252,7 +261,7 @@ def _draw(stem: Path, robot: Robot, camera: CameraSettings, motion: Motion, expo
             sizes["color"].append(color.write(encode_color(picture.color, settings)))
             sizes["depth"].append(depth.write(encode_depth(picture.depth)))
     part = stem.with_suffix(".part.npz")
-    np.savez(part, **{name: np.cumsum(size) for name, size in sizes.items()})
+    np.savez(part, color=np.cumsum(sizes["color"]), depth=np.cumsum(sizes["depth"]))
     part.replace(stem.with_suffix(".npz"))
 
 

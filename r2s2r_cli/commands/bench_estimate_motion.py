@@ -1,4 +1,4 @@
-"""What the rig's robot does in a case of `bench estimate`: the plant under its boards and our controller, no camera yet.
+"""What the rig's robot does in a case of `bench estimate`: the plant under its boards and our controller, no camera.
 
 Time is the rig's, nothing waits: samples reach the controller as they are taken.
 """
@@ -12,6 +12,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from r2s2r_cli.artifact import Group
+    from r2s2r_cli.devices.lengths import Lengths
     from r2s2r_cli.rig.world import World
     from schemas.robot import Robot
 
@@ -27,9 +28,12 @@ HOLD_S = 0.3
 
 @dataclass(frozen=True)
 class Motion:
-    """A run of the rig. t: instants of the truth [s], (n,), every LOOK_S. p_WE: end caps [m], (n, cap, 3). length: of the
-    cables [m], (n, cable). force: of the ground on the caps along its normal [N], (n, cap). weight: of the robot [N].
-    streams: what the host recorded (`schemas/recording.py`), pictures apart. driven: some motor runs, bool (n,)."""
+    """A run of the rig.
+
+    t: instants of the truth [s], (n,), every LOOK_S. p_WE: end caps [m], (n, cap, 3). length: of the cables [m],
+    (n, cable). force: of the ground on the caps along its normal [N], (n, cap). weight: of the robot [N]. streams: what
+    the host recorded (`schemas/recording.py`), without pictures. driven: some motor runs, bool (n,).
+    """
 
     t: np.ndarray
     p_WE: np.ndarray
@@ -100,12 +104,10 @@ def _streams(
     robot: Robot,
     sensors: list[tuple[float, float, int, np.ndarray]],
     commands: list[tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray]],
-    lengths: object,
+    lengths: Lengths,
 ) -> dict[str, Group]:
     from r2s2r_cli.artifact import Group
-    from r2s2r_cli.devices.lengths import Lengths
 
-    assert isinstance(lengths, Lengths)
     t, t_board, board, heard = (np.array(column) for column in zip(*sensors, strict=True))
     at, target, control, done, position = (np.array(column) for column in zip(*commands, strict=True))
     facts = {"origin": "rig", "nature": "simulated", "source": "r2s2r bench estimate", "robot": robot.name,

@@ -41,9 +41,9 @@ class RecordSettings(Frozen):
     """How colour is kept: JPEG of jpeg_quality, or PNG, which loses nothing and takes twice the room. Depth is always PNG."""
     jpeg_quality: Annotated[int, Field(strict=True, ge=50, le=100)] = 95
     """Quality of the JPEG colour."""
-    camera_hold_s: Annotated[float, Field(strict=True, gt=0, le=60)] = 0.2
-    """While the camera gives no frame for longer than this [s] the motors are held; more than a frame takes, as it must be
-    for cameras of less than 10 Hz."""
+    camera_hold_s: Annotated[float, Field(strict=True, gt=0, le=60)] = 0.15
+    """While the camera gives no frame for longer than this [s] the motors are held. More than two frames take: a larger one
+    for cameras of less than 15 Hz."""
     camera_gone_s: Annotated[float, Field(strict=True, gt=0, le=60)] = 2.0
     """A camera without a frame for longer than this [s] stops the robot."""
 

@@ -53,8 +53,8 @@ class Sample:
     received. t_sensor: arrival of each of them [s], (sensor,), NaN: never. fresh: they came with this message,
     (sensor,), bool. encoder: counts of the latest message, (actuated,), NaN: none. a_B: specific force of this board's
     IMU [m/s^2], w_WB: angular velocity [rad/s], in board axes, (3,), None: the message has none. voltage: battery [V],
-    None: not told. doubt: why a guard holds the motors for now (it sends zeros, whatever is asked for), "" where it does
-    not.
+    None: not told. doubt: why a guard holds the motors for now (it sends zeros, whatever is asked for), "" where it
+    does not.
     """
 
     t_host: float

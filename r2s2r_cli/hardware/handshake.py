@@ -79,14 +79,14 @@ def shake(link: Link) -> None:
         if message is not None:
             if message.source is not None and not addressed:
                 addressed, again = True, begin  # only now is it known where to say hello
-            heard.note(link.take(message), message.line, hello)
+            heard.note(link.inbox.take(message), message.line, hello)
             _refuse(link, heard)
     link.greeting = heard.greeting
-    link.forget()
+    link.inbox.forget()
     if heard.period > 0:
         link.lock_step = LockStepClock(heard.period)
         link.lock_step.tick(link)  # tells the world's time, and the addresses of all boards
-        link.forget()
+        link.inbox.forget()
 
 
 def _complete(link: Link, heard: _Heard) -> bool:
@@ -182,7 +182,7 @@ def unlatch(link: Link) -> None:
             continue
         if message.source is not None and not addressed:
             addressed, again = True, begin  # only now is it known where to ask
-        event = link.take(message)
+        event = link.inbox.take(message)
         if not isinstance(event, Ack) or event.of not in asked:
             continue
         if event.code in (0, 6):

@@ -31,7 +31,7 @@ class LockStepClock:
         A time-out above 0 is a tick at least, be it as short as a rounding error: a loop until some time gets there.
         """
         end, waits = self.t + timeout, timeout > 0
-        while (sample := link.next_sample()) is None and waits:
+        while (sample := link.inbox.next_sample()) is None and waits:
             self.tick(link)
             waits = self.t < end - 1e-9
         return sample
@@ -48,13 +48,13 @@ class LockStepClock:
                 message = link.transport.receive(left)
                 if message is None:
                     continue
-                event = link.take(message)
+                event = link.inbox.take(message)
                 if isinstance(event, Reading):
                     readings.append(event)
                 if isinstance(event, TickDone) and event.k == k:
                     self.k, self.t = k, event.t
-                    link.forget()  # stamped by the wall's clock; below by the world's
-                    return link.take_all([(reading, event.t) for reading in readings])
+                    link.inbox.forget()  # stamped by the wall's clock; below by the world's
+                    return link.inbox.take_tick(readings, event.t)
             if time.monotonic() > end:
                 raise LinkError(
                     "the rig does not answer", where=f"{link.transport.name}, tick {k}", expected="the end of the tick",

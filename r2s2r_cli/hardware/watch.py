@@ -22,8 +22,8 @@ DOUBTED_PATH = 0.004
 changes with nearly every reading, one whose cable is held back by its noise (0.18 s without a change did not occur in
 390 s of driving on the rig) ..."""
 FROZEN = 0.8
-"""[s], driven or held, after which it is frozen for certain. Not less: at rest the 10-bit converter sends the same value
-up to 18 times in a row (measured on the rig's, in 1,000 readings of noise 0.55 mm), and then was merely doubted."""
+"""[s], driven or held, after which it is frozen for certain. Not less: at rest the 10-bit converter sends the same
+value up to 18 times in a row (measured on the rig's, in 1,000 readings of noise 0.55 mm), and was merely doubted."""
 OUT_FOR = 3
 """Messages in a row: one bad number is no reason."""
 _ROUNDING = 1e-9

@@ -252,8 +252,8 @@ def test_boards_are_merged_and_one_of_them_leads() -> None:
             message = robot.receive(0.0)
             assert message is not None
             t += 0.02 / 3
-            link.take(dataclasses.replace(message, t=100 + t * (1.5 if i > 14 else 1)))
-            sample = link.next_sample()
+            link.inbox.take(dataclasses.replace(message, t=100 + t * (1.5 if i > 14 else 1)))
+            sample = link.inbox.next_sample()
             assert sample is not None and sample.board == board
             np.testing.assert_array_equal(sample.fresh, np.arange(9) // 3 == board)
             due.append((i, sample.due))

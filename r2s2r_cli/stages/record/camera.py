@@ -23,8 +23,8 @@ _PNG_LEVEL = 1
 class Pictures:
     """Frames of one run into its `camera` stream, until the context ends.
 
-    feed: frames as they come. stamp: from a frame to its time in the run [s]. waits: a robot in lock-step, whose time does
-    not go on while the camera is slow. Counts: `written`, `lost` (gaps in the camera's own count).
+    feed: frames as they come. stamp: from a frame to its time in the run [s]. waits: a robot in lock-step, whose time
+    does not go on while the camera is slow. Counts: `written`, `lost` (gaps in the camera's own count).
     """
 
     def __init__(

@@ -57,6 +57,12 @@ def simulate(
             help="Start from the first estimated state of this run, or `rest`. Default: rest; a replay, its own run.",
         ),
     ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            "--model", metavar="FILE", help="Simulate with the numbers of this 30-identify.h5. Default: robot.toml's."
+        ),
+    ] = None,
     project: ProjectOption = None,
     iteration: IterationOption = None,
     json: JsonOption = False,
@@ -89,7 +95,7 @@ def simulate(
         raise UsageError("there is nothing to simulate", where="r2s2r simulate",
                          expected="a policy file, --random N or --replay RUN", received="none of them",
                          hint="r2s2r simulate --random 15")  # fmt: skip
-    asked = Asked(here, place, tuple(policies or ()), random, seed, tuple(replay or ()), start)
+    asked = Asked(here, place, tuple(policies or ()), random, seed, tuple(replay or ()), start, model)
     run = StageRun(
         stage="simulate", kind="simulation", project=here, iteration=place, find_inputs=asked.refs,
         report_model=SimulateReport, overrides=overrides, flags=asked.flags(), dry_run=dry_run, force=force,
@@ -123,7 +129,9 @@ def _compute(asked: Asked, settings: SimulateSettings, console: Console) -> tupl
                 advance(done - passed[name])
                 passed[name] = done
 
-        data, report = stage.simulate(robot, requests, settings, cache_dir=asked.project.cache, progress=progress)
+        data, report = stage.simulate(
+            robot, requests, settings, model=asked.simulator(), cache_dir=asked.project.cache, progress=progress
+        )
     return data, report
 
 

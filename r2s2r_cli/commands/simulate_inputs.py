@@ -15,6 +15,7 @@ from schemas.header import InputRef
 
 if TYPE_CHECKING:
     from r2s2r_cli.artifact import ArtifactData
+    from r2s2r_cli.stages.identified import Identified
     from r2s2r_cli.stages.simulate import Request, Start
     from schemas.policy import PolicyFile
 
@@ -33,6 +34,7 @@ class Asked:
     seed: int
     replay: tuple[str, ...]
     start: str | None
+    model: Path | None = None
 
     def flags(self) -> dict[str, Any]:
         """What else than settings and inputs decides the result, for the provenance."""
@@ -43,6 +45,7 @@ class Asked:
             "seed": None if self.random is None else self.seed,
             "replay": list(self.replay),
             "from": self.start,
+            "model": None if self.model is None else self.project.relative(self.model),
         }
 
     def refs(self) -> list[InputRef]:
@@ -62,10 +65,24 @@ class Asked:
                                  received=error.strerror or str(error),
                                  hint="r2s2r simulate --random 15") from error  # fmt: skip
             refs[ref.path] = ref
+        if self.model is not None:
+            require_input(self.model, "r2s2r identify")
+            ref = artifact_ref(self.project, self.model, whole_header(self.model))
+            refs[ref.path] = ref
         if self._recorded is not None:
             ref = artifact_ref(self.project, self._recorded, whole_header(self._recorded))
             refs[ref.path] = ref
         return list(refs.values())
+
+    def simulator(self) -> Identified | None:
+        """The identified numbers that were asked for. Raises ArtifactError, InputError."""
+        from r2s2r_cli.stages.identified import identified
+        from r2s2r_cli.store.read import read_artifact
+
+        if self.model is None:
+            return None
+        _, found = read_artifact(self.model, "identification")
+        return identified(found, self.project.robot(), words=self.project.relative(self.model))
 
     def requests(self) -> list[Request]:
         """The runs to simulate, in the order of the command line. Raises InputError, UsageError."""

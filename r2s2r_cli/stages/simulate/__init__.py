@@ -14,6 +14,7 @@ import numpy as np
 from r2s2r_cli import __version__
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.errors import UsageError
+from r2s2r_cli.stages.identified import Identified
 from r2s2r_cli.stages.segments import segments, target_intervals
 from r2s2r_cli.stages.simulate.drive import REPLAY_SPELL_S, Driver, Simulated, Start
 from r2s2r_cli.stages.simulate.measures import com_path, heading_change, penetration, slack_share
@@ -62,13 +63,15 @@ def simulate(
     requests: Items[Request],
     settings: SimulateSettings,
     *,
+    model: Identified | None = None,
     cache_dir: Path | None = None,
     progress: Callable[[str, int], None] = lambda name, done: None,
 ) -> tuple[ArtifactData, SimulateReport]:
     """Simulate every request; the layout is that of `schemas/simulation.py`.
 
-    progress: called with the run's name and how many of its `parts` are done. Raises UsageError where two runs have one
-    name, InputError for a robot or policy that cannot be simulated, NumericalError where numbers are not finite.
+    model: whose numbers are simulated; None: robot.toml's. progress: called with the run's name and how many of its
+    `parts` are done. Raises UsageError where two runs have one name, InputError for a robot or policy that cannot be simulated,
+    NumericalError where numbers are not finite.
     """
     names = [request.name for request in requests]
     for name in names:
@@ -77,7 +80,7 @@ def simulate(
                 "two runs would have the same name", where="r2s2r simulate", expected="a name for each", received=name,
                 hint="change name in one of the policies, or simulate one at a time",
             )  # fmt: skip
-    driver = Driver(robot, settings, cache_dir)
+    driver = Driver(robot, settings, cache_dir, model)
     groups: dict[str, Group] = {}
     reports = []
     for request in requests:

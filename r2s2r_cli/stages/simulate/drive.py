@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from r2s2r_cli.errors import InputError, NumericalError
+from r2s2r_cli.stages.identified import Identified, nominal
 from r2s2r_cli.stages.init.attachment import rod_frames
-from r2s2r_cli.stages.model import parameters_of, structure_of
 from r2s2r_cli.stages.simulate.frames import centre_of_mass, frame_datasets, joined, stored_rows, without_first
 from r2s2r_cli.stages.simulate.policies import Sequence
 from r2s2r_cli.stages.simulate.replay import Replay
@@ -21,7 +21,6 @@ from schemas.robot import Robot
 
 if TYPE_CHECKING:
     from r2s2r_cli.engine import State
-    from r2s2r_cli.engine.pid import LatchedPid
 
 RESTLESS = 0.01
 """[m/s] a robot whose caps still move so fast when settling gives up is not at rest: no run starts from there."""
@@ -58,18 +57,22 @@ class Simulated:
 class Driver:
     """A robot in the engine. Holds the compiled step, so one serves all runs.
 
-    cache_dir: where machine code is kept. Raises InputError for a robot that cannot be simulated.
+    cache_dir: where machine code is kept. model: whose numbers are simulated; None: robot.toml's. Raises InputError for
+    a robot that cannot be simulated.
     """
 
-    def __init__(self, robot: Robot, settings: SimulateSettings, cache_dir: Path | None) -> None:
+    def __init__(
+        self, robot: Robot, settings: SimulateSettings, cache_dir: Path | None, model: Identified | None = None
+    ) -> None:
         from dataclasses import replace
 
         from r2s2r_cli.engine.rollout import Simulator
 
         self.robot = robot
         self.settings = settings
-        self.theta = parameters_of(robot)
-        self.structure = replace(structure_of(robot), rod_contact=settings.rod_contact)
+        self.model = model or nominal(robot)
+        self.theta = self.model.theta
+        self.structure = replace(self.model.structure, rod_contact=settings.rod_contact)
         self.simulator = Simulator(self.structure, cache_dir=cache_dir)
         self.cable_caps = tuple((a, b) for a, b in (cable.caps for cable in robot.cables))
         self.period = 1.0 / robot.pid.rate_hz
@@ -117,9 +120,9 @@ class Driver:
             state, shift = self.settled(start)
             with torch.no_grad():
                 run = closed_loop(
-                    self.simulator, self.theta, state, self.pid(), torch.as_tensor(policy.target),
+                    self.simulator, self.theta, state, self.model.pid, torch.as_tensor(policy.target),
                     torch.as_tensor(policy.hold), torch.as_tensor(policy.timeout), step=self.settings.step_s,
-                    tail=self.settings.tail_s, progress=progress,
+                    tail=self.settings.tail_s, link=self.model.link, progress=progress,
                 )  # fmt: skip
         except EngineError as error:
             raise self._translated(name, error, 0.0) from error
@@ -156,7 +159,7 @@ class Driver:
             for first in range(0, count, spell):
                 frames = min(spell, count - first)
                 at = replay.t_first + first * every * step
-                _, control = replay.at(at + step * np.arange(frames * every))
+                _, control = replay.at(at + step * np.arange(frames * every) - self.model.late)
                 with torch.no_grad():
                     run = self.simulator.rollout(
                         self.theta, state, torch.as_tensor(control)[None], step=step, every=every, substeps=substeps
@@ -175,16 +178,6 @@ class Driver:
             frames={"t": t, **self._read(states, rows, substeps)}, com=centre_of_mass(self.theta, states, rows),
             commands={key: commands[key] for key in commands.datasets}, target_at=target_at, control_at=control_at,
             timed_out=(), substeps=substeps, start_shift=shift,
-        )  # fmt: skip
-
-    def pid(self) -> LatchedPid:
-        """The low-level controller of robot.toml."""
-        from r2s2r_cli.engine.pid import LatchedPid
-
-        pid = self.robot.pid
-        return LatchedPid(
-            p=pid.p, i=pid.i, d=pid.d, tolerance=pid.tolerance, min_length=pid.min_length_m, range=pid.range_m,
-            period=self.period, cable_caps=self.cable_caps, actuated=self.robot.actuated,
         )  # fmt: skip
 
     def _ticks_a_frame(self) -> int:

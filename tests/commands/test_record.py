@@ -77,8 +77,8 @@ def test_a_recording_is_whole_and_valid(robot_project: Path, link: Maker) -> Non
 
 @pytest.mark.parametrize("silent", [None, 7])
 def test_a_sensor_is_judged_by_the_messages_of_its_board(robot_project: Path, link: Maker, silent: int | None) -> None:
-    """Three boards take turns, so that every sensor is missing in two rows of three: nothing to warn of. One that is heard
-    in every fifth message of its board (no winched cable's: the run goes on) is named, and no other."""
+    """Three boards take turns, so that every sensor is missing in two rows of three: nothing to warn of. One that is
+    heard in every fifth message of its board (no winched cable's: the run goes on) is named, and no other."""
 
     def drop(number: int, sample: Sample) -> Sample:
         if silent is None or not sample.fresh[silent] or number % 5 == 0:

@@ -144,8 +144,8 @@ def test_a_fault_of_the_robot_stops_it(root: Path, fault: str, word: str) -> Non
 @pytest.mark.slow
 @pytest.mark.parametrize("at_s", [3.0, 3.7, 4.4])
 def test_a_frozen_sensor_stops_the_robot(root: Path, at_s: float) -> None:
-    """Exit code 5; all motors are off within 250 ms of the motor of that cable being driven on the frozen value (while it
-    rests nothing depends on the value), and nothing moves again; the run is sealed."""
+    """Exit code 5; all motors are off within 250 ms of the motor of that cable being driven on the frozen value (while
+    it rests nothing depends on the value), and nothing moves again; the run is sealed."""
     with desk(root, "--link", "tcp", world=f'[[faults]]\nkind = "sensor_frozen"\nsensor = 1\nat_s = {at_s}\n') as rig:
         result = record(root, rig.address)
         truth = read_truth(rig.truth)
@@ -205,8 +205,8 @@ def test_a_clock_that_jumps_is_counted_and_harms_nothing(root: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", ["gone_at_s", "stalled_from_s"])
 def test_a_camera_that_goes_stops_the_robot(root: Path, fault: str) -> None:
-    """Its cable is pulled in the middle of a run, or it falls silent: exit code 5, motors off within 250 ms (a silent one
-    is given up after camera_gone_s, and the motors are held until then), lengths and pictures until then sealed."""
+    """Its cable is pulled in the middle of a run, or it falls silent: exit code 5, motors off within 250 ms (a silent
+    one is given up after camera_gone_s, the motors are held until then), lengths and pictures until then sealed."""
     with desk(root, "--link", "tcp", "--camera-port", "0", world=f"[camera.faults]\n{fault} = 5.0\n") as rig:
         assert rig.camera is not None
         result = record(root, rig.address, "--camera", rig.camera)

@@ -128,8 +128,8 @@ def test_a_frozen_sensor_holds_the_motors_at_once_and_stops_them_for_good(begins
 
 
 def test_a_cable_that_stands_still_is_no_frozen_sensor() -> None:
-    """Driven for 200 s in vain, read in the steps of a 10-bit converter with noise of half a step: a run of equal values
-    long enough to hold the motors is rare, ends with the next value, and is told; none stops the robot."""
+    """Driven for 200 s in vain, read in the steps of a 10-bit converter with noise of half a step: a run of equal
+    values long enough to hold the motors is rare, ends with the next value, and is told; none stops the robot."""
     step = SLOPE * 0.001
     inner = Clockwork(lambda k, c: np.round(c / step) * step)
     told = set()

@@ -122,12 +122,11 @@ def _report(loop: RunLoop, pictures: Pictures | None, ended: str) -> RecordRun:
         silent_share=tuple((tally.silent / max(1, tally.ticks)).tolist()), voltage_first_v=tally.voltage_first,
         voltage_last_v=tally.voltage_last, camera=camera,
     )  # fmt: skip
-    return done.model_copy(
-        update={"warnings": tuple(_warnings(done, tally.doubts, loop.link.facts.watchdog is not None))}
-    )
+    warnings = _warnings(done, tally.doubts, stops_by_itself=loop.link.facts.watchdog is not None)
+    return done.model_copy(update={"warnings": tuple(warnings)})
 
 
-def _warnings(run: RecordRun, doubts: Mapping[str, int], stops_by_itself: bool) -> list[str]:
+def _warnings(run: RecordRun, doubts: Mapping[str, int], *, stops_by_itself: bool) -> list[str]:
     found = []
     if not run.complete:
         left = "" if stops_by_itself else "; the protocol cannot guarantee that the motors stopped"

@@ -60,8 +60,10 @@ class Tally:
             self._clocks[sample.board] = (t, sample.t_board)
 
     def tick(self, t: float, length: np.ndarray, doubt: str = "") -> None:
-        """A control tick at t [s] with the lengths of all sensors [m], (sensor,), NaN: no reading. doubt: why the motors
-        were held."""
+        """A control tick at t [s] with the lengths of all sensors [m], (sensor,), NaN: no reading.
+
+        doubt: why the motors were held in it.
+        """
         self.ticks += 1
         if doubt:
             self.held += 1

@@ -119,7 +119,7 @@ def test_a_camera_that_is_gone_ends_the_run() -> None:
 
 @pytest.mark.parametrize("lock_step", [False, True])
 def test_a_camera_that_hesitates_holds_the_motors(lock_step: bool) -> None:
-    """No frame for longer than camera_hold_s: nothing is driven, until the next frame; in lock-step time itself waits."""
+    """No frame for longer than camera_hold_s: nothing is driven until the next one; in lock-step time itself waits."""
     robot = calibrated()
     link, feed = FakeLink(robot, lock_step=lock_step), Still([])
     feed.statistics = FeedStatistics(silent_s=0.5)

@@ -74,7 +74,7 @@ def test_every_command_is_written_as_it_was_sent() -> None:
 
 
 def test_held_motors_are_written_as_held() -> None:
-    """Ten samples in doubt in mid-motion: zeros are sent and written, counted and said; then the run goes on to its end."""
+    """Ten samples in doubt in mid-motion: zeros are sent and written, counted and said; then the run goes on."""
     doubt = "the sensor of cable 3 may be frozen"
     link = FakeLink(calibrated())
     link.on_read = lambda number, sample: dataclasses.replace(sample, doubt=doubt if 45 <= number < 55 else "")

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Literal, Self
+from typing import Literal
 
 import numpy as np
 
 from r2s2r_cli.rig.camera.service import CameraService
 from r2s2r_cli.rig.camera_process import CameraProcess
 from r2s2r_cli.rig.clock import RealClock, TickClock
+from r2s2r_cli.rig.closing import Closing
 from r2s2r_cli.rig.firmware import Firmware
 from r2s2r_cli.rig.plant import Plant, Truth
 from r2s2r_cli.rig.server import Server
@@ -47,7 +47,7 @@ class Outlet:
     truth: Path | None = None
 
 
-class Rig:
+class Rig(Closing):
     """A robot on the desk. Opens its ports at once; `serve` lets time begin.
 
     Raises UsageError and InputError for a robot, world or protocol that do not go together, HardwareError where a port
@@ -123,16 +123,6 @@ class Rig:
             self._camera.close()
         if self._truth is not None:
             self._truth.close()
-
-    def __enter__(self) -> Self:
-        """Itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close."""
-        self.close()
 
     def _observe(self, t: float) -> None:
         if self._camera is not None and t >= self._look_due:

@@ -13,21 +13,21 @@ import signal
 import struct
 import subprocess
 import sys
-from types import TracebackType
-from typing import BinaryIO, Self
+from typing import BinaryIO
 
 import numpy as np
 
 from r2s2r_cli.errors import HardwareError
 from r2s2r_cli.rig.camera.service import CameraService
 from r2s2r_cli.rig.camera.settings import CameraSettings
+from r2s2r_cli.rig.closing import Closing
 from schemas.robot import Robot
 
 _MODULE = "r2s2r_cli.rig.camera_process"
 _PATIENCE_S = 5.0
 
 
-class CameraProcess:
+class CameraProcess(Closing):
     """`CameraService` behind a pipe. It ends with this process, however that ends."""
 
     def __init__(self, robot: Robot, settings: CameraSettings, *, seed: int, host: str, port: int) -> None:
@@ -78,16 +78,6 @@ class CameraProcess:
         except subprocess.TimeoutExpired:
             self._child.kill()
             self._child.wait()
-
-    def __enter__(self) -> Self:
-        """Itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close."""
-        self.close()
 
     def _write_all(self, data: bytes) -> None:
         while data:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
+from r2s2r_cli.rig.closing import Closing
 from r2s2r_cli.rig.plant import Truth
 
 
-class TruthLog:
+class TruthLog(Closing):
     """One row every `period` [s] of the rig's time: t_s, cap{i}_{x,y,z}_m, length{i}_m, duty{i}."""
 
     def __init__(self, path: Path, *, caps: int, cables: int, motors: int, period: float) -> None:
@@ -33,16 +32,6 @@ class TruthLog:
     def close(self) -> None:
         """End the file."""
         self._file.close()
-
-    def __enter__(self) -> Self:
-        """Itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close."""
-        self.close()
 
     def _row(self, numbers: Sequence[float]) -> None:
         self._file.write(",".join(f"{x:.6f}" for x in numbers) + "\n")

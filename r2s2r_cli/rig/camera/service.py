@@ -9,8 +9,6 @@ import threading
 import time
 from collections import deque
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
@@ -20,6 +18,7 @@ from r2s2r_cli.rig.camera.camera import Picture, RigCamera
 from r2s2r_cli.rig.camera.client import Client
 from r2s2r_cli.rig.camera.clock import Exposure, Shutter
 from r2s2r_cli.rig.camera.settings import CameraSettings
+from r2s2r_cli.rig.closing import Closing
 from schemas.robot import Robot
 
 ALIVE_S = 0.25
@@ -35,7 +34,7 @@ class _Shot:
     v_WE: np.ndarray
 
 
-class CameraService:
+class CameraService(Closing):
     """The rig's main loop says where the robot is (`observe`); hosts that connect get pictures.
 
     Real time: pictures are drawn and sent in threads of their own; a host that reads too slowly loses frames, and
@@ -111,16 +110,6 @@ class CameraService:
         self._unplug()
         for thread in self._threads:
             thread.join(timeout=2.0)
-
-    def __enter__(self) -> Self:
-        """Itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close."""
-        self.close()
 
     def _unplug(self) -> None:
         with contextlib.suppress(OSError):

@@ -10,7 +10,7 @@ import numpy as np
 from r2s2r_cli.devices.camera import FeedStatistics, Frame, Intrinsics
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.doctor.colors import Box, hsv_of, in_range, measure_range, overlapping, patches
-from r2s2r_cli.stages.doctor.ground import MIN_SHARE, Ground, find_ground, points_C
+from r2s2r_cli.stages.estimate.vision.plane import MIN_SHARE, Ground, find_ground, points_C
 from schemas.results_camera import CameraGround, CameraResult, CameraRod
 from schemas.robot import HsvRange, Robot
 

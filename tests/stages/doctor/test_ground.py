@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.devices.camera import Intrinsics
-from r2s2r_cli.stages.doctor.ground import find_ground, points_C
+from r2s2r_cli.stages.estimate.vision.plane import find_ground, points_C
 
 LENS = Intrinsics(160, 120, 150.0, 150.0, 80.0, 60.0)
 

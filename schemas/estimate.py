@@ -52,6 +52,24 @@ QUALITY = {
     3: "jump: used, and the track jumped between the frame before and this one",
 }
 
+SIGHT = {
+    0: "seen in colour and depth",
+    1: "seen in colour, no depth on it",
+    2: "out of the picture",
+    3: "hidden: nothing of its colour where it should be",
+    4: "of its colour, but no sphere of its size",
+    5: "no picture, or a blank one",
+}
+
+MODE = {
+    1: "no cable sensor near the frame",
+    2: "some caps not seen",
+    4: "no cap seen",
+    8: "lost: some cap less certain than 30 mm",
+    16: "no picture",
+}
+"""Bits of `frames/mode`."""
+
 RUN = GroupSpec(
     path="runs/{run}",
     description="one run: what the recording says about it",
@@ -61,7 +79,8 @@ RUN = GroupSpec(
 
 GROUND = GroupSpec(
     path="runs/{run}/ground",
-    description="ground plane in the frame of the recording, and what was done to it",
+    description="ground plane in the frame of the recording, and what was done to it; of camera images, that frame is the "
+                "ground as the camera sees it, and this the floor as the caps that touch it show it",
     required=True,
     attributes=(
         AttributeSpec(name="offset", type="float", unit="m",
@@ -96,7 +115,7 @@ FRAMES = GroupSpec(
     ),
     datasets=(
         column("t", "float64", ("frame",), "s", "time since the start of the run"),
-        column("source_frame", "int64", ("frame",), "index", "row of the recording's caps that this frame is"),
+        column("source_frame", "int64", ("frame",), "index", "row of the recording's caps, or of its camera, that this frame is"),
         column("p_WE", "float64", ("frame", "cap", "xyz"), "m", "end caps: smoothed, rods rigid, on the ground", frame="W"),
         column("cov_p_WE", "float64", ("frame", "cap", "xyz", "xyz2"), "m^2", "covariance of each end cap, that of "
           "the ground included; the caps of a rod are correlated along it, which is not stored", frame="W"),
@@ -109,6 +128,8 @@ FRAMES = GroupSpec(
         column("w_WR", "float64", ("frame", "rod", "xyz"), "rad/s", "angular velocity across each rod; its part along the "
           "rod is not observable and 0", frame="W"),
         column("quality", "uint8", ("frame", "cap"), "code", "what the observation was worth", codes=QUALITY),
+        column("mode", "uint8", ("frame",), "1", "what the state had to do without; sum of "
+          + ", ".join(f"{bit} {words}" for bit, words in MODE.items()), required=False),
         column("score", "float64", ("frame", "cap"), "1", "distance of the observation from what all other frames predict, "
           "in standard deviations, root mean square over axes", nan_means="not observed, or not used"),
         column("contact", "bool", ("frame", "cap"), "bool", "the cap touches the ground, as far as heights can tell"),
@@ -118,7 +139,7 @@ FRAMES = GroupSpec(
           "the controller of the 3-bar robot counts in this length"),
         column("length_sd", "float64", ("frame", "cable"), "m", "standard deviation of that distance"),
         column("sensor_length", "float64", ("frame", "sensor"), "m", "lengths that the cable sensors gave, interpolated to the "
-          "frames", required=False, nan_means="no reading near enough"),
+          "frames (later by sensor_fit's delay, where there is one)", required=False, nan_means="no reading near enough"),
         column("sensor_cable", "int64", ("sensor",), "index", "cable that each sensor measures", required=False),
     ),
 )  # fmt: skip
@@ -134,9 +155,68 @@ TRACKS = GroupSpec(
         column("speed_change", "float64", ("cap",), "m/s", "process noise: standard deviation of the change of velocity "
           "over 1 s, per axis, as used: twice the density of highest likelihood"),
         column("innovation_variance", "float64", ("cap",), "1", "mean squared innovation over its variance, at the highest "
-          "likelihood; 1 where the assumed noise is right, below 1 where it is too large"),
+          "likelihood (camera images: sighting minus smoothed state); 1 where the assumed noise is right, below 1 where it is too large"),
         column("innovation_lag1", "float64", ("cap",), "1", "correlation of neighbouring innovations; 0 where they are white"),
         column("white", "bool", ("cap",), "bool", "that correlation lies within 2 standard deviations of 0"),
+    ),
+)  # fmt: skip
+
+CAMERA = GroupSpec(
+    path="runs/{run}/camera",
+    description="the camera that saw the caps; only of camera images",
+    attributes=(
+        *(AttributeSpec(name=name, type="int", unit="px", description=f"{name} of the pictures")
+          for name in ("width", "height")),
+        *(AttributeSpec(name=name, type="float", unit="px", description="focal length" if name[0] == "f" else
+                        "principal point, pixel centres at u + 0.5") for name in ("fx", "fy", "cx", "cy")),
+        AttributeSpec(name="depth_scale", type="float", unit="m", description="metres a count of depth"),
+        AttributeSpec(name="plane_share", type="float", required=False,
+                      description="share of the pixels with depth that lie on the ground"),
+        AttributeSpec(name="plane_noise", type="float", unit="m", required=False,
+                      description="standard deviation of depth about the ground"),
+        AttributeSpec(name="begun", type="int", unit="index", description="frame in which the caps were told apart"),
+        AttributeSpec(name="searched", type="int", unit="count",
+                      description="frames in which the caps had been lost and were found again"),
+    ),
+    datasets=(
+        column("X_WC", "float64", ("mat4", "mat4"), "1", "pose of the camera, homogeneous, translation in metres; z from the "
+          "ground, x along the picture and the origin under the camera by choice, unless the recording states a pose",
+          frame="W"),
+        column("shift_px", "float64", ("pair",), "px", "how far depth lies beside colour; corrected"),
+        column("noise_scale", "float64", ("pair",), "1", "what the standard deviations of the sightings were multiplied by, "
+          "across and along the line of sight, because the run shows it"),
+    ),
+)  # fmt: skip
+
+SIGHTINGS = GroupSpec(
+    path="runs/{run}/sightings",
+    description="where each cap was seen, before any smoothing; row k is row k of frames; only of camera images",
+    datasets=(
+        column("p_WE", "float64", ("frame", "cap", "xyz"), "m", "centres of the caps", frame="W", nan_means="not seen"),
+        column("cov_p_WE", "float64", ("frame", "cap", "xyz", "xyz2"), "m^2", "their covariance, before noise_scale",
+          frame="W", nan_means="not seen"),
+        column("visible", "float64", ("frame", "cap"), "1", "share of the cap's disc that is seen in its colour"),
+        column("code", "uint8", ("frame", "cap"), "code", "how it was seen, or why not", codes=SIGHT),
+        column("residual", "float64", ("frame", "cap", "xyz"), "1", "sighting minus smoothed cap in standard deviations of "
+          "that difference, along its principal axes", nan_means="not seen, or not used"),
+    ),
+)  # fmt: skip
+
+SENSOR_FIT = GroupSpec(
+    path="runs/{run}/sensor_fit",
+    description="the cable sensors against the camera; only of camera images with sensors",
+    attributes=(
+        AttributeSpec(name="delay", type="float", unit="s", description="by which the lengths of the sensors come later than "
+                      "those of the pictures: clock offset and lag together; 0 where it is not known"),
+        AttributeSpec(name="delay_sd", type="float", unit="s", required=False, description="its standard deviation"),
+        AttributeSpec(name="delay_known", type="bool", description="false: nothing moved enough to tell"),
+    ),
+    datasets=(
+        column("bias", "float64", ("frame", "sensor"), "m", "what the sensor shows minus the length"),
+        column("bias_sd", "float64", ("frame", "sensor"), "m", "its standard deviation"),
+        column("noise_sd", "float64", ("sensor",), "m", "noise of one reading, as the run shows it",
+          nan_means="it gave no reading"),
+        column("dead", "bool", ("sensor",), "bool", "it contradicts everything else, or never speaks: not used"),
     ),
 )  # fmt: skip
 
@@ -146,5 +226,17 @@ ESTIMATE = ArtifactSpec(
     title="states per frame",
     filename="20-estimate.h5",
     level="iteration",
-    groups=(RUN, GROUND, FRAMES, TRACKS, COMMANDS, INTERVALS, SEGMENTS, policy_group("runs/{run}/policy")),
+    groups=(
+        RUN,
+        GROUND,
+        FRAMES,
+        TRACKS,
+        CAMERA,
+        SIGHTINGS,
+        SENSOR_FIT,
+        COMMANDS,
+        INTERVALS,
+        SEGMENTS,
+        policy_group("runs/{run}/policy"),
+    ),
 )

@@ -68,6 +68,59 @@ class BrokenFrames(Frozen):
     caps: tuple[int, ...]
 
 
+class CapSight(Frozen):
+    """How one end cap was seen by the camera."""
+
+    cap: int
+    seen: float
+    """Share of the frames in which it was seen and used."""
+    rejected: int
+    """Frames in which it was seen, and contradicted the rest."""
+    hidden_longest_s: float
+    """Longest time without a sighting."""
+    residual_sd: float | None
+    """Root mean square of sighting minus smoothed state over the standard deviation of that; 1 where both are right."""
+
+
+class SensorFigures(Frozen):
+    """One cable sensor against the camera."""
+
+    cable: int
+    bias_m: float
+    """Shown minus seen, mean over the run."""
+    bias_sd_m: float
+    noise_sd_m: float | None
+    dead: bool
+    """Not used: it contradicts everything else, or never speaks."""
+
+
+class CameraFigures(Frozen):
+    """What only a run of camera images has."""
+
+    height_m: float
+    """Of the camera above the ground."""
+    tilt_rad: float
+    """Between its line of sight and the vertical."""
+    plane_share: float | None
+    """Share of the pixels with depth that lie on the ground."""
+    depth_noise_sd_m: float | None
+    """About the ground."""
+    shift_px: tuple[float, float]
+    """Depth beside colour; corrected."""
+    noise_scale: tuple[float, float]
+    begun_t_s: float
+    searched: int
+    """Frames in which the caps had been lost and were found again."""
+    modes: dict[str, int]
+    """Frames by what they had to do without."""
+    sight: tuple[CapSight, ...]
+    sensors: tuple[SensorFigures, ...]
+    delay_s: float | None
+    """By which the sensors' lengths come later than the pictures'; None: nothing moved enough to tell."""
+    delay_sd_s: float | None
+    settled: bool
+
+
 class EstimateRun(Frozen):
     """One run."""
 
@@ -86,6 +139,8 @@ class EstimateRun(Frozen):
     broken: tuple[BrokenFrames, ...]
     sensors: int
     """Sensor lengths carried along."""
+    camera: CameraFigures | None = None
+    """None: the recording brought the caps."""
     warnings: tuple[str, ...] = ()
 
 

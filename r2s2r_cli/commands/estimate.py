@@ -38,9 +38,10 @@ def estimate(
     set_: SetOption = None,
     show_config: ShowConfigOption = False,
 ) -> None:
-    """Estimate states from the observed end caps: smoothed positions with covariance, velocities, poses, contacts.
+    """Estimate states: end caps with covariance, velocities, poses, contacts, from camera images or observed end caps.
 
-    Puts the ground at z = 0 and makes the rods rigid; marks outliers and jumps of the tracker instead of hiding them.
+    Camera images are tracked (colour, depth and cable sensors); logs bring their end caps. The ground is put at z = 0
+    and the rods are rigid; what is hidden, lost, an outlier or a jump is marked, frame by frame.
 
     Example: r2s2r estimate --iteration 1
     """
@@ -69,10 +70,15 @@ def estimate(
 
     def compute() -> tuple[ArtifactData, EstimateReport]:
         from r2s2r_cli.stages.estimate import estimate as compute_states
+        from r2s2r_cli.store.frames import PictureFile
         from r2s2r_cli.store.read import read_artifact
 
         _, recording = read_artifact(source, "recording")
-        return compute_states(recording, here.robot(), here.config(place, overrides).estimate)
+        with PictureFile(source) as file, console.parts() as show:
+            return compute_states(
+                recording, here.robot(), here.config(place, overrides).estimate, show=show,
+                pictures=lambda run, name: file.pictures(f"runs/{run}/camera/{name}"),
+            )  # fmt: skip
 
     result, report = run.run(compute, (lambda data, said: _draw(data, here.robot(), said)) if draw else None)
     show_outcome(result, console)

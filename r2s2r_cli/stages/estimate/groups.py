@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from r2s2r_cli.artifact import Group
+from r2s2r_cli.stages.estimate.camera_groups import camera_groups
 from r2s2r_cli.stages.estimate.lengths import cap_distances
 from r2s2r_cli.stages.estimate.rigid import angular_velocities, axes, orientations
 from r2s2r_cli.stages.estimate.run import RunState
@@ -23,6 +24,8 @@ def run_groups(state: RunState) -> dict[str, Group]:
         made["intervals"] = state.intervals.to_group()
     if state.segments is not None:
         made["segments"] = state.segments.to_group()
+    if state.camera is not None:
+        made.update(camera_groups(state.camera, state.ground.shift))
     return {f"runs/{state.run}/{name}".rstrip("/"): group for name, group in made.items()}
 
 
@@ -51,6 +54,8 @@ def _frames(state: RunState) -> Group:
     rod_length = np.array([rod.length_m for rod in state.robot.rods])
     caps = np.array([cable.caps for cable in state.robot.cables])
     length, length_sd = cap_distances(p_WE, rods.cov_p, caps)
+    if state.camera is not None:  # its caps are correlated, and known to be
+        length_sd = state.camera.tracked.length_sd
     cov_p = rods.cov_p.copy()
     cov_p[:, :, 2, 2] += state.ground.shift_sd**2
     datasets = {
@@ -71,6 +76,8 @@ def _frames(state: RunState) -> Group:
         "length": length,
         "length_sd": length_sd,
     }
+    if state.camera is not None:
+        datasets["mode"] = state.camera.tracked.mode.astype(np.uint8)
     if state.sensors is not None:
         datasets["sensor_length"] = state.sensors.length
         datasets["sensor_cable"] = state.sensors.cable

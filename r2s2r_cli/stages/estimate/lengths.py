@@ -40,7 +40,7 @@ def sensor_lengths(t: np.ndarray, sensors: Group, robot: Robot, gap_s: float) ->
     t: stamps of the frames [s]. The recording's own lengths are taken where it has them, else capacitances through
     the lines of robot.toml. Between two readings at most `gap_s` apart the length is interpolated linearly.
     """
-    readings = _readings(sensors, robot)
+    readings = readings_of(sensors, robot)
     if readings is None:
         return None
     cable = sensors["cable"] if "cable" in sensors else np.array([s.cable for s in robot.sensors], dtype=np.int64)
@@ -50,7 +50,9 @@ def sensor_lengths(t: np.ndarray, sensors: Group, robot: Robot, gap_s: float) ->
     return SensorLengths(lengths, cable) if np.any(np.isfinite(lengths)) else None
 
 
-def _readings(sensors: Group, robot: Robot) -> np.ndarray | None:
+def readings_of(sensors: Group, robot: Robot) -> np.ndarray | None:
+    """Lengths of the samples [m], (sample, sensor): the recording's own, else capacitances through the lines of
+    robot.toml; None where neither is there. NaN: not received."""
     if "length" in sensors:
         return sensors["length"]
     if "capacitance" not in sensors or len(robot.sensors) != sensors["capacitance"].shape[1]:

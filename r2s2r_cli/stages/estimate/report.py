@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from r2s2r_cli.stages.estimate.camera_report import camera_figures, camera_warnings
 from r2s2r_cli.stages.estimate.run import RunState
 from r2s2r_cli.stages.estimate.smooth import JUMP, OUTLIER, whiteness
 from r2s2r_cli.stages.frames import fit_rod_length, ground_offset
@@ -23,7 +24,7 @@ def run_report(state: RunState) -> EstimateRun:
     return EstimateRun(
         run=state.run,
         frames=len(state.t),
-        rows=len(state.streams["caps"]["t"]),
+        rows=len(state.streams["caps" if state.camera is None else "camera"]["t"]),
         duration_s=float(state.t[-1] - state.t[0]),
         intervals=len(state.intervals) if state.intervals else 0,
         segments=len(state.segments) if state.segments else 0,
@@ -33,7 +34,8 @@ def run_report(state: RunState) -> EstimateRun:
         ground=_ground(state),
         broken=_broken(state),
         sensors=0 if state.sensors is None else len(state.sensors.cable),
-        warnings=_warnings(state, caps),
+        camera=None if state.camera is None else camera_figures(state, state.camera),
+        warnings=(*_warnings(state, caps), *(() if state.camera is None else camera_warnings(state, state.camera))),
     )
 
 
@@ -62,7 +64,7 @@ def _caps(state: RunState) -> tuple[CapFigures, ...]:
 
 
 def _rods(state: RunState) -> tuple[RodFigures, ...]:
-    length, sd = fit_rod_length(state.observed)
+    length, sd = _observed_lengths(state.observed)
     moved = np.max(state.rods.correction, axis=0).reshape(-1, 2).max(axis=1)
     return tuple(
         RodFigures(
@@ -76,6 +78,17 @@ def _rods(state: RunState) -> tuple[RodFigures, ...]:
     )
 
 
+def _observed_lengths(p_WE: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of the rods, with NaN where a cap was not seen; a rod that never was has NaN."""
+    found = []
+    for even, odd in zip(range(0, p_WE.shape[1], 2), range(1, p_WE.shape[1], 2), strict=True):
+        both = p_WE[:, [even, odd]]
+        seen = both[np.isfinite(both).all(axis=(1, 2))]
+        found.append([part[0] for part in fit_rod_length(seen)] if len(seen) else [np.nan, np.nan])
+    length, sd = np.array(found).T
+    return length, sd
+
+
 def _ground(state: RunState) -> GroundFigures:
     ground = state.ground
     touching = np.sum(state.contact, axis=1)
@@ -83,7 +96,7 @@ def _ground(state: RunState) -> GroundFigures:
     return GroundFigures(
         shift_m=ground.shift,
         shift_sd_m=ground.shift_sd,
-        offset_recording_m=ground_offset(state.observed, radius),
+        offset_recording_m=ground_offset(state.observed if state.camera is None else state.tracks.p_WE, radius),
         height_error_m=state.height_error,
         slope=None if ground.slope is None else (float(ground.slope[0]), float(ground.slope[1])),
         slope_sd=None if ground.slope_sd is None else (float(ground.slope_sd[0]), float(ground.slope_sd[1])),
@@ -129,7 +142,7 @@ def _warnings(state: RunState, caps: tuple[CapFigures, ...]) -> tuple[str, ...]:
             found.append(
                 f"end cap {cap.cap} is seen {1e3 * (radius - cap.height_min_m):.1f} mm below the ground at its lowest"
             )
-    if state.height_error is None:
+    if state.height_error is None and state.camera is None:
         found.append("the robot is not seen to stand on three caps: contacts trust the heights as they are")
     ground = state.ground
     if ground.slope is not None and ground.slope_sd is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,16 +20,20 @@ from r2s2r_cli.stages.segments import Intervals, Segments, segments, target_inte
 from schemas.estimate import EstimateSettings
 from schemas.robot import Robot
 
+if TYPE_CHECKING:
+    from r2s2r_cli.stages.estimate.camera_run import CameraFacts
+
 
 @dataclass(frozen=True)
 class RunState:
-    """Everything that is known of one run. `observed`, `tracks` and `rods` are in the frame of the recording."""
+    """Everything that is known of one run. `observed`, `tracks` and `rods` are in the frame of the recording; in a run
+    of camera images in that of the ground as it is seen, and `observed` has NaN where a cap was not seen."""
 
     run: str
     streams: dict[str, Group]
     robot: Robot
     kept: np.ndarray
-    """Rows of the recording's caps, shape (frame,)."""
+    """Rows of the recording's caps, or of its camera, shape (frame,)."""
     t: np.ndarray
     observed: np.ndarray
     """[m], shape (frame, cap, 3)."""
@@ -48,6 +53,8 @@ class RunState:
     intervals: Intervals | None
     segments: Segments | None
     sensors: SensorLengths | None
+    camera: CameraFacts | None = None
+    """Of a run of camera images; None where the recording brought the caps."""
 
 
 def estimate_run(run: str, streams: dict[str, Group], robot: Robot, settings: EstimateSettings) -> RunState:
@@ -60,7 +67,7 @@ def estimate_run(run: str, streams: dict[str, Group], robot: Robot, settings: Es
         t,
         observed,
         noise,
-        changes=_switches(streams, t),
+        changes=switches(streams, t),
         kick_m_per_s=settings.switch_kick_m_per_s,
         gate=settings.gate_probability,
     )
@@ -93,11 +100,11 @@ def observations(run: str, streams: dict[str, Group]) -> tuple[np.ndarray, np.nd
     if "caps" not in streams:
         held = ", ".join(name for name in streams if name) or "nothing"
         raise InputError(
-            f"run {run} holds no observed end caps, and the tracker that finds them in camera images is not there yet",
+            f"run {run} holds neither observed end caps nor camera images",
             where=f"runs/{run}/caps",
-            expected="end caps, as a trajectory CSV brings them",
+            expected="end caps, as a trajectory CSV brings them, or a camera with colour and depth",
             received=held,
-            hint="r2s2r import crawl.csv",
+            hint="r2s2r record --camera ..., or r2s2r import crawl.csv",
         )
     caps = streams["caps"]
     kept = np.flatnonzero(caps["drop_reason"] == KEPT)
@@ -159,6 +166,11 @@ def _intervals(run: str, streams: dict[str, Group], t: np.ndarray) -> tuple[Inte
                 hint="import the log again: r2s2r import crawl.csv --force",
             )
         return found, Segments.from_group(streams["segments"]) if "segments" in streams else None
+    return intervals_of(streams, t)
+
+
+def intervals_of(streams: dict[str, Group], t: np.ndarray) -> tuple[Intervals | None, Segments | None]:
+    """Intervals and segments of the frames at t [s] from the commands; None where there are none."""
     target, control = _commanded(streams, t)
     if target is None:
         return None, None
@@ -166,7 +178,7 @@ def _intervals(run: str, streams: dict[str, Group], t: np.ndarray) -> tuple[Inte
     return found, segments(found, t, control)
 
 
-def _switches(streams: dict[str, Group], t: np.ndarray) -> np.ndarray:
+def switches(streams: dict[str, Group], t: np.ndarray) -> np.ndarray:
     """Gaps between frames in which a motor was switched on, off or round, or (control not logged) a target changed.
 
     A target moves nothing by itself and is seen up to a frame before the motion: then the gap after it counts, too.

@@ -15,7 +15,7 @@ from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.estimate import estimate
 from r2s2r_cli.stages.estimate.groups import run_groups
 from r2s2r_cli.stages.estimate.noise import MIN_NOISE
-from r2s2r_cli.stages.estimate.run import RunState, _switches, estimate_run
+from r2s2r_cli.stages.estimate.run import RunState, estimate_run, switches
 from r2s2r_cli.stages.estimate.smooth import OUTLIER
 from schemas.estimate import EstimateSettings
 from tests.stages.estimate.builders import RUN, recording, replaced, threebar
@@ -37,13 +37,13 @@ def commands(**columns: list[float]) -> dict[str, Group]:
 
 def test_a_change_of_target_counts_in_its_gap_and_the_next() -> None:
     """Control not logged: target changes between frames 3 and 4 and before the last one; the end has no next gap."""
-    assert _switches(commands(target=[0.0] * 4 + [1.0] * 5 + [0.0]), T).tolist() == [3, 4, 8]
+    assert switches(commands(target=[0.0] * 4 + [1.0] * 5 + [0.0]), T).tolist() == [3, 4, 8]
 
 
 def test_a_logged_control_says_when_motors_switch() -> None:
     """Gaps in which the sign of a control changes, and no others; the target does not count then."""
     control = [0.0, 0.0, 0.5, 0.7, 0.7, -0.2, -0.9, -0.9, 0.0, 0.0]
-    assert _switches(commands(target=[0.0] * 3 + [1.0] * 7, control=control), T).tolist() == [1, 4, 7]
+    assert switches(commands(target=[0.0] * 3 + [1.0] * 7, control=control), T).tolist() == [1, 4, 7]
 
 
 def test_the_covariance_of_heights_holds_that_of_the_ground(state: RunState) -> None:
@@ -90,7 +90,7 @@ def test_a_run_without_end_caps_is_left_out_with_a_warning() -> None:
 def test_two_runs_without_end_caps_are_refused() -> None:
     """Nothing is left to estimate: an input error that names a run and what it holds."""
     camera = {f"runs/{run}{name}": Group({}, dict(RUN)) for run in "ab" for name in ("", "/camera")}
-    with pytest.raises(InputError, match="no observed end caps") as caught:
+    with pytest.raises(InputError, match="neither observed end caps nor") as caught:
         estimate(ArtifactData("recording", camera), threebar(), EstimateSettings())
     assert caught.value.received == "camera"
 

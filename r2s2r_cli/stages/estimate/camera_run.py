@@ -1,0 +1,152 @@
+"""One run of camera images through the estimate: ground, pass over the pictures, smoothing; states out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.artifact import Group
+from r2s2r_cli.devices.camera import Intrinsics
+from r2s2r_cli.stages.estimate.camera_input import Pictures, kept_frames, sensor_readings
+from r2s2r_cli.stages.estimate.ground import Ground
+from r2s2r_cli.stages.estimate.lengths import sensor_lengths
+from r2s2r_cli.stages.estimate.motion.data import REJECTED, SEEN, MotionSettings, Readings, Sighted, TrackedRun
+from r2s2r_cli.stages.estimate.motion.smooth_run import smooth_run
+from r2s2r_cli.stages.estimate.rigid import make_rigid
+from r2s2r_cli.stages.estimate.run import RunState, intervals_of, switches
+from r2s2r_cli.stages.estimate.smooth import MISSING, OBSERVED, OUTLIER, Tracks
+from r2s2r_cli.stages.estimate.sweep import Sweep, Swept
+from r2s2r_cli.stages.estimate.vision.frames import FrameSource
+from r2s2r_cli.stages.estimate.vision.known import Survey
+from r2s2r_cli.stages.estimate.vision.sight import Sighter
+from r2s2r_cli.stages.estimate.vision.survey import survey
+from schemas.estimate import EstimateSettings
+from schemas.robot import Robot
+
+Show = Callable[[str, int, int, str], None]
+"""Progress: part of the work, items done and in all, a word beside them (`Console.parts`)."""
+
+
+@dataclass(frozen=True)
+class CameraFacts:
+    """What only a run of camera images has. Positions in W, ground at z = 0.
+
+    X_WC: pose of the camera (4, 4). survey: what the pictures were found to be. swept, tracked: sightings and states,
+    before the floor under the caps was put at z = 0. readings: of the cable sensors. residual: sightings minus smoothed
+    caps, whitened, (frame, cap, 3), NaN where there is none.
+    """
+
+    X_WC: np.ndarray
+    lens: Intrinsics
+    depth_scale: float
+    survey: Survey
+    swept: Swept
+    tracked: TrackedRun
+    readings: Readings | None
+    residual: np.ndarray
+
+
+def camera_run(
+    run: str, streams: dict[str, Group], robot: Robot, settings: EstimateSettings, pictures: Pictures,
+    show: Show = lambda part, done, total, word: None,
+) -> RunState:  # fmt: skip
+    """See `estimate`. pictures: the encoded images of a run. show: called after every frame.
+
+    Raises InputError where the pictures cannot be tracked, NumericalError where no motion explains them.
+    """
+    rows, source = kept_frames(run, streams, pictures)
+    return tracked_run(run, streams, source, robot, settings, rows=rows, show=show)
+
+
+def tracked_run(
+    run: str, streams: dict[str, Group], source: FrameSource, robot: Robot, settings: EstimateSettings, *,
+    rows: np.ndarray | None = None, show: Show = lambda part, done, total, word: None,
+) -> RunState:  # fmt: skip
+    """The same from frames that are there. rows: of the recording that they are, default all."""
+    n, part, done = len(source), f"{run}: pictures", 0
+
+    def advance(more: int) -> None:
+        nonlocal done
+        done += more
+        show(part, done, n, "")
+
+    known = survey(source, robot)
+    motion = MotionSettings(kick_m_per_s=settings.switch_kick_m_per_s)
+    readings = sensor_readings(streams, robot)
+    sighter = Sighter(robot, source.lens, source.depth_scale, known)
+    swept = Sweep(run, source, sighter, known.X_WC, readings, robot, motion, advance).run()
+    show(f"{run}: smoothing", 0, 1, "")
+    tracked = smooth_run(swept.sighted, readings, robot, motion, switches=switches(streams, source.t))
+    show(f"{run}: smoothing", 1, 1, "")
+    return _state(run, streams, source, robot, settings, known, swept, tracked, readings,
+                  np.arange(n) if rows is None else rows)  # fmt: skip
+
+
+def _state(
+    run: str, streams: dict[str, Group], source: FrameSource, robot: Robot, settings: EstimateSettings, known: Survey,
+    swept: Swept, tracked: TrackedRun, readings: Readings | None, rows: np.ndarray,
+) -> RunState:  # fmt: skip
+    t, shift = source.t, -float(tracked.ground[0])
+    X_WC = known.X_WC.copy()
+    X_WC[2, 3] += shift
+    length = np.array([rod.length_m for rod in robot.rods])
+    rods = make_rigid(
+        tracked.p_WE, tracked.cov_p, tracked.v_WE, tracked.cov_v, length, np.zeros(len(length), dtype=bool)
+    )
+    observed = swept.sighted.p_WE
+    residual = whitened(swept.sighted, tracked)
+    quality = np.select([tracked.quality == SEEN, tracked.quality == REJECTED], [OBSERVED, OUTLIER], MISSING)
+    variance = np.where(np.isfinite(observed), np.diagonal(swept.sighted.cov, axis1=2, axis2=3), np.nan)
+    intervals, parts = intervals_of(streams, t)
+    seen_late = t + (tracked.clock.delay_s if tracked.clock.known else 0.0)
+    return RunState(
+        run=run, streams=streams, robot=robot, kept=rows, t=t, observed=observed,
+        noise=_typical(np.sqrt(variance)) * float(np.exp(np.mean(np.log(tracked.noise_scale)))),
+        held=np.zeros((robot.n_caps, 3), dtype=bool),
+        tracks=Tracks(
+            p_WE=tracked.p_WE, v_WE=tracked.v_WE, cov_p=tracked.cov_p, cov_v=tracked.cov_v,
+            quality=quality.astype(np.uint8), score=tracked.score, density=np.mean(tracked.acceleration, axis=0),
+            innovation=residual,
+        ),
+        rods=rods, rigid=np.zeros(len(length), dtype=bool),
+        ground=Ground(shift=shift, shift_sd=float(tracked.ground_sd[0]), slope=tracked.ground[1:],
+                      slope_sd=tracked.ground_sd[1:]),
+        p_WE=rods.p_WE + np.array([0.0, 0.0, shift]), height_error=None, probability=tracked.contact_probability,
+        contact=tracked.contact, intervals=intervals, segments=parts,
+        sensors=None if readings is None else sensor_lengths(seen_late, streams["sensors"], robot,
+                                                             settings.sensor_gap_s),
+        camera=CameraFacts(
+            X_WC=X_WC, lens=source.lens, depth_scale=source.depth_scale, survey=known, swept=swept, tracked=tracked,
+            readings=readings, residual=residual,
+        ),
+    )  # fmt: skip
+
+
+def whitened(sighted: Sighted, tracked: TrackedRun) -> np.ndarray:
+    """Sightings that were used minus smoothed caps, over the square root of the covariance of that difference.
+
+    Shape (frame, cap, 3); NaN where no sighting was used. The smoothed state has the sighting in it, so that the
+    covariance of the difference is that of the sighting minus that of the state; their mean square is 1 where both are
+    right.
+    """
+    used = np.isfinite(sighted.p_WE[..., 0]) & (tracked.quality == SEEN)
+    scale = float(np.mean(tracked.noise_scale)) ** 2
+    found = np.full(sighted.p_WE.shape, np.nan)
+    cov = scale * sighted.cov[used]
+    gap = cov - tracked.cov_p[used]
+    # Other sightings may be so good that rounding, or the systematic part of cov_p, leaves nothing of the difference.
+    value, vector = np.linalg.eigh(gap)
+    floor = 0.05 * np.linalg.eigvalsh(cov)[:, :1]
+    root = np.sqrt(np.maximum(value, floor))
+    found[used] = np.einsum("kij,ki->kj", vector, (sighted.p_WE - tracked.p_WE)[used]) / root
+    return found
+
+
+def _typical(sd: np.ndarray) -> np.ndarray:
+    """Median over frames, shape (cap, 3); caps that were never seen get that of the others."""
+    seen = np.isfinite(sd)
+    overall = np.median(sd[seen]) if seen.any() else np.nan
+    return np.array([[np.median(sd[seen[:, cap, i], cap, i]) if seen[:, cap, i].any() else overall for i in range(3)]
+                     for cap in range(sd.shape[1])])  # fmt: skip

@@ -1,0 +1,172 @@
+"""The pass over the images: predict every cap, look for it there, go on; what stays is small (sightings).
+
+It begins at the first frame in which all caps are told apart, goes on to the last one, and then from the beginning back
+to the first. Pictures are decoded once, those before the beginning twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.estimate.motion.data import MotionSettings, Readings, Sighted
+from r2s2r_cli.stages.estimate.motion.forward import Forward
+from r2s2r_cli.stages.estimate.motion.labels import label
+from r2s2r_cli.stages.estimate.vision.frames import FrameSource, ImageFrame
+from r2s2r_cli.stages.estimate.vision.sight import Sighter
+from r2s2r_cli.stages.estimate.vision.sightings import HIDDEN, NO_PICTURE, Candidate, Sightings
+from r2s2r_cli.stages.estimate.vision.world import from_world, to_world
+from schemas.robot import Robot
+
+FRESH_S = 0.06
+"""Readings of the sensors up to this old count as those of a frame: three samples of a board."""
+
+
+@dataclass(frozen=True)
+class Swept:
+    """What the pass found, one row a frame. visible: share of each cap that is seen, (frame, cap). code: see REASONS of
+    vision/sightings.py, uint8 (frame, cap). shift_px: depth against colour, (frame, 2), NaN where unknown. first:
+    frame in which the caps were told apart. searched: frames in which they had to be found again, (frame,) bool."""
+
+    sighted: Sighted
+    visible: np.ndarray
+    code: np.ndarray
+    shift_px: np.ndarray
+    first: int
+    searched: np.ndarray
+
+
+class Sweep:
+    """One pass over one run. advance: called with 1 after every frame."""
+
+    def __init__(
+        self, run: str, source: FrameSource, sighter: Sighter, X_WC: np.ndarray, readings: Readings | None,
+        robot: Robot, settings: MotionSettings, advance: Callable[[int], None],
+    ) -> None:  # fmt: skip
+        n, caps = len(source), robot.n_caps
+        self._run, self._source, self._sighter, self._X_WC, self._robot = run, source, sighter, X_WC, robot
+        self._settings, self._advance = settings, advance
+        self._lengths = _at_frames(source.t, readings)
+        self._cable = np.zeros(0, dtype=int) if readings is None else readings.cable
+        self._p, self._cov = np.full((n, caps, 3), np.nan), np.full((n, caps, 3, 3), np.nan)
+        self._visible, self._code = np.zeros((n, caps)), np.full((n, caps), HIDDEN, dtype=np.uint8)
+        self._shift = np.full((n, 2), np.nan)
+        self._searched = np.zeros(n, dtype=bool)
+        self._seen = np.zeros(len(robot.rods), dtype=int)
+
+    def run(self) -> Swept:
+        """Both ways. Raises InputError where no frame tells the caps apart."""
+        forward, first, start = None, 0, np.zeros((self._robot.n_caps, 3))
+        for frame in self._source:
+            if forward is None:
+                found = self._begin(frame)
+                if found is not None:
+                    forward, first, start = self._started(frame.t, found), frame.index, found
+            if forward is not None:
+                self._look(forward, frame)
+            self._advance(1)
+        if forward is None:
+            raise self._not_found()
+        if first:
+            self._backwards(first, start)
+        return Swept(Sighted(self._source.t, self._p, self._cov), self._visible, self._code, self._shift, first,
+                     self._searched)  # fmt: skip
+
+    def _backwards(self, first: int, start: np.ndarray) -> None:
+        back = self._started(float(self._source.t[first]), start)
+        for frame in _in_reverse(self._source, first):
+            self._look(back, frame)
+
+    def _started(self, t: float, p_WE: np.ndarray) -> Forward:
+        forward = Forward(self._robot, self._settings)
+        forward.start(t, p_WE)
+        return forward
+
+    def _begin(self, frame: ImageFrame) -> np.ndarray | None:
+        """Caps of a frame that shows them all and leaves no doubt which is which, (cap, 3) in W."""
+        candidates = self._sighter.detect(frame)
+        blobs = self._in_world(candidates)
+        self._seen += [len(of_rod) >= 2 for of_rod in blobs]
+        if any(len(of_rod) < 2 for of_rod in blobs):
+            return None
+        found = label(blobs, self._robot, self._of_cables(frame.index))
+        return found.p_WE if found is not None and found.sure else None
+
+    def _look(self, forward: Forward, frame: ImageFrame) -> None:
+        k = frame.index
+        if len(self._cable):
+            forward.sense(frame.t, self._lengths[k])
+        p_WE, cov = forward.predict(frame.t)
+        if forward.lost and not self._find(forward, frame):
+            return
+        if forward.lost or self._searched[k]:
+            p_WE, cov = forward.predict(frame.t)
+        seen = self._sighter.sight(frame, *from_world(self._X_WC, p_WE, cov))
+        self._keep(k, seen)
+        p, cov_p = to_world(self._X_WC, seen.p_C, seen.cov_C)
+        forward.update(frame.t, p, cov_p)
+        self._p[k], self._cov[k] = p, cov_p
+
+    def _find(self, forward: Forward, frame: ImageFrame) -> bool:
+        if frame.color is None or frame.depth is None:
+            self._code[frame.index] = NO_PICTURE
+            return False
+        candidates = self._sighter.detect(frame)
+        covs = [c.cov_C for c in candidates]
+        R = self._X_WC[:3, :3]
+        cov = R @ np.mean(covs, axis=0) @ R.T if covs else np.eye(3) * 1e-4
+        found = forward.reacquire(frame.t, self._in_world(candidates), cov)
+        self._searched[frame.index] = found
+        return found
+
+    def _keep(self, k: int, seen: Sightings) -> None:
+        self._visible[k], self._code[k], self._shift[k] = seen.visible, seen.code, seen.shift_px
+
+    def _in_world(self, candidates: Iterable[Candidate]) -> list[np.ndarray]:
+        found: list[list[np.ndarray]] = [[] for _ in self._robot.rods]
+        for one in candidates:
+            found[one.rod].append(to_world(self._X_WC, one.p_C)[0])
+        return [np.array(of_rod).reshape(-1, 3) for of_rod in found]
+
+    def _of_cables(self, k: int) -> np.ndarray | None:
+        if not len(self._cable):
+            return None
+        length = np.full(len(self._robot.cables), np.nan)
+        length[self._cable] = self._lengths[k]
+        return length
+
+    def _not_found(self) -> InputError:
+        n = len(self._source)
+        seen = ", ".join(
+            f"{color.rod} in {count}" for color, count in zip(self._robot.colors, self._seen, strict=False)
+        )
+        return InputError(
+            f"in no frame of run {self._run} are all end caps seen and told apart", where=f"runs/{self._run}/camera",
+            expected="one frame at least with both caps of every rod, as far apart as the cable sensors say",
+            received=f"of {n} frames both caps of a colour: {seen or 'robot.toml has no colours'}",
+            hint="r2s2r doctor camera shows what the colours of robot.toml find",
+        )  # fmt: skip
+
+
+def _in_reverse(source: FrameSource, first: int) -> Iterable[ImageFrame]:
+    for index in range(first - 1, -1, -1):
+        yield source.frame(index)
+
+
+def _at_frames(t: np.ndarray, readings: Readings | None) -> np.ndarray:
+    """Median of each sensor's readings in the FRESH_S before each frame [m], (frame, sensor); NaN: none."""
+    if readings is None:
+        return np.zeros((len(t), 0))
+    order = np.argsort(readings.t, kind="stable")
+    stamps, length = readings.t[order], readings.length[order]
+    first, last = np.searchsorted(stamps, t - FRESH_S, side="right"), np.searchsorted(stamps, t, side="right")
+    found = np.full((len(t), length.shape[1]), np.nan)
+    for k, (a, b) in enumerate(zip(first, last, strict=True)):
+        rows = length[a:b]
+        some = np.any(np.isfinite(rows), axis=0)
+        if some.any():
+            found[k, some] = np.nanmedian(rows[:, some], axis=0)
+    return found

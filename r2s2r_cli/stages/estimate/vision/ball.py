@@ -16,8 +16,8 @@ from r2s2r_cli.stages.estimate.vision.solids import ball_depth
 
 RIM_PX = 1.5
 """Width over which the modelled disc goes from 1 to 0."""
-WIDE_PX = 5.0
-"""The same while its place is still uncertain."""
+WIDE_PX = 3.0
+"""The same in the first step, when its place is not certain to a pixel."""
 PIXEL_SD = 0.32
 """What the mask differs by from the modelled rim, a pixel: 1 / sqrt(12) from its being yes or no, and the colour's noise."""
 RIM_SD_PX = 0.05
@@ -27,7 +27,7 @@ CORE = 0.85
 DEPTHS = 64
 """Depths that are used at most; neighbours share most of their error, so more would tell nothing more."""
 GATE_SD = 4.0
-_WIDE_STEPS, _NARROW_STEPS = 6, 4
+_STEPS = 4
 _STEP_PX = 3.0
 
 
@@ -86,25 +86,39 @@ class BallFitter:
         self.f, self.noise = f, noise
         self.swell_px, self.swell_sd_px = swell_px, swell_sd_px
 
-    def place(self, patch: Patch, valid: np.ndarray, center: np.ndarray, radius: float) -> np.ndarray:
-        """A better start than `center` [m] (3,): the disc that holds the colour best; its distance is not touched.
+    def place(
+        self, patch: Patch, told: np.ndarray, hidden: np.ndarray, center: np.ndarray, radius: float, sd_px: float
+    ) -> np.ndarray:
+        """A start within a pixel [m] (3,): `center` moved across the picture to where the colour fits what should be seen.
 
-        valid: pixels that may tell something. Tries the start itself and the middle of the colour about it.
+        told: pixels whose colour tells something. hidden: pixels where something is before the ball if it is at `center`; it moves with the
+        ball, as the rod behind it does. Both bool (v, u). sd_px: of the prediction; of two places that fit
+        equally well the likelier one is taken. The distance stays.
         """
-        starts = [center, self._middle(patch, valid, center, radius)]
-        found = []
-        for start in starts:
-            c = start
-            for k in range(_WIDE_STEPS):
-                width = max(WIDE_PX * (1 - k / _WIDE_STEPS), 2.0)
-                step, cost = self._across(patch, valid, c, radius, width)
-                c = c + step
-                if float(np.abs(step).max()) * self.f / c[2] < 0.05:
-                    break
-            found.append((cost, c))
-            if np.allclose(starts[0], starts[1], atol=0.5 * c[2] / self.f):
-                break
-        return min(found, key=lambda one: one[0])[1]
+        import cv2
+
+        disc = _Disc.of(center, radius, patch.x, patch.y)
+        model = np.clip(0.5 + (disc.rim + self.swell_px / self.f - disc.rho) * self.f, 0.0, 1.0) * ~hidden
+        rows, columns = (np.nonzero((disc.rho * self.f < disc.rim * self.f + 2.0).any(axis=axis))[0] for axis in (1, 0))
+        if not len(rows):
+            return center
+        v0, v1, u0, u1 = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
+        template = model[v0:v1, u0:u1].astype(np.float32)
+        # A border of nothing: a ball may lie half outside of the patch.
+        pad = max(template.shape) // 2
+
+        def padded(picture: np.ndarray) -> np.ndarray:
+            return np.asarray(cv2.copyMakeBorder(picture.astype(np.float32), pad, pad, pad, pad, cv2.BORDER_CONSTANT))
+
+        # sum told (colored - model)^2 for every place, but for what does not depend on it
+        cost = cv2.matchTemplate(padded(told), template**2, cv2.TM_CCORR)
+        cost -= 2 * cv2.matchTemplate(padded(told & patch.colored), template, cv2.TM_CCORR)
+        dv = np.arange(cost.shape[0]) - pad - v0
+        du = np.arange(cost.shape[1]) - pad - u0
+        cost = cost + 0.5 * (dv[:, None] ** 2 + du[None, :] ** 2) / max(sd_px, 1.0) ** 2
+        k, i = divmod(int(np.argmin(cost)), cost.shape[1])
+        move = np.array([du[i], dv[k], 0.0]) * center[2] / self.f
+        return np.asarray(center + move)
 
     def fit(
         self, patch: Patch, valid: np.ndarray, seen: np.ndarray, center: np.ndarray, radius: float
@@ -119,11 +133,11 @@ class BallFitter:
             c = self._along(patch, depths, c, radius)
         told = valid
         A = np.zeros((4, 4))
-        for k in range(_NARROW_STEPS):
+        for k in range(_STEPS):
             disc = _Disc.of(c, radius, patch.x, patch.y)
             if k < 2:
                 told = valid & ~self._contradicting(patch, valid, disc)
-            A, g = self._rim(patch, told, disc, delta, RIM_PX)
+            A, g = self._rim(patch, told, disc, delta, RIM_PX if k else WIDE_PX)
             if k == 1:
                 depths = self._depths(patch, seen, c, radius)
             J, r, C = self._lines(patch, depths, c, radius, disc)
@@ -149,32 +163,6 @@ class BallFitter:
             c, cov_C, float((patch.colored & inside).sum() / expected), float((told & edge).sum() / max(edge.sum(), 1)),
             len(depths[0]), shift, shift_cov, delta, float(np.sqrt(cov[3, 3])),
         )  # fmt: skip
-
-    def _middle(self, patch: Patch, valid: np.ndarray, center: np.ndarray, radius: float) -> np.ndarray:
-        """Mean direction of the colour, followed until it stays, at the distance of `center`."""
-        c = center
-        colored = patch.colored & valid
-        for k in range(5):
-            disc = _Disc.of(c, radius, patch.x, patch.y)
-            near = colored & (disc.rho < (2.5 - 0.3 * k) * disc.rim)
-            if not near.any():
-                near = colored
-            if not near.any():
-                return center
-            c = c[2] * np.array([patch.x[near].mean(), patch.y[near].mean(), 1.0])
-        return c
-
-    def _across(
-        self, patch: Patch, valid: np.ndarray, c: np.ndarray, radius: float, width: float
-    ) -> tuple[np.ndarray, float]:
-        """A step [m] (3,) across the line of sight, and the cost before it."""
-        disc = _Disc.of(c, radius, patch.x, patch.y)
-        A, g = self._rim(patch, valid, disc, self.swell_px, width)
-        model = np.clip(0.5 + (disc.rim + self.swell_px / self.f - disc.rho) * self.f / width, 0.0, 1.0)
-        cost = float((((patch.colored - model) ** 2) * valid).sum())
-        step = np.linalg.solve(A[:2, :2] + 1e-3 * np.trace(A[:2, :2]) * np.eye(2) + 1e-6 * np.eye(2), g[:2])
-        limit = _STEP_PX * c[2] / self.f
-        return disc.E[:, :2] @ np.clip(step, -limit, limit), cost
 
     def _rim(
         self, patch: Patch, told: np.ndarray, disc: _Disc, delta: float, width: float

@@ -36,6 +36,8 @@ LEAST_VISIBLE, LEAST_RIM = 0.08, 0.12
 SD_MOST_M = 0.03
 """A sighting across the line of sight worse than this says nothing."""
 DEPTHS_LEAST = 3
+EDGE_PX = 0.7
+"""What hides a cap is taken for larger by this: pixels on its edge may be of either."""
 MOVED_PX = 1.0
 """A prediction that was wrong by more: what hides what is worked out again from what was seen."""
 LOW_M = 0.015
@@ -164,24 +166,32 @@ class Sighter:
             return OUT_OF_VIEW, None
         if int(patch.colored.sum()) < LEAST_PIXELS:
             return HIDDEN, None
-        margin = np.minimum(sd, 0.01) + 0.7 * center[2] / self._f
-        other = self._body.nearest(patch.x, patch.y, p_C, cap, margin)
-        # First its place, from the colour alone, then the rest with what hides it there.
-        valid = ~(other < center[2] - 0.3 * radius)
-        start = self._fitter.place(patch, valid, center, radius)
+        margin = np.minimum(sd / np.sqrt(3.0), 0.01) + EDGE_PX * center[2] / self._f
+        margin[cap] = EDGE_PX * center[2] / self._f
+        hidden = self._hidden(patch, p_C, cap, 0.0 * margin)
+        told = ~in_front(patch, np.full_like(patch.z, center[2] - radius), self._noise_sd(center[2]))
+        start = self._fitter.place(patch, told, hidden, center, radius, spare / GATE_SD)
         start = start * (self._distance(patch, start, radius) / start[2])
-        if other_is_near := bool(np.isfinite(other).any()):
-            moved = p_C.copy()
-            moved[cap] = start
-            other = self._body.nearest(patch.x, patch.y, moved, cap, margin)
+        moved = p_C.copy()
+        moved[cap] = start
+        hidden = self._hidden(patch, moved, cap, margin)
         z_cap = ball_depth(patch.x, patch.y, start, radius)
         z_cap = np.where(np.isfinite(z_cap), z_cap, start[2])
-        hidden = in_front(patch, z_cap, z_cap**2 * self.survey.noise.sd)
-        if other_is_near:
-            hidden |= other < z_cap
+        hidden |= in_front(patch, z_cap, self._noise_sd(z_cap))
         valid = ~hidden
-        fit = self._fitter.fit(patch, valid, valid & grown_in(patch.colored, self.survey.shift_px), start, radius)
+        seen = valid & moved_by(patch.colored, self.survey.shift_px)
+        fit = self._fitter.fit(patch, valid, seen, start, radius)
         return self._judged(patch, cap, fit)
+
+    def _noise_sd(self, z: np.ndarray | float) -> np.ndarray:
+        """Of depths z [m]."""
+        return np.asarray(np.square(z) * self.survey.noise.sd)
+
+    def _hidden(self, patch: Patch, p_C: np.ndarray, cap: int, margin: np.ndarray) -> np.ndarray:
+        """Pixels where a part of the robot is before a cap, or before the plane of its rim beside it, bool (v, u)."""
+        z = self._body.nearest(patch.x, patch.y, p_C, cap, margin)
+        own = ball_depth(patch.x, patch.y, p_C[cap], float(self.cap_radius[cap]))
+        return np.asarray(z < np.where(np.isfinite(own), own, p_C[cap, 2]))
 
     def _distance(self, patch: Patch, center: np.ndarray, radius: float) -> float:
         """Z of the centre [m] by the depths in its disc; that of `center` where there are none."""
@@ -223,7 +233,7 @@ class Sighter:
         return Sightings(p, cov, visible, code, shift_cov @ total, shift_cov)
 
 
-def grown_in(colored: np.ndarray, shift_px: tuple[float, float]) -> np.ndarray:
+def moved_by(colored: np.ndarray, shift_px: tuple[float, float]) -> np.ndarray:
     """The coloured pixels, moved to where the depth picture has them."""
     du, dv = (round(shift) for shift in shift_px)
     if du == dv == 0:

@@ -39,7 +39,7 @@ class Body:
         """Depth [m] at which rays (x, y, 1) meet the robot first, cap `cap` itself left out; inf where they miss it.
 
         p_C: all caps [m] (cap, 3); one with a NaN is left out, and so are the parts of its rod. margin: by which each
-        cap is taken for larger, and the parts of its rod by the larger of two [m], (cap,): its position is not exact.
+        cap is taken for larger [m], (cap,), as its position is not exact; parts of rods by what lies between their caps'.
         """
         z = np.full(x.shape, np.inf)
         slope = np.array([x.mean(), y.mean()])
@@ -54,7 +54,8 @@ class Body:
             length = float(np.linalg.norm(along))
             if not length > 1e-6:
                 continue
-            spare = float(margin[2 * part.rod : 2 * part.rod + 2].max())
+            share = 0.5 + part.offset / length
+            spare = float((1 - share) * margin[2 * part.rod] + share * margin[2 * part.rod + 1])
             w = along / length
             middle = (even + odd) / 2 + part.offset * w
             half, radius = part.half + spare, part.radius + spare

@@ -18,6 +18,10 @@ ROD_SD = 0.008
 """[m] Of the distance between two blobs against the rod length."""
 SURE = 4.0
 """Least difference of half the squared deviations (log likelihood) to the next labelling: 55 to 1."""
+MISSING_COST = 12.0
+"""Price of leaving out a cap, in half squared deviations: nearly 5 standard deviations of one of them."""
+FREEDOM = 4.0
+"""Of Student's t of the distance from where a cap was expected: it may be far off after it was lost."""
 FIT = 5.0
 """Most that half the squared deviations may be per constraint; beyond, the blobs are not the robot."""
 
@@ -38,47 +42,68 @@ class Labelling:
     """The margin is at least SURE and the cost fits."""
 
 
-def label(candidates: Sequence[np.ndarray], robot: Robot, length: np.ndarray | None = None) -> Labelling | None:
+def label(
+    candidates: Sequence[np.ndarray],
+    robot: Robot,
+    length: np.ndarray | None = None,
+    *,
+    predicted: tuple[np.ndarray, np.ndarray] | None = None,
+    partly: bool = False,
+) -> Labelling | None:
     """Tell the caps apart.
 
     candidates: of each rod, centres of the blobs of its colour [m], shape (blob, 3), in any frame whose z points up;
     two or more (distractors). length: of the cables by their sensors [m], shape (cable,), NaN where there is none;
     None or all NaN: the shape at rest of robot.toml is compared instead, mirror images told apart, which holds only
-    while the robot rests. None where some rod has no two blobs a rod length apart.
+    while the robot rests. predicted: caps (cap, 3) and covariance (cap, 3, 3) where the filter expects them; it takes the
+    place of the shape at rest. partly: a cap may be missing (NaN, pick -1), at a price. None where some rod has no two
+    blobs a rod length apart (partly: where no blob is left).
     """
-    pairs = [_pairs(np.asarray(blobs, dtype=float), rod.length_m) for blobs, rod in zip(candidates, robot.rods, strict=True)]
+    blobs = [np.asarray(one, dtype=float).reshape(-1, 3) for one in candidates]
+    pairs = [_pairs(one, rod.length_m, partly) for one, rod in zip(blobs, robot.rods, strict=True)]
     if not all(pairs):
         return None
     picks = np.array([np.concatenate(choice) for choice in itertools.product(*pairs)])
-    sets = [np.asarray(candidates[cap // 2], dtype=float)[picks[:, cap]] for cap in range(robot.n_caps)]
+    # The last row stands for a cap that is missing: pick -1.
+    sets = [np.vstack([blobs[cap // 2], np.full((1, 3), np.nan)])[picks[:, cap]] for cap in range(robot.n_caps)]
     p_WE = np.stack(sets, axis=1)
     rods = np.linalg.norm(p_WE[:, 1::2] - p_WE[:, 0::2], axis=-1) - [rod.length_m for rod in robot.rods]
-    cost = 0.5 * np.sum((rods / ROD_SD) ** 2, axis=1)
+    missing = np.sum(picks < 0, axis=1)
+    if np.all(missing == robot.n_caps):
+        return None
+    cost = 0.5 * np.nansum((rods / ROD_SD) ** 2, axis=1) + MISSING_COST * missing
     count = len(robot.rods)
     known = np.zeros(0, dtype=int) if length is None else np.flatnonzero(np.isfinite(length))
     if len(known):
         ends = np.array([cable.caps for cable in robot.cables])[known]
         seen = np.linalg.norm(p_WE[:, ends[:, 1]] - p_WE[:, ends[:, 0]], axis=-1)
-        cost += 0.5 * np.sum(((seen - np.asarray(length)[known]) / SENSOR_SD) ** 2, axis=1)
+        cost += 0.5 * np.nansum(((seen - np.asarray(length)[known]) / SENSOR_SD) ** 2, axis=1)
         count += len(known)
-    else:
+    if predicted is not None:
+        off = p_WE - predicted[0]
+        square = np.einsum("kci,cij,kcj->kc", off, np.linalg.inv(predicted[1] + SENSOR_SD**2 * np.eye(3)), off)
+        fit = cost.copy()
+        cost = cost + 0.5 * (FREEDOM + 3) * np.nansum(np.log1p(square / FREEDOM), axis=1)
+    elif not len(known):
         cost += 0.5 * _from_rest(p_WE, np.array(robot.rest_caps_m))
         count += 2 * robot.n_caps
+    fit = cost if predicted is None else fit
     order = np.argsort(cost)
     best = int(order[0])
     margin = float(cost[order[1]] - cost[best]) if len(order) > 1 else float("inf")
     return Labelling(
         p_WE=p_WE[best], pick=picks[best], cost=float(cost[best]), margin=margin,
-        sure=bool(margin >= SURE and cost[best] <= FIT * count),
+        sure=bool(margin >= SURE and fit[best] <= FIT * count),
     )  # fmt: skip
 
 
-def _pairs(blobs: np.ndarray, length: float) -> list[tuple[int, int]]:
-    """Ordered pairs of blobs about a rod length apart."""
+def _pairs(blobs: np.ndarray, length: float, partly: bool) -> list[tuple[int, int]]:
+    """Ordered pairs of blobs about a rod length apart; partly: also single blobs, and none (-1)."""
+    alone = [pair for i in range(len(blobs)) for pair in ((i, -1), (-1, i))] + [(-1, -1)] if partly else []
     if len(blobs) < 2:
-        return []
+        return alone
     apart = np.linalg.norm(blobs[:, None] - blobs[None], axis=-1)
-    return [(int(i), int(j)) for i, j in np.argwhere(np.abs(apart - length) < 5 * ROD_SD)]
+    return [(int(i), int(j)) for i, j in np.argwhere(np.abs(apart - length) < 5 * ROD_SD)] + alone
 
 
 def _from_rest(p_WE: np.ndarray, rest: np.ndarray) -> np.ndarray:

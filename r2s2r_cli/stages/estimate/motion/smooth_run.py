@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from r2s2r_cli.stages.estimate.motion.data import MotionSettings, Readings, Sighted, TrackedRun
+from r2s2r_cli.stages.estimate.ground import find_ground
+from r2s2r_cli.stages.estimate.motion.body import Body
+from r2s2r_cli.stages.estimate.motion.data import MotionSettings, Readings, SensorClock, Sighted, TrackedRun
+from r2s2r_cli.stages.estimate.motion.prepare import Prepared, first_evidence, first_states, prepare
+from r2s2r_cli.stages.estimate.motion.result import tracked_run
+from r2s2r_cli.stages.estimate.motion.rounds import State, distances, learn, sensor_weights, settle, touch
+from r2s2r_cli.stages.estimate.motion.sensor_clock import find_clock
+from r2s2r_cli.stages.estimate.motion.sensors import bin_readings
 from schemas.robot import Robot
+
+ALONE, TOGETHER = 2, 4
+"""Rounds of states and noise: with sightings alone, and with everything."""
 
 
 def smooth_run(
@@ -19,6 +31,56 @@ def smooth_run(
     """Maximum of the posterior over all frames, and its covariance.
 
     switches: gaps between frames (index k: between k and k + 1) in which a motor was switched, shape (any,).
-    Raises InputError where no frame has all caps sighted to start from; NumericalError where the search fails.
+    First the sightings and rods alone: they give the clock of the sensors, their offsets and the first contacts. Then
+    everything together, the noise of each source and of the motion as the run shows it.
+    Raises InputError where some cap is never sighted or the stamps do not increase; NumericalError where the search
+    fails.
     """
-    raise NotImplementedError
+    settings = settings or MotionSettings()
+    body = Body.of(robot, None if readings is None else readings.cable)
+    prepared = prepare(sighted, body)
+    state = State(
+        x=first_states(prepared, body), evidence=first_evidence(prepared, body, settings, switches), factor=np.ones(2),
+        noise=np.full(len(body.sensor), settings.sensor_noise_sd_m),
+    )  # fmt: skip
+    for _ in range(ALONE):
+        state = learn(settle(state, body, settings), prepared, body)
+    state = settle(state, body, settings)
+    state, clock = _with_sensors(state, readings, body, settings)
+    state = touch(_with_floor(state, prepared, body, settings), body)
+    for _ in range(TOGETHER):
+        state = touch(learn(settle(state, body, settings), prepared, body), body)
+    state = settle(state, body, settings)
+    return tracked_run(state, prepared, clock, body, settings)
+
+
+def _with_sensors(
+    state: State, readings: Readings | None, body: Body, settings: MotionSettings
+) -> tuple[State, SensorClock]:
+    """Sensors at the frames they belong to, offsets from where the camera sees well."""
+    if readings is None or not np.any(np.isfinite(readings.length)):
+        return state, SensorClock(0.0, float("inf"), False)
+    assert state.marginal is not None
+    t = state.evidence.t
+    length, rate, sd = distances(state.x, state.marginal.cov, body, body.sensor)
+    clock = find_clock(t, length, rate, sd, readings, settings.clock_range_s)
+    binned = bin_readings(t, readings, clock.delay_s)
+    x = state.x.copy()
+    for s in range(len(body.sensor)):
+        clear = (binned.samples[:, s] > 0) & (sd[:, s] < 3 * settings.sensor_noise_sd_m)
+        if np.any(clear):
+            x[:, body.bias.start + s] = np.median((binned.shown - length - binned.later * rate)[clear, s])
+    evidence = replace(
+        state.evidence, shown=binned.shown, later=binned.later, samples=binned.samples,
+        sensor_weight=sensor_weights(binned.samples, state.noise),
+    )  # fmt: skip
+    return replace(state, x=x, evidence=evidence), clock
+
+
+def _with_floor(state: State, prepared: Prepared, body: Body, settings: MotionSettings) -> State:
+    """The floor where the lowest caps are, as far as the settings let it be off."""
+    found = find_ground(body.positions(state.x), prepared.sighted, body.radius)
+    most = 3 * settings.ground_sd_m
+    x = state.x.copy()
+    x[:, body.floor.start] = np.clip(-found.shift, -most, most)
+    return replace(state, x=x)

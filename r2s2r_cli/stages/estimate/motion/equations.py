@@ -1,0 +1,164 @@
+"""The normal equations of a run at given states: motion, sightings, rods, cables, floor, crossing rods."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from r2s2r_cli.stages.estimate.kalman import process
+from r2s2r_cli.stages.estimate.motion.body import GROUND, Body
+from r2s2r_cli.stages.estimate.motion.chain import Normal
+from r2s2r_cli.stages.estimate.motion.crossing import add_crossings
+from r2s2r_cli.stages.estimate.motion.data import MotionSettings
+from r2s2r_cli.stages.estimate.motion.evidence import Evidence
+from r2s2r_cli.stages.estimate.motion.factors import Frames
+
+SIGHTING_FREEDOM, SENSOR_FREEDOM = 8.0, 5.0
+"""Of Student's t. Few wild sightings (another thing of the same colour), more wild sensor samples (dropouts)."""
+START_SD = (3.0, 1.0)
+"""Of position [m] and velocity [m/s] at the first frame: wide."""
+FLOOR_WALK_M = 2e-5
+"""[m] Of the floor under the caps over 1 s: it stays, the walk only keeps the equations well-conditioned."""
+BELOW_SD_M = 1e-3
+"""[m] Of how far a cap that is not known to touch may be below the floor."""
+SLIP_S = 0.3
+"""[s] How long a cap keeps sliding: the slip speeds of neighbouring frames are one piece of evidence, not many."""
+
+
+def equations(x: np.ndarray, evidence: Evidence, body: Body, settings: MotionSettings) -> tuple[float, Normal]:
+    """Cost and normal equations at the states x, shape (frame, dim)."""
+    frames = Frames(len(x), body.dim)
+    _sightings(frames, x, evidence, body)
+    _rods(frames, x, body, settings)
+    _sensors(frames, x, evidence, body)
+    _floor(frames, x, evidence, body, settings)
+    add_crossings(frames, x, body)
+    upper = _motion(frames, x, evidence, body, settings)
+    _start(frames, x, body, settings)
+    return frames.cost, Normal(frames.matrix, upper, frames.gradient)
+
+
+def apart(x: np.ndarray, body: Body, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distance of two caps and the unit vector from the first to the second, (frame,) and (frame, 3)."""
+    bar = x[:, body.p(ends[1])] - x[:, body.p(ends[0])]
+    length = np.maximum(np.linalg.norm(bar, axis=1), 1e-9)
+    return length, bar / length[:, None]
+
+
+def _sightings(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body) -> None:
+    for cap in range(body.caps):
+        states = body.p(cap)
+        residual = x[:, states] - evidence.seen[:, cap]
+        frames.vector(states, residual, evidence.information[:, cap], SIGHTING_FREEDOM)
+
+
+def _rods(frames: Frames, x: np.ndarray, body: Body, settings: MotionSettings) -> None:
+    weight = np.full(len(x), settings.rod_sd_m**-2)
+    for ends, length in zip(body.rod, body.rod_length, strict=True):
+        now, u = apart(x, body, ends)
+        frames.scalar(np.concatenate([body.p(ends[0]), body.p(ends[1])]), np.hstack([-u, u]), now - length, weight)
+
+
+def _sensors(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body) -> None:
+    for s, ends in enumerate(body.sensor):
+        weight = evidence.sensor_weight[:, s]
+        if not np.any(weight):
+            continue
+        later = evidence.later[:, s, None]
+        bar = x[:, body.p(ends[1])] - x[:, body.p(ends[0])]
+        bar = bar + later * (x[:, body.v(ends[1])] - x[:, body.v(ends[0])])
+        length = np.maximum(np.linalg.norm(bar, axis=1), 1e-9)
+        u = bar / length[:, None]
+        states = np.concatenate(
+            [body.p(ends[0]), body.p(ends[1]), body.v(ends[0]), body.v(ends[1]), [body.bias.start + s]]
+        )
+        slope = np.hstack([-u, u, -later * u, later * u, np.ones((len(x), 1))])
+        residual = length + x[:, body.bias.start + s] - evidence.shown[:, s]
+        frames.scalar(states, slope, residual, weight, SENSOR_FREEDOM)
+
+
+def _floor(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body, settings: MotionSettings) -> None:
+    """Caps that carry weight lie on the floor and slip slowly; no cap is below it."""
+    one = np.ones(len(x))
+    slip = slip_weight(evidence.t, settings)
+    for cap in range(body.caps):
+        p = x[:, body.p(cap)]
+        floor = x[:, body.floor]
+        height = p[:, 2] - body.radius[cap] - floor[:, 0] - floor[:, 1] * p[:, 0] - floor[:, 2] * p[:, 1]
+        states = np.concatenate([body.p(cap), np.arange(body.floor.start, body.floor.stop)])
+        slope = np.column_stack([-floor[:, 1], -floor[:, 2], one, -one, -p[:, 0], -p[:, 1]])
+        touching = evidence.touching[:, cap]
+        below = np.where(height < 0, 1 - touching, 0.0) / BELOW_SD_M**2
+        frames.scalar(states, slope, height, touching / settings.contact_sd_m**2 + below)
+        if np.any(touching):
+            for axis in range(2):
+                v = x[:, body.v(cap)[axis]]
+                frames.scalar(body.v(cap)[axis : axis + 1], one[:, None], v, touching * slip, 4.0)
+
+
+def slip_weight(t: np.ndarray, settings: MotionSettings) -> np.ndarray:
+    """1 / variance of the horizontal speed of a touching cap in one frame, (frame,)."""
+    share = np.minimum(np.gradient(t) / (2 * SLIP_S), 1.0)
+    return np.asarray(share / settings.slip_sd_m_per_s**2)
+
+
+def transition_information(evidence: Evidence) -> np.ndarray:
+    """Inverse covariance of position and velocity over each gap, (frame - 1, cap, 2, 2)."""
+    dt = np.diff(evidence.t)
+    unit = np.array([np.linalg.inv(process(gap)) for gap in dt])
+    density = evidence.density + (evidence.kick / dt)[:, None]
+    return np.asarray(unit[:, None] / density[:, :, None, None])
+
+
+def _motion(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body, settings: MotionSettings) -> np.ndarray:
+    dt = np.diff(evidence.t)
+    n, half = len(x), 3 * body.caps
+    w = np.repeat(transition_information(evidence), 3, axis=1)
+    f = np.zeros((n - 1, 1, 2, 2))
+    f[:, 0, 0, 0] = f[:, 0, 1, 1] = 1.0
+    f[:, 0, 0, 1] = dt
+    fw = np.swapaxes(f, 2, 3) @ w
+    fwf = fw @ f
+    pair = np.stack([x[:, :half], x[:, half : body.moving]], axis=2)
+    off = pair[1:] - np.einsum("kaij,kcj->kci", f, pair[:-1])
+    push = np.einsum("kcij,kcj->kci", w, off)
+    back = np.einsum("kaji,kcj->kci", f, push)
+    frames.cost += 0.5 * float(np.sum(push * off))
+    upper = np.zeros((n - 1, body.dim, body.dim))
+    rows = np.stack([np.arange(half), half + np.arange(half)])
+    for i in range(2):
+        frames.gradient[1:, rows[i]] += push[:, :, i]
+        frames.gradient[:-1, rows[i]] -= back[:, :, i]
+        for j in range(2):
+            frames.matrix[1:, rows[i], rows[j]] += w[:, :, i, j]
+            frames.matrix[:-1, rows[i], rows[j]] += fwf[:, :, i, j]
+            upper[:, rows[i], rows[j]] -= fw[:, :, i, j]
+    slow = np.arange(body.moving, body.dim)
+    walk = np.full(len(slow), settings.sensor_walk_m)
+    walk[-GROUND:] = FLOOR_WALK_M
+    weight = 1.0 / (walk**2 * dt[:, None])
+    step = np.diff(x[:, slow], axis=0)
+    frames.cost += 0.5 * float(np.sum(weight * step**2))
+    frames.gradient[1:, slow] += weight * step
+    frames.gradient[:-1, slow] -= weight * step
+    frames.matrix[1:, slow, slow] += weight
+    frames.matrix[:-1, slow, slow] += weight
+    upper[:, slow, slow] -= weight
+    return upper
+
+
+def _start(frames: Frames, x: np.ndarray, body: Body, settings: MotionSettings) -> None:
+    sd = start_sd(body, settings)
+    mean = np.zeros(body.dim)
+    mean[: 3 * body.caps] = x[0, : 3 * body.caps]  # no place is likelier than another; the width only bounds it
+    frames.cost += 0.5 * float(np.sum(((x[0] - mean) / sd) ** 2))
+    frames.gradient[0] += (x[0] - mean) / sd**2
+    frames.matrix[0, np.arange(body.dim), np.arange(body.dim)] += sd**-2
+
+
+def start_sd(body: Body, settings: MotionSettings) -> np.ndarray:
+    """Standard deviations of the state of the first frame, (dim,)."""
+    sd = np.empty(body.dim)
+    sd[: 3 * body.caps], sd[3 * body.caps : body.moving] = START_SD
+    sd[body.bias] = settings.sensor_bias_sd_m
+    sd[body.floor] = [settings.ground_sd_m, settings.ground_tilt_sd_rad, settings.ground_tilt_sd_rad]
+    return sd

@@ -1,0 +1,94 @@
+"""The end: what of the states and covariances is handed on, and how each frame is marked."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from r2s2r_cli.stages.estimate.contacts import contacts
+from r2s2r_cli.stages.estimate.motion.body import Body
+from r2s2r_cli.stages.estimate.motion.data import (
+    BLIND,
+    HIDDEN,
+    LOST,
+    NO_SENSORS,
+    PARTLY_HIDDEN,
+    REJECTED,
+    SEEN,
+    MotionSettings,
+    SensorClock,
+    TrackedRun,
+)  # fmt: skip
+from r2s2r_cli.stages.estimate.motion.equations import SIGHTING_FREEDOM
+from r2s2r_cli.stages.estimate.motion.factors import heavy_tail
+from r2s2r_cli.stages.estimate.motion.prepare import Prepared
+from r2s2r_cli.stages.estimate.motion.rounds import State, cap_covariances, distances
+
+USED = 0.3
+"""A sighting whose weight fell below this share contradicts the rest: nearly 5 standard deviations off."""
+NEAR_S = 0.25
+"""[s] A sensor that was not heard for that long before and after a frame is missing there."""
+
+
+def tracked_run(
+    state: State, prepared: Prepared, clock: SensorClock, body: Body, settings: MotionSettings
+) -> TrackedRun:
+    """At the run's own frames; the knots in its holes are left out."""
+    assert state.marginal is not None and state.solved is not None
+    x, cov, rows = state.x, state.marginal.cov, prepared.given
+    p_cov = cap_covariances(cov, body)
+    speed = 3 * body.caps
+    v_cov = np.stack([cov[:, (b := body.p(c) + speed)[:, None], b] for c in range(body.caps)], axis=1)
+    length, _, length_sd = distances(x, cov, body, body.cable)
+    quality, score = _quality(state, prepared, p_cov, body)
+    variance = np.diagonal(cov, axis1=1, axis2=2)
+    heard = _heard(state.evidence.t, state.evidence.sensor_weight)
+    systematic = settings.systematic_sd_m**2 * np.eye(3)
+    shown = p_cov + systematic
+    worst = np.sqrt(np.linalg.eigvalsh(shown)[..., -1])
+    mode = (
+        np.where(np.any(heard, axis=1), 0, NO_SENSORS)
+        | np.where(np.any(quality != SEEN, axis=1), PARTLY_HIDDEN, 0)
+        | np.where(np.all(quality != SEEN, axis=1), BLIND, 0)
+        | np.where(np.any(worst > settings.lost_sd_m, axis=1), LOST, 0)
+    ).astype(np.uint8)
+    first = np.searchsorted(rows, np.arange(len(x) - 1), side="right") - 1
+    return TrackedRun(
+        t=prepared.t[rows], p_WE=body.positions(x)[rows], cov_p=shown[rows], v_WE=body.velocities(x)[rows],
+        cov_v=v_cov[rows], length=length[rows], length_sd=length_sd[rows], sensor_bias=x[rows, body.bias],
+        sensor_bias_sd=np.sqrt(variance[rows, body.bias]), sensor_noise_sd=state.noise,
+        sensor_dead=~np.any(state.evidence.sensor_weight > 0, axis=0), clock=clock,
+        ground=np.median(x[:, body.floor], axis=0), ground_sd=np.sqrt(np.median(variance[:, body.floor], axis=0)),
+        contact=contacts(state.evidence.touching)[rows], contact_probability=state.evidence.touching[rows],
+        quality=quality[rows], mode=mode[rows], score=score[rows], noise_scale=np.sqrt(state.factor),
+        acceleration=np.array([state.evidence.density[first == k].mean(axis=0) for k in range(len(rows) - 1)]),
+        rounds=state.rounds, settled=state.solved.settled,
+    )  # fmt: skip
+
+
+def _quality(state: State, prepared: Prepared, p_cov: np.ndarray, body: Body) -> tuple[np.ndarray, np.ndarray]:
+    off = prepared.seen - body.positions(state.x)
+    information = state.evidence.information
+    square = np.einsum("kci,kcij,kcj->kc", off, information, off)
+    used = prepared.sighted & (heavy_tail(square, 3, SIGHTING_FREEDOM) > USED)
+    quality = np.where(prepared.sighted, np.where(used, SEEN, REJECTED), HIDDEN).astype(np.uint8)
+    score = np.full(square.shape, np.nan)
+    rows = np.nonzero(prepared.sighted)
+    seen = np.linalg.inv(information[rows])
+    # A used sighting took part in the state, so that the difference has the difference of both variances.
+    spread = np.where(used[rows][:, None, None], seen - p_cov[rows], seen + p_cov[rows])
+    values, axes = np.linalg.eigh(spread)
+    part = np.einsum("nai,na->ni", axes, off[rows])
+    score[rows] = np.sqrt(np.mean(part**2 / np.maximum(values, 0.02 * np.linalg.eigvalsh(seen)[:, :1]), axis=1))
+    return quality, score
+
+
+def _heard(t: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Whether each sensor spoke within NEAR_S of each frame, (frame, sensor)."""
+    out = np.zeros(weight.shape, dtype=bool)
+    for s in range(weight.shape[1]):
+        spoke = t[weight[:, s] > 0]
+        if len(spoke):
+            near = np.clip(np.searchsorted(spoke, t), 1, max(len(spoke) - 1, 1))
+            before, after = spoke[near - 1], spoke[np.minimum(near, len(spoke) - 1)]
+            out[:, s] = np.minimum(np.abs(t - before), np.abs(after - t)) <= NEAR_S
+    return out

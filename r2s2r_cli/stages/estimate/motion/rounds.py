@@ -1,0 +1,143 @@
+"""Alternate between the states and what they say about noise, sensors and contacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from r2s2r_cli.stages.estimate.motion.body import Body
+from r2s2r_cli.stages.estimate.motion.chain import Marginals, marginals
+from r2s2r_cli.stages.estimate.motion.data import MotionSettings
+from r2s2r_cli.stages.estimate.motion.equations import SENSOR_FREEDOM, SIGHTING_FREEDOM
+from r2s2r_cli.stages.estimate.motion.evidence import Evidence
+from r2s2r_cli.stages.estimate.motion.factors import heavy_tail
+from r2s2r_cli.stages.estimate.motion.noise import gap_density, next_density, sensor_variance, sighting_scale
+from r2s2r_cli.stages.estimate.motion.prepare import Prepared, information, principal
+from r2s2r_cli.stages.estimate.motion.solve import Solved, solve
+from r2s2r_cli.stages.estimate.motion.touching import touching_probability
+
+STEPS = 6
+"""Gauss-Newton steps between two looks at the noise, at most."""
+DEAD_NOISE_M = 0.02
+"""[m] A sensor with more noise than this says nothing."""
+
+
+@dataclass(frozen=True)
+class State:
+    """Where the alternation stands. factor: on the variances of the sightings, (2,); noise: of one sample [m], (sensor,)."""
+
+    x: np.ndarray
+    evidence: Evidence
+    factor: np.ndarray
+    noise: np.ndarray
+    solved: Solved | None = None
+    marginal: Marginals | None = None
+    rounds: int = 0
+
+
+def settle(state: State, body: Body, settings: MotionSettings, *, steps: int = STEPS) -> State:
+    """States and covariances for the present evidence."""
+    solved = solve(state.x, state.evidence, body, settings, rounds=steps)
+    return replace(
+        state, x=solved.x, solved=solved, marginal=marginals(solved.done), rounds=state.rounds + solved.rounds
+    )
+
+
+def learn(state: State, prepared: Prepared, body: Body) -> State:
+    """Noise of sightings, sensors and motion from the present states."""
+    assert state.marginal is not None
+    evidence, cov = state.evidence, state.marginal.cov
+    p_cov = cap_covariances(cov, body)
+    rows = np.nonzero(prepared.sighted)
+    p = body.positions(state.x)
+    values, axes = principal(prepared.cov[rows])
+    scaled = values * np.array([state.factor[0], state.factor[0], state.factor[1]])
+    seen = np.einsum("ni,nia,nib->nab", scaled, axes, axes)
+    step = sighting_scale(prepared.seen[rows] - p[rows], seen, axes, p_cov[rows])
+    factor = np.clip(state.factor * step, 0.1, 30.0)
+    noise = state.noise.copy()
+    for s in range(len(noise)):
+        used = evidence.sensor_weight[:, s] > 0
+        if np.sum(used) < 10:
+            continue
+        residual, spread = sensor_residual(state.x, cov, evidence, body, s)
+        variance = 1.0 / evidence.sensor_weight[used, s]
+        square = residual[used] ** 2 / variance
+        usual = square < 16.0 * max(float(np.median(square)) / 0.455, 0.1)
+        noise[s] *= np.sqrt(sensor_variance(residual[used], variance, spread[used], usual))
+    each = gap_density(state.x, state.marginal, evidence, body)
+    believed = prepared.sighted[1:] & prepared.sighted[:-1]
+    density = next_density(each, evidence.kick, np.diff(evidence.t), believed)
+    weight = sensor_weights(evidence.samples, noise)
+    evidence = replace(evidence, information=information(prepared, factor), density=density, sensor_weight=weight)
+    return replace(state, evidence=evidence, factor=factor, noise=noise)
+
+
+def touch(state: State, body: Body) -> State:
+    """Contacts from the present heights."""
+    assert state.marginal is not None
+    height, sd = heights(state.x, state.marginal.cov, body)
+    return replace(state, evidence=replace(state.evidence, touching=touching_probability(state.evidence.t, height, sd)))
+
+
+def sensor_weights(samples: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """1 / variance of means of so many samples; 0 for sensors that say nothing."""
+    return np.where(noise < DEAD_NOISE_M, samples / noise**2, 0.0)
+
+
+def cap_covariances(cov: np.ndarray, body: Body) -> np.ndarray:
+    """(frame, dim, dim) to those of the caps' positions, (frame, cap, 3, 3)."""
+    return np.stack([cov[:, body.p(c)[:, None], body.p(c)] for c in range(body.caps)], axis=1)
+
+
+def heights(x: np.ndarray, cov: np.ndarray, body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Of the caps' lowest points above the floor as it stands in the states, and their standard deviation, (frame, cap)."""
+    height, sd = np.empty((len(x), body.caps)), np.empty((len(x), body.caps))
+    for cap in range(body.caps):
+        p, floor = x[:, body.p(cap)], x[:, body.floor]
+        height[:, cap] = p[:, 2] - body.radius[cap] - floor[:, 0] - np.sum(floor[:, 1:] * p[:, :2], axis=1)
+        states = np.concatenate([body.p(cap), np.arange(body.floor.start, body.floor.stop)])
+        one = np.ones(len(x))
+        slope = np.column_stack([-floor[:, 1], -floor[:, 2], one, -one, -p[:, 0], -p[:, 1]])
+        part = cov[:, states[:, None], states]
+        sd[:, cap] = np.sqrt(np.maximum(np.einsum("ki,kij,kj->k", slope, part, slope), 1e-14))
+    return height, sd
+
+
+def distances(
+    x: np.ndarray, cov: np.ndarray, body: Body, pairs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Distances of pairs of caps [m], their rates [m/s] and standard deviations [m], (frame, pair)."""
+    shape = (len(x), len(pairs))
+    length, rate, sd = np.empty(shape), np.empty(shape), np.empty(shape)
+    for i, (a, b) in enumerate(pairs):
+        bar = x[:, body.p(b)] - x[:, body.p(a)]
+        length[:, i] = np.maximum(np.linalg.norm(bar, axis=1), 1e-9)
+        u = bar / length[:, i : i + 1]
+        rate[:, i] = np.sum(u * (x[:, body.v(b)] - x[:, body.v(a)]), axis=1)
+        states, slope = np.concatenate([body.p(a), body.p(b)]), np.hstack([-u, u])
+        sd[:, i] = np.sqrt(np.maximum(np.einsum("ki,kij,kj->k", slope, cov[:, states[:, None], states], slope), 0.0))
+    return length, rate, sd
+
+
+def sensor_residual(
+    x: np.ndarray, cov: np.ndarray, evidence: Evidence, body: Body, s: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shown minus predicted by one sensor [m], and the variance of the prediction [m^2], (frame,)."""
+    a, b = body.sensor[s]
+    later = evidence.later[:, s, None]
+    bar = x[:, body.p(b)] - x[:, body.p(a)] + later * (x[:, body.v(b)] - x[:, body.v(a)])
+    length = np.maximum(np.linalg.norm(bar, axis=1), 1e-9)
+    u = bar / length[:, None]
+    bias = body.bias.start + s
+    states = np.concatenate([body.p(a), body.p(b), [bias]])
+    slope = np.hstack([-u, u, np.ones((len(x), 1))])
+    variance = np.einsum("ki,kij,kj->k", slope, cov[:, states[:, None], states], slope)
+    return evidence.shown[:, s] - length - x[:, bias], variance
+
+
+__all__ = [
+    "SENSOR_FREEDOM", "SIGHTING_FREEDOM", "State", "cap_covariances", "distances", "heavy_tail", "heights", "learn",
+    "sensor_residual", "sensor_weights", "settle", "touch",
+]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import shutil
 from collections.abc import Callable
@@ -9,9 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import typer.testing
+from typer.main import get_command
 from typer.testing import CliRunner
 
 from r2s2r_cli.app import app
+
+# The runner builds the whole command line anew for every command that it runs, a third of what a short one takes.
+typer.testing._get_command = functools.cache(get_command)
 
 Run = Callable[..., Any]
 

@@ -54,7 +54,7 @@ class Reference:
         a, b = self.p[:, :2] - self.p[:, :2].mean(axis=0), shown[..., :2] - centre[:, :, None]
         sine = (a[:, 0] * b[..., 1] - a[:, 1] * b[..., 0]).sum(axis=-1)
         yaw = np.arctan2(sine, (a * b).sum(axis=(-1, -2)))
-        moved = turned(a, yaw)
+        moved = turned(a, yaw[..., None])
         left = ((moved - b) ** 2).sum(axis=(-1, -2)) + ((shown[..., 2] - self.p[:, 2]) ** 2).sum(axis=-1)
         best, row = left.argmin(axis=1), np.arange(len(shown))
         shift = turned(self.p[:, :2].mean(axis=0), yaw[row, best])
@@ -73,15 +73,13 @@ def reference_of(p_WE: np.ndarray, group: SymmetryGroup) -> Reference:
             f"{axis[1]:.3g}, {axis[2]:.3g})", hint="rest the robot on another triangle in robot.toml",
         )  # fmt: skip
     angle, origin = float(np.arctan2(axis[1], axis[0])), p_WE[:, :2].mean(axis=0)
-    flat = turned(p_WE[:, :2] - origin, np.array(-angle))
+    flat = turned(p_WE[:, :2] - origin, -angle)
     return Reference(np.concatenate([flat, p_WE[:, 2:]], axis=1), group, origin, angle)
 
 
-def turned(xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-    """Points xy (..., 2) turned by yaw about the vertical; axes of yaw come before the points' own."""
+def turned(xy: np.ndarray, yaw: np.ndarray | float) -> np.ndarray:
+    """Points xy (..., 2) turned by yaw (...) about the vertical; both are broadcast."""
     c, s = np.cos(yaw), np.sin(yaw)
-    more = (1,) * (np.ndim(xy) - 1)
-    c, s = np.reshape(c, (*np.shape(yaw), *more)), np.reshape(s, (*np.shape(yaw), *more))
     x, y = xy[..., 0], xy[..., 1]
     return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 

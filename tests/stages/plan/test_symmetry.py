@@ -17,11 +17,11 @@ from r2s2r_cli.stages.plan.symmetry import Symmetry, SymmetryGroup, principal_ax
 from schemas.robot import Robot
 from tests.support.robots import Subject, subject
 
-PUBLISHED = {
+PUBLISHED: dict[tuple[int, ...], tuple[int, ...]] = {
     (0, 2, 5): (0, 1, 2, 3, 4, 5), (0, 3, 5): (0, 1, 2, 3, 4, 5), (1, 2, 4): (1, 2, 0, 4, 5, 3),
     (1, 2, 5): (1, 2, 0, 4, 5, 3), (0, 3, 4): (2, 0, 1, 5, 3, 4), (1, 3, 4): (2, 0, 1, 5, 3, 4),
 }  # fmt: skip
-"""By bottom triangle: motor k takes the target of this motor of the policy as written (the public host of the robot)."""
+"""By bottom triangle: motor k takes the target of this motor of the policy as written (public host of the robot)."""
 
 
 @pytest.fixture(scope="module", params=["threebar", "sixbar"])
@@ -64,7 +64,7 @@ def test_group_axioms(case: tuple[Robot, SymmetryGroup]) -> None:
 
 
 def test_parts_go_where_their_caps_go(case: tuple[Robot, SymmetryGroup]) -> None:
-    """Rods, cables and motors of the image join the images of the caps; every turn is a proper rotation that does it."""
+    """Rods, cables and motors of the image join the images of the caps; every turn is the proper rotation there."""
     robot, group = case
     p = np.array(robot.rest_caps_m)
     p = p - p.mean(axis=0)
@@ -130,7 +130,7 @@ def three_bar() -> Reference:
 
 def lying_as(reference: Reference, k: int, xy: np.ndarray, yaw: float) -> np.ndarray:
     """Caps (cap, 3) of the robot that has undergone element k: cap i's place in the reference is taken by caps[i]."""
-    flat = turned(reference.p[:, :2], np.array(yaw)) + xy
+    flat = turned(reference.p[:, :2], yaw) + xy
     p_WE = np.empty_like(reference.p)
     p_WE[list(reference.group.elements[k].caps)] = np.concatenate([flat, reference.p[:, 2:]], axis=1)
     return p_WE
@@ -148,7 +148,7 @@ def test_every_pose_is_mapped_back() -> None:
         assert np.allclose(found.xy, xy, atol=3e-4) and abs(wrapped(found.yaw[0] - yaw)) < 3e-3
         assert support_caps(p_WE) == reference.group.supports(reference.support)[k]
         # A half-turn points the principal axis the other way: forward and backward change places.
-        axis = turned(principal_axis(p_WE)[:2], np.array(-yaw))
+        axis = turned(principal_axis(p_WE)[:2], -yaw)
         assert np.sign(axis[0]) == (-1 if any(reference.group.elements[k].reverses) else 1)
 
 

@@ -1,0 +1,77 @@
+"""From all gaits of the search to the ten best of every behaviour."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.stages.plan.executor import Executor, Standing
+from r2s2r_cli.stages.plan.gaits import Gait
+from r2s2r_cli.stages.plan.placement import Reference
+from r2s2r_cli.stages.plan.rewards import Outcomes, Reward
+from r2s2r_cli.stages.plan.robust import Primitive, earned, judged, primitive
+from r2s2r_cli.stages.plan.search import Found, best_of
+
+
+@dataclass(frozen=True)
+class ChoiceSettings:
+    """candidates: gaits of each behaviour that are judged at all, on a few pairs; of these `finalists` on all pairs;
+    kept: how many stay. spread: standard deviations that are taken off the mean."""
+
+    candidates: int = 60
+    first_pairs: int = 6
+    finalists: int = 20
+    kept: int = 10
+    spread: float = 1.0
+
+
+class Judge:
+    """Outcomes of gaits over pairs of numbers and start poses; a gait is simulated once, whatever asks for it."""
+
+    def __init__(self, executor: Executor, reference: Reference, pairs: Standing, rest_error_m: float) -> None:
+        self.executor, self.reference, self.pairs, self.rest_error_m = executor, reference, pairs, rest_error_m
+        self._known: dict[tuple[tuple[str, ...], int], tuple[Outcomes, np.ndarray]] = {}
+        self.simulated = 0
+
+    def __call__(self, gaits: list[Gait], count: int) -> list[tuple[Outcomes, np.ndarray]]:
+        """Outcomes and whether the gait came back to rest, over `count` pairs spread evenly, the first included."""
+        rows = np.unique(np.round(np.linspace(0, len(self.pairs) - 1, count)).astype(int))
+        new = list({gait.key: gait for gait in gaits if (gait.key, count) not in self._known}.values())
+        if new:
+            for gait, (came, sound) in zip(
+                new, judged(self.executor, self.reference, self.pairs, new, rows), strict=True
+            ):
+                self._known[gait.key, count] = came, sound & (came.error < self.rest_error_m)
+                self.simulated += len(rows) * len(gait.targets)
+        return [self._known[gait.key, count] for gait in gaits]
+
+
+def chosen(
+    judge: Judge, found: Found, rewards: Mapping[str, Reward], settings: ChoiceSettings,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> dict[str, tuple[Primitive, ...]]:  # fmt: skip
+    """The best gaits of every behaviour, best first, by their robust score; named `forward-1`, `forward-2` ..."""
+    kept: dict[str, tuple[Primitive, ...]] = {}
+    for number, (behaviour, reward) in enumerate(rewards.items()):
+        gaits = [found.gaits[row] for row in best_of(found, reward, settings.candidates)]
+        few = min(settings.first_pairs, len(judge.pairs))
+        first = [earned(reward, came, good) for came, good in judge(gaits, few)]
+        order = np.argsort([-(one.mean() - settings.spread * one.std()) for one in first], kind="stable")
+        finalists = [gaits[k] for k in order[: settings.finalists]]
+        made = [
+            primitive("", behaviour, reward, gait, came, good, spread=settings.spread)
+            for gait, (came, good) in zip(finalists, judge(finalists, len(judge.pairs)), strict=True)
+        ]
+        ranked = sorted(made, key=lambda one: (-one.score, one.gait.key))[: settings.kept]
+        short = behaviour.replace(":", ".").rpartition(".")[2]
+        kept[behaviour] = tuple(_named(one, f"{short}-{k}") for k, one in enumerate(ranked, 1))
+        progress(number + 1, len(rewards))
+    return kept
+
+
+def _named(one: Primitive, name: str) -> Primitive:
+    from dataclasses import replace
+
+    return replace(one, name=name)

@@ -1,0 +1,261 @@
+"""Many policies at once: the robot's controller in the loop, every environment with targets and numbers of its own.
+
+`engine.closed_loop` runs one policy from many starts; the search needs another target in every environment, and
+environments that end at different times. This is the same loop, tick by tick; finished environments leave the batch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from r2s2r_cli.errors import NumericalError
+from r2s2r_cli.stages.init.attachment import rod_frames
+from r2s2r_cli.stages.model import structure_of
+from r2s2r_cli.stages.plan.belief import Belief
+from schemas.robot import Robot
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from r2s2r_cli.engine import LatchedPid
+    from r2s2r_cli.engine.link import DelayLine
+
+CHUNK = 4096
+"""Environments that are simulated together: more is not faster, and takes memory."""
+RESTLESS = 0.01
+"""[m/s] a start whose caps still move so fast after settling is none."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Robots in the engine, one a row. s: flat states (B, NS); line: commands that are under way, newest last,
+    (B, depth, actuated); draw: which drawn numbers each has, (B,)."""
+
+    s: Tensor
+    line: Tensor
+    draw: Tensor
+
+    def __len__(self) -> int:
+        return len(self.s)
+
+    def take(self, rows: np.ndarray) -> Standing:
+        """The same for some rows, repeats allowed."""
+        import torch
+
+        index = torch.as_tensor(np.asarray(rows, dtype=np.int64))
+        return Standing(self.s[index], self.line[index], self.draw[index])
+
+
+@dataclass(frozen=True)
+class Executed:
+    """What became of policies of S targets. ends: the robots when each target was left, S of them; ticks: control ticks
+    until then, (B, S); given_up: at its timeout, (B, S); failed: the simulation left the finite numbers, (B,)."""
+
+    ends: tuple[Standing, ...]
+    ticks: np.ndarray
+    given_up: np.ndarray
+    failed: np.ndarray
+
+    @property
+    def sound(self) -> np.ndarray:
+        """Environments that reached all targets, (B,)."""
+        return np.asarray(~self.given_up.any(axis=1) & ~self.failed)
+
+
+class Executor:
+    """A robot whose numbers are drawn from a belief. Holds the compiled step.
+
+    draws: values (K, n) of the belief's parameters. timeout_s: a target that takes longer is given up.
+    """
+
+    def __init__(
+        self, robot: Robot, belief: Belief, draws: np.ndarray, *, step: float, timeout_s: float | None = None,
+        rod_contact: bool = True, cache_dir: Path | None = None, threads: int = 1,
+    ) -> None:  # fmt: skip
+        import torch
+
+        from r2s2r_cli.engine.flat import pack_parameters
+        from r2s2r_cli.engine.pid import steps_a_tick, ticks
+        from r2s2r_cli.engine.rollout import Simulator
+        from r2s2r_cli.stages.identify.free import Mapping
+
+        self.robot, self.step = robot, step
+        structure = replace(structure_of(robot), rod_contact=rod_contact)
+        self.mapping = Mapping(robot, belief.frees, belief.effects, fixed=belief.fixed, structure=structure)
+        self.structure = self.mapping.structure
+        self.values = torch.as_tensor(draws, dtype=torch.float64)
+        one = self.mapping.theta(self.values)
+        self.theta = one.map(lambda x: x.expand(len(draws), *x.shape[1:]).contiguous())
+        self.packed = pack_parameters(self.structure, self.theta)
+        self.simulator = Simulator(self.structure, cache_dir=cache_dir, threads=threads)
+        self.period = 1.0 / robot.pid.rate_hz
+        self.whole = steps_a_tick(self.period, step)
+        self.cable_caps = tuple((a, b) for a, b in (cable.caps for cable in robot.cables))
+        self.delay = torch.tensor([self.mapping.observation(row).command_delay for row in draws], dtype=torch.float64)
+        limit = robot.pid.step_timeout_s if timeout_s is None else timeout_s
+        self.timeout = int(ticks(torch.tensor([limit], dtype=torch.float64), self.period)[0])
+        self.steps = 0
+        self._substeps: int | None = None
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def computed_by_torch(self) -> bool:
+        """Whether no machine code could be made."""
+        return not self.simulator.kernels.native(self.theta.mass)
+
+    def pid(self, draw: Tensor) -> LatchedPid:
+        """The controller of environments with these draws."""
+        return self.mapping.pid(self.values[draw])
+
+    def standing(self, p_WE: np.ndarray, draw: np.ndarray, lengths: np.ndarray | None = None) -> Standing:
+        """Robots at rest nearest to poses (B, cap, 3) [m]; lengths: of all cables [m], (B, cable). Raises
+        NumericalError where one does not come to rest."""
+        import torch
+
+        from r2s2r_cli.engine.flat import pack_state
+        from r2s2r_cli.engine.settle import settled
+
+        index = torch.as_tensor(np.asarray(draw, dtype=np.int64))
+        theta = self.theta.map(lambda x: x[index])
+        found = settled(
+            self.simulator, theta, torch.as_tensor(p_WE), torch.as_tensor(np.array([rod_frames(p) for p in p_WE])),
+            self.cable_caps, lengths=None if lengths is None else torch.as_tensor(lengths), step=self.step,
+        )  # fmt: skip
+        fastest = float(found.speed.max())
+        if fastest > RESTLESS:
+            raise NumericalError(
+                "the robot does not come to rest", where="the rest pose of robot.toml", expected="a pose it can hold",
+                received=f"caps still at {1e3 * fastest:.0f} mm/s", hint="r2s2r validate robot.toml",
+            )  # fmt: skip
+        s = pack_state(self.structure, found.state)
+        depth = int(torch.floor(self.delay.max() / self.period + 1e-9)) + 2
+        return Standing(s, s.new_zeros(len(s), depth, self.structure.n_actuated), index)
+
+    def caps(self, at: Standing) -> np.ndarray:
+        """End caps [m], (B, cap, 3)."""
+        from r2s2r_cli.engine import end_caps
+        from r2s2r_cli.engine.flat import unpack_state
+
+        state = unpack_state(self.structure, at.s)
+        return np.asarray(end_caps(self.theta.map(lambda x: x[at.draw]), state).numpy())
+
+    def speeds(self, at: Standing) -> np.ndarray:
+        """Speeds of the end caps [m/s], (B, cap)."""
+        from r2s2r_cli.engine import cap_velocities
+        from r2s2r_cli.engine.flat import unpack_state
+
+        v_WE = cap_velocities(self.theta.map(lambda x: x[at.draw]), unpack_state(self.structure, at.s))
+        return np.asarray(v_WE.norm(dim=-1).numpy())
+
+    def com(self, at: Standing) -> np.ndarray:
+        """Centres of mass [m], (B, 3)."""
+        from r2s2r_cli.engine.flat import unpack_state
+
+        mass = self.theta.mass[at.draw]
+        p_WB = unpack_state(self.structure, at.s).p_WB
+        return np.asarray(((p_WB * mass[..., None]).sum(1) / mass.sum(1, keepdim=True)).numpy())
+
+    def run(self, at: Standing, targets: np.ndarray) -> Executed:
+        """Targets (B, S, actuated) from where the robots stand, with the robot's controller; no time is held."""
+        import torch
+
+        parts = []
+        for first in range(0, len(at), CHUNK):
+            rows = np.arange(first, min(first + CHUNK, len(at)))
+            parts.append(self._run(at.take(rows), torch.as_tensor(np.ascontiguousarray(targets[rows], dtype=float))))
+        if len(parts) == 1:
+            return parts[0]
+        ends = tuple(
+            Standing(torch.cat([p.ends[k].s for p in parts]), torch.cat([p.ends[k].line for p in parts]),
+                     torch.cat([p.ends[k].draw for p in parts]))
+            for k in range(targets.shape[1])
+        )  # fmt: skip
+        return Executed(ends, *(np.concatenate([getattr(p, name) for p in parts])
+                                for name in ("ticks", "given_up", "failed")))  # fmt: skip
+
+    def _run(self, at: Standing, targets: Tensor) -> Executed:
+        import torch
+
+        from r2s2r_cli.engine.flat import unpack_state
+        from r2s2r_cli.engine.pid import advance, start_progress
+        from r2s2r_cli.engine.reading import cap_lengths
+        from r2s2r_cli.engine.state import end_caps
+
+        batch, steps, _ = targets.shape
+        ends_s = at.s[:, None].repeat(1, steps, 1)
+        ends_line = at.line[:, None].repeat(1, steps, 1, 1)
+        ticks, given_up = np.zeros((batch, steps), dtype=np.int64), np.zeros((batch, steps), dtype=bool)
+        failed = np.zeros(batch, dtype=bool)
+        hold, timeout = torch.zeros(steps, dtype=torch.long), torch.full((steps,), self.timeout)
+        n = self.substeps(at)
+        h, count = self.step / n, self.whole * n
+        delayed = bool((self.delay > 0).any())
+
+        live = torch.arange(batch)
+        s, s_line, draw, goal = at.s, at.line, at.draw, targets
+        theta, p, pid = self.theta.map(lambda x: x[draw]), self.packed[draw], self.pid(draw)
+        memory, where = pid.start(s.new_zeros(batch, self.structure.n_cables)), start_progress(batch)
+        line = self._line(draw, s_line) if delayed else None
+        with torch.no_grad():
+            for tick in range(1, steps * (self.timeout + 1) + 1):
+                state = unpack_state(self.structure, s)
+                length = cap_lengths(self.cable_caps, end_caps(theta, state))
+                for effect in self.structure.effects:
+                    length = effect.sensing(theta.of(effect.name), length)
+                wanted = goal[torch.arange(len(s)), where.index.clamp(max=steps - 1)]
+                running = ~where.finished(steps)
+                u, memory = pid.tick(memory, length, wanted)
+                u = torch.where(running[:, None], u, torch.zeros_like(u))
+                before = where.index
+                where, moved = advance(where, memory.done, hold, timeout)
+                memory = memory.restarted(moved.changed)
+                if line is None:
+                    s = self.simulator.advance(s, u[:, None], p, h=h, hold=count, every=count)[:, -1]
+                else:
+                    rows, line = line.pushed(u)
+                    s = self.simulator.advance(s, rows, p, h=h, hold=n, every=count)[:, -1]
+                    s_line = torch.cat([s_line[:, 1:], u[:, None]], dim=1)
+                self.steps += len(s) * count
+                sane = torch.isfinite(s).all(dim=1)
+                if bool(moved.changed.any()):
+                    left, step_of = live[moved.changed], before[moved.changed]
+                    ends_s[left, step_of], ticks[left.numpy(), step_of.numpy()] = s[moved.changed], tick
+                    ends_line[left, step_of] = s_line[moved.changed]
+                    given_up[left.numpy(), step_of.numpy()] = moved.timed_out[moved.changed].numpy()
+                over = where.finished(steps) | ~sane
+                failed[live[~sane].numpy()] = True
+                if bool(over.all()):
+                    break
+                if int(over.sum()) * 8 >= len(over):
+                    keep = ~over
+                    live, s, s_line, draw, goal = live[keep], s[keep], s_line[keep], draw[keep], goal[keep]
+                    theta, p, pid = theta.map(lambda x, keep=keep: x[keep]), p[keep], self.pid(draw)
+                    memory = replace(memory, total=memory.total[keep], previous=memory.previous[keep],
+                                     done=memory.done[keep])  # fmt: skip
+                    where = replace(where, index=where.index[keep], elapsed=where.elapsed[keep], held=where.held[keep])
+                    line = None if line is None else self._line(draw, s_line)
+        ends = tuple(Standing(ends_s[:, k], ends_line[:, k], at.draw) for k in range(steps))
+        return Executed(ends, ticks, given_up, failed)
+
+    def _line(self, draw: Tensor, recent: Tensor) -> DelayLine:
+        """The commands under way as the engine's link takes them."""
+        from r2s2r_cli.engine.link import Link
+
+        made = Link(delay=self.delay[draw][:, None]).line(len(draw), recent[:, 0], self.period, self.whole)
+        depth = made.recent.shape[1]
+        return replace(made, recent=recent[:, recent.shape[1] - depth :])
+
+    def substeps(self, at: Standing) -> int:
+        """Engine steps per `step`, as many as the stiffest of all draws needs."""
+        from r2s2r_cli.engine.flat import unpack_state
+
+        if self._substeps is None:
+            theta = self.theta.map(lambda x: x[at.draw])
+            self._substeps = self.simulator.substeps(theta, unpack_state(self.structure, at.s), self.step)
+        return self._substeps

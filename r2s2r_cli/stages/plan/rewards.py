@@ -1,0 +1,98 @@
+"""What a gait is rewarded for, of what came of it; and rewards that users bring along."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from importlib.metadata import entry_points
+
+import numpy as np
+
+from r2s2r_cli.errors import UsageError
+
+ENTRY_POINTS = "r2s2r.rewards"
+"""Group of entry points in which other packages offer rewards."""
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """What came of gaits, one a row, in the frame of their start: x along the principal axis, y forward, z up.
+
+    com: displacement of the centre of mass [m], (B, 3). turn: of the principal axis about the vertical [rad], counter-
+    clockwise positive, (B,). element: symmetry that the robot has undergone, (B,). error: distance of the last pose
+    from the rest pose [m], (B,). duration: [s], (B,). switched: cables that a target changes, summed, (B,).
+    """
+
+    com: np.ndarray
+    turn: np.ndarray
+    element: np.ndarray
+    error: np.ndarray
+    duration: np.ndarray
+    switched: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.turn)
+
+    def take(self, rows: np.ndarray) -> Outcomes:
+        """The same for some rows."""
+        return Outcomes(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
+
+
+Reward = Callable[[Outcomes], np.ndarray]
+
+BEHAVIOURS: dict[str, Reward] = {
+    "forward": lambda outcome: outcome.com[:, 1],
+    "backward": lambda outcome: -outcome.com[:, 1],
+    "clockwise": lambda outcome: -outcome.turn,
+    "counterclockwise": lambda outcome: outcome.turn,
+}
+"""The four of the paper, section "Developing Policies with Symmetry Reduction": [m] and [rad]."""
+
+
+def joined(parts: list[Outcomes]) -> Outcomes:
+    """Outcomes one after the other."""
+    return Outcomes(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Outcomes)})
+
+
+def reward_named(name: str) -> Reward:
+    """A behaviour of the paper, an entry point of group `r2s2r.rewards`, or `package.module:function`.
+
+    Raises UsageError for a name that leads nowhere, or to something that is no function.
+    """
+    if name in BEHAVIOURS:
+        return BEHAVIOURS[name]
+    found = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
+    module, colon, attribute = name.partition(":")
+    try:
+        if name in found:
+            made = found[name].load()
+        elif colon:
+            made = getattr(importlib.import_module(module), attribute)
+        else:
+            raise UsageError(
+                "there is no such behaviour", where="--behaviour",
+                expected=" | ".join([*BEHAVIOURS, *found, "package.module:function"]), received=name,
+                hint="r2s2r plan --behaviour forward",
+            )  # fmt: skip
+    except (ImportError, AttributeError) as error:
+        raise UsageError("the reward cannot be loaded", where=f"--behaviour {name}", received=str(error),
+                         expected="package.module:function that Python can import",
+                         hint="r2s2r plan --behaviour forward") from error  # fmt: skip
+    if not callable(made):
+        raise UsageError("the reward is no function", where=f"--behaviour {name}", expected="a function of Outcomes",
+                         received=type(made).__name__, hint="r2s2r plan --behaviour forward")  # fmt: skip
+    checked: Reward = _checked(name, made)
+    return checked
+
+
+def _checked(name: str, function: Reward) -> Reward:
+    def reward(outcome: Outcomes) -> np.ndarray:
+        value = np.asarray(function(outcome), dtype=float)
+        if value.shape != (len(outcome),) or not np.isfinite(value).all():
+            raise UsageError("the reward gives no number for every gait", where=f"--behaviour {name}",
+                             expected=f"{len(outcome)} finite numbers", received=f"shape {value.shape}",
+                             hint="see docs/guides/plan.md for an example")  # fmt: skip
+        return value
+
+    return reward

@@ -1,0 +1,98 @@
+"""Gaits judged over what is not known: the simulator's numbers, and the pose that the robot starts from.
+
+The score is mean minus so many standard deviations of the reward over all pairs of drawn numbers and start poses; a gait
+that gives a target up, or does not come back to rest, has earned nothing there. A gait that works in one simulator only
+loses to one that works in all of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.stages.plan.executor import Executor, Standing
+from r2s2r_cli.stages.plan.gaits import Gait, run_gaits
+from r2s2r_cli.stages.plan.placement import Reference
+from r2s2r_cli.stages.plan.rewards import Outcomes, Reward
+from schemas.robot import Robot
+
+
+@dataclass(frozen=True)
+class Primitive:
+    """A gait and what it is worth for one behaviour. nominal: reward with the best numbers from the rest pose; mean, sd:
+    over all pairs; score: mean - spread x sd; worked: share of the pairs in which it came back to rest.
+
+    move: (3,) shift [m] of the centre of mass over the ground in the frame of the start and turn [rad] of the principal
+    axis, means where it worked and ended on its usual triangle; move_sd: (3,) their standard deviations; element: that
+    triangle's symmetry; same_element: its share of the pairs that worked; duration: mean [s].
+    """
+
+    name: str
+    behaviour: str
+    gait: Gait
+    nominal: float
+    mean: float
+    sd: float
+    score: float
+    worked: float
+    move: np.ndarray
+    move_sd: np.ndarray
+    element: int
+    same_element: float
+    duration: float
+
+
+def start_poses(executor: Executor, robot: Robot, starts: int, generator: np.random.Generator) -> Standing:
+    """Rested robots, every draw from `starts` poses, draw by draw: the first with all cables at their rest lengths, the
+    others where the controller may leave them (done within its tolerance, reached from the short side)."""
+    p_WE = np.array(robot.rest_caps_m)
+    ends = np.array([cable.caps for cable in robot.cables])
+    length = np.linalg.norm(p_WE[ends[:, 1]] - p_WE[ends[:, 0]], axis=-1)
+    lengths = np.tile(length, (starts, 1))
+    short = robot.pid.tolerance * robot.pid.range_m
+    lengths[1:, list(robot.actuated)] -= short * generator.random((starts - 1, len(robot.actuated)))
+    pairs = len(executor) * starts
+    return executor.standing(
+        np.repeat(p_WE[None], pairs, axis=0), np.repeat(np.arange(len(executor)), starts),
+        np.tile(lengths, (len(executor), 1)),
+    )  # fmt: skip
+
+
+def judged(
+    executor: Executor, reference: Reference, pairs: Standing, gaits: list[Gait], rows: np.ndarray | None = None
+) -> list[tuple[Outcomes, np.ndarray]]:
+    """Every gait from every robot of `pairs` (or those rows), all in one call a length: outcomes and whether it came
+    back to rest, one entry a gait. Rest is what `Reference.place` finds near the rest pose."""
+    which = np.arange(len(pairs)) if rows is None else rows
+    every = [gait for gait in gaits for _ in which]
+    came, sound = run_gaits(executor, reference, pairs, every, np.tile(which, len(gaits)))
+    size = len(which)
+    return [
+        (came.take(np.arange(k * size, (k + 1) * size)), sound[k * size : (k + 1) * size]) for k in range(len(gaits))
+    ]
+
+
+def earned(reward: Reward, came: Outcomes, good: np.ndarray) -> np.ndarray:
+    """Rewards (B,), 0 where the gait did not come back to rest."""
+    value = np.zeros(len(came))
+    if good.any():
+        value[good] = reward(came.take(np.flatnonzero(good)))
+    return value
+
+
+def primitive(
+    name: str, behaviour: str, reward: Reward, gait: Gait, came: Outcomes, good: np.ndarray, *, spread: float
+) -> Primitive:
+    """What a gait is worth, of its outcomes over all pairs; the first pair is the best numbers from the rest pose."""
+    value = earned(reward, came, good)
+    mean, sd = float(value.mean()), float(value.std())
+    elements = came.element[good] if good.any() else came.element[:1]
+    usual = int(np.bincount(elements).argmax())
+    of = good & (came.element == usual)
+    shown = came.take(np.flatnonzero(of) if of.any() else np.arange(1))
+    moves = np.column_stack([shown.com[:, :2], shown.turn])
+    return Primitive(
+        name, behaviour, gait, float(value[0]), mean, sd, mean - spread * sd, float(good.mean()), moves.mean(axis=0),
+        moves.std(axis=0), usual, float((elements == usual).mean()), float(shown.duration.mean()),
+    )  # fmt: skip

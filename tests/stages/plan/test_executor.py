@@ -1,0 +1,71 @@
+"""Many policies at once do what the engine's closed loop does with each of them alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from r2s2r_cli.engine.closed_loop import closed_loop
+from r2s2r_cli.engine.flat import pack_state, unpack_state
+from r2s2r_cli.engine.link import Link
+from r2s2r_cli.stages.identify.free.base import values_of
+from r2s2r_cli.stages.identify.free.catalogue import entries
+from r2s2r_cli.stages.plan.belief import Belief, assumed
+from r2s2r_cli.stages.plan.executor import Executor
+from tests.support.robots import subject
+
+
+def executor(belief: Belief, draws: np.ndarray, timeout_s: float = 6.0) -> Executor:
+    """The paper's robot with drawn numbers."""
+    made = Executor(subject().robot, belief, draws, step=1e-3, timeout_s=timeout_s)
+    made.simulator = subject().simulator if made.structure == subject().structure else made.simulator
+    return made
+
+
+def test_a_batch_does_what_the_closed_loop_does_one_by_one() -> None:
+    """Policies of two targets with numbers and a delay of their own: same states at the ends of both targets, same
+    ticks, same targets given up, as the engine's closed loop gives them alone, to rounding."""
+    robot = subject().robot
+    delay = replace(entries(robot)["command_delay"].free, start=0.03)
+    base = assumed(robot)
+    belief = replace(base, frees=(*base.frees, delay), covariance=np.diag([0.01] * len(base.frees) + [1e-3]) ** 2)
+    draws = belief.draws(3, np.random.default_rng(1))
+    assert len(set(draws[:, 0])) == 3 and np.allclose(draws[0], values_of(belief.frees, np.array(
+        [free.to_z(free.start) for free in belief.frees])))  # fmt: skip
+    made = executor(belief, draws, timeout_s=1.3)
+    at = made.standing(np.repeat(subject().p_WE.numpy(), 3, axis=0), np.arange(3))
+    targets = np.array([[[1, 0, 1, 1, 0, 1], [1, 1, 1, 1, 1, 1]], [[0, 0, 0, 0, 0, 0], [1, 1, 0, 1, 1, 1]],
+                        [[1, 1, 1, 1, 1, 0.5], [0, 1, 1, 1, 1, 1]]], dtype=float)  # fmt: skip
+    run = made.run(at, targets)
+    for k in range(3):
+        theta = made.theta.map(lambda x, k=k: x[k : k + 1])
+        one = closed_loop(
+            made.simulator, theta, unpack_state(made.structure, at.s[k : k + 1]), made.pid(torch.tensor([k])),
+            torch.as_tensor(targets[k]), torch.zeros(2, dtype=torch.float64),
+            torch.full((2,), 1.3, dtype=torch.float64), link=Link(delay=made.delay[k : k + 1, None]),
+        )  # fmt: skip
+        assert run.given_up[k].tolist() == one.timed_out[0].tolist()
+        index = one.index[0].numpy()
+        for step in range(2):
+            last = int(np.flatnonzero(index == step)[-1]) + 1
+            assert run.ticks[k, step] == last
+            flat = pack_state(made.structure, one.trajectory.at(last))
+            assert float((flat - run.ends[step].s[k]).abs().max()) < 1e-9
+    assert run.given_up.any() and not run.given_up.all() and not run.failed.any()
+
+
+def test_two_targets_are_one_after_the_other() -> None:
+    """A run of two targets is a run of the first, and one of the second from where that ended."""
+    made = executor(*(lambda b: (b, b.draws(1, np.random.default_rng(0))))(assumed(subject().robot)))
+    at = made.standing(np.repeat(subject().p_WE.numpy(), 2, axis=0), np.zeros(2, dtype=int))
+    targets = np.array(
+        [[[1, 0, 1, 1, 0, 1], [1, 1, 1, 1, 1, 1]], [[0, 1, 1, 1, 1, 0], [0, 0, 1, 1, 1, 0]]], dtype=float
+    )
+    whole = made.run(at, targets)
+    half = made.run(at, targets[:, :1])
+    rest = made.run(half.ends[0], targets[:, 1:])
+    assert torch.equal(whole.ends[1].s, rest.ends[0].s)
+    assert (whole.ticks[:, 1] == half.ticks[:, 0] + rest.ticks[:, 0]).all()
+    assert whole.sound.all()

@@ -1,4 +1,4 @@
-"""`r2s2r bench`: speeds on this machine, as ratios measured in one run: start-up, the engine, and identification."""
+"""`r2s2r bench`: speeds on this machine, as ratios measured in one run: start-up, engine, tracker, identification."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from r2s2r_cli.commands.bench_engine import engine
+from r2s2r_cli.commands.bench_estimate import estimate
 from r2s2r_cli.commands.bench_identify import identify
 from r2s2r_cli.console import Console
 from r2s2r_cli.options import JsonOption, QuietOption
@@ -40,6 +41,7 @@ def bench() -> None:
 
 
 bench_app.command("engine")(engine)
+bench_app.command("estimate")(estimate)
 bench_app.command("identify")(identify)
 
 

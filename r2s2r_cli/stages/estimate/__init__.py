@@ -37,9 +37,11 @@ def estimate(
 
     pictures: gives the encoded images of a run (`camera_input.py`); without them only runs with observed end caps can
     be estimated. A run that has both is estimated from its end caps. The report of the first estimated run warns of
-    those that were left out. Raises InputError where no run can be estimated, for a run with fewer than five kept frames, of
-    another robot, with numbers that are not finite, or with pictures in which the robot cannot be found; NumericalError
-    where the smoother cannot explain a track.
+    those that were left out.
+
+    Raises InputError where no run can be estimated, for a run with fewer than five kept frames, of another robot, with
+    numbers that are not finite, or with pictures in which the robot cannot be found; NumericalError where the smoother
+    cannot explain a track.
     """
     if recording.kind != "recording" or not recording.runs():
         raise ArtifactError(

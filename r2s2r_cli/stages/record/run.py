@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,6 +63,8 @@ class RunLoop:
         self.targets = len(self._sequence.target)
         self.steps = WireSteps(ticks(self._sequence.hold, period), ticks(self._sequence.timeout, period))
         self.timed_out: list[int] = []
+        self.hindered: dict[int, list[str]] = {}
+        """By target that was given up: which cables were not there, and what they lacked."""
         self._lengths, self._pid, self._robot = Lengths.of(robot), WirePid.of(robot), robot
         self._winched = list(robot.actuated)
         self._interval = OpenInterval()
@@ -143,6 +145,7 @@ class RunLoop:
         changed, gave_up = self.steps.advance(done)
         if gave_up:
             self.timed_out.append(number)
+            self.hindered[number] = _hindered(self._winched, self._pid.position(length) - target, done)
         if changed:
             self._pid.restart()
 
@@ -174,3 +177,12 @@ class RunLoop:
             rate=self.tally.rate, link=self.link.statistics,
             frames=None if pictures is None else pictures.written, frames_lost=0 if pictures is None else pictures.lost,
         )  # fmt: skip
+
+
+def _hindered(cables: Sequence[int], over: np.ndarray, done: np.ndarray) -> list[str]:
+    """Cables that are not done, in words. over: position less target, done: (actuated,)."""
+    return [
+        f"cable {cable} " + ("without reading" if np.isnan(far) else "too long" if far > 0 else "too short")
+        for cable, far, there in zip(cables, over, done, strict=True)
+        if not there
+    ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 
@@ -21,6 +21,8 @@ from schemas.robot import Robot
 
 CONTROL_SHARE, CAMERA_SHARE = 0.95, 0.98
 """Of control ticks on time and of frames that were kept: below it the report warns."""
+_NAMED = 6
+"""Targets that were given up which a warning names."""
 _SILENT = 0.02
 """Share of the control ticks without a reading of a sensor beyond which the report warns."""
 
@@ -122,21 +124,26 @@ def _report(loop: RunLoop, pictures: Pictures | None, ended: str) -> RecordRun:
         silent_share=tuple((tally.silent / max(1, tally.ticks)).tolist()), voltage_first_v=tally.voltage_first,
         voltage_last_v=tally.voltage_last, camera=camera,
     )  # fmt: skip
-    warnings = _warnings(done, tally.doubts, stops_by_itself=loop.link.facts.watchdog is not None)
+    warnings = _warnings(done, loop, stops_by_itself=loop.link.facts.watchdog is not None)
     return done.model_copy(update={"warnings": tuple(warnings)})
 
 
-def _warnings(run: RecordRun, doubts: Mapping[str, int], *, stops_by_itself: bool) -> list[str]:
+def _warnings(run: RecordRun, loop: RunLoop, *, stops_by_itself: bool) -> list[str]:
     found = []
     if not run.complete:
         left = "" if stops_by_itself else "; the protocol cannot guarantee that the motors stopped"
         found.append(f"ended at target {run.targets_done + 1} of {run.targets}: {run.ended}{left}")
     if run.timed_out:
-        numbers = ", ".join(map(str, run.timed_out))
-        found.append(f"targets given up after their time-out, not all cables were done: {numbers}")
+        targets = "; ".join(f"{number} ({', '.join(loop.hindered[number])})" for number in run.timed_out[:_NAMED])
+        more = len(run.timed_out) - _NAMED
+        found.append(
+            f"{len(run.timed_out)} of {run.targets} targets given up after their time-out: {targets}"
+            + (f"; and {more} more" if more > 0 else "")
+            + ". A cable that stays too short is held by the others (it is slack), one that stays too long by its load"
+        )
     if run.late > (1 - CONTROL_SHARE) * max(run.ticks, 1):
         found.append(f"{run.late} of {run.ticks} control ticks came more than half a period late")
-    found += [f"the motors were held for {count} control ticks: {why}" for why, count in doubts.items()]
+    found += [f"the motors were held for {count} control ticks: {why}" for why, count in loop.tally.doubts.items()]
     if run.lost:
         found.append(f"{run.lost} of {run.lost + run.samples} samples were lost on the way")
     if run.corrupt:

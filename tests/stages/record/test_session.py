@@ -113,7 +113,7 @@ def test_intervals_and_segments_are_those_of_the_commands() -> None:
 
 
 def test_a_target_that_is_out_of_reach_is_given_up_after_its_timeout() -> None:
-    """A motor that does not turn: the run goes on after the time-out, and says which target it was."""
+    """A motor that does not turn: the run goes on after the time-out, and says which target and which cable it was."""
     robot = calibrated()
     link = FakeLink(robot)
     full = link.command
@@ -122,7 +122,8 @@ def test_a_target_that_is_out_of_reach_is_given_up_after_its_timeout() -> None:
     assert session.runs[0].timed_out == (1,)
     t_first, t_last = rows.column("runs/gait/intervals", "t_first"), rows.column("runs/gait/intervals", "t_last")
     assert t_last[0] - t_first[0] == pytest.approx(2.0 - link.period, abs=1e-6)
-    assert any("given up" in text for text in session.runs[0].warnings)
+    said = f"1 of 2 targets given up after their time-out: 1 (cable {robot.actuated[2]} too long)."
+    assert session.runs[0].warnings[0].startswith(said)
 
 
 def test_commands_and_transitions_are_those_of_the_engine_s_controller() -> None:
@@ -225,6 +226,7 @@ def test_a_sensor_at_0_20_pf_moves_no_motor() -> None:
     motor = list(robot.actuated).index(robot.sensors[0].cable)
     assert not rows.column("runs/gait/commands", "control")[:, motor].any()
     assert session.runs[0].timed_out == (1,) and session.runs[0].silent_share[0] == 1.0
+    assert f"cable {robot.sensors[0].cable} without reading" in session.runs[0].warnings[0]
     assert np.all(rows.column("runs/gait/sensors", "capacitance")[:, 0] == 0.20e-12)
 
 

@@ -16,7 +16,7 @@ from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
 from r2s2r_cli.stages.identify.residuals import CapResiduals
 from r2s2r_cli.stages.identify.settled import settle, solution_at, spread_of
-from r2s2r_cli.stages.identify.solve.found_twice import Begin, cool_growing
+from r2s2r_cli.stages.identify.solve.found_twice import CHANCES, MANY_CHANCES, Begin, cool_growing
 from r2s2r_cli.stages.identify.solve.horizon import Limits, solve_growing
 from r2s2r_cli.stages.identify.solve.levenberg import levenberg_marquardt
 from r2s2r_cli.stages.identify.solve.loss import LOSSES
@@ -155,7 +155,8 @@ def first_round(
         led = Begin(solution.z, solution.normal, min(smooth, len(stages) - 1))
         anew = Begin(started(problem, values), wide_about(problem, cooling), min(1, len(stages) - 1))
         hear = None if progress is None else partial(_heard, progress, names, cooling.generations)
-        ways = cool_growing(stages, [led, anew], loss=loss, seed=seed, cooling=cooling, told=hear)
+        chances = CHANCES if problem.offsets == 0 else MANY_CHANCES
+        ways = cool_growing(stages, [led, anew], loss=loss, seed=seed, cooling=cooling, chances=chances, told=hear)
         return _settled(problem, ways.best, recipe, seed, cooling.generations, ways.others)
     if problem.misfit(solution.z) < EXACT:
         # The model explains the data to their noise: no filter knows these start states as well as the fit does.

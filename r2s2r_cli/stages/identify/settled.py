@@ -10,12 +10,17 @@ import numpy as np
 from r2s2r_cli.stages.identify.residuals import CapResiduals
 from r2s2r_cli.stages.identify.solve.linearised import cost_of
 from r2s2r_cli.stages.identify.solve.loss import Loss
-from r2s2r_cli.stages.identify.solve.population import Cooled
+from r2s2r_cli.stages.identify.solve.population import Cooled, moving_of
 from r2s2r_cli.stages.identify.solve.problem import Evaluation
 from r2s2r_cli.stages.identify.solve.record import Counts, Reason, Solution, names_on_bound
 from r2s2r_cli.stages.identify.trust.covariance import Covariance, covariance
+from r2s2r_cli.stages.identify.trust.perturbed import perturbed
 from r2s2r_cli.stages.identify.trust.posterior import posterior
 
+MOST_UNKNOWNS = 16
+"""With more, hardly any candidate drawn from a normal distribution counts by its weight."""
+ROUNDING = 1e-10
+"""Of a normal matrix with a diagonal of ones, ten thousand times that of its eigenvalues."""
 AS_GOOD = 1.0
 """[nats per parameter, noise counted with the misfit] The mean of the posterior is taken where it costs no more than
 that above the best candidate: it is the better estimate, unless it lies between two minima."""
@@ -35,25 +40,35 @@ def settle(
 ) -> Settled:
     """generations: that were allowed. others: unknowns where other ways ended that are about as good.
 
-    Ends of ways show where else the best may lie: their scatter comes to what was drawn about the best, and, with too
-    many unknowns to draw for, to the curvature that the population saw, as flat as its last draw was rough. Raises
-    NumericalError where the mean cannot be simulated.
+    Candidates about the best say how far it may lie, by their weights, or with many unknowns by fits of perturbed
+    observations. Ends of ways show where else it may lie: their scatter comes to that, and so does how far the mean of
+    the candidates is from what is reported. Raises NumericalError where the mean cannot be simulated.
     """
     own = solution_at(problem, cooled.z, cooled, loss, generations)
     inflation = spread_of(problem, own, loss).inflation
-    narrow = np.linalg.inv(cooled.normal)
-    found = posterior(problem, cooled.z, narrow, loss=loss, temperature=inflation, seed=seed)
-    off = np.array([cooled.z, *others]) - np.mean([cooled.z, *others], axis=0)
-    scatter = off.T @ off / max(len(others), 1)
-    if found is None:
-        return Settled(own, inflation * max(cooled.rough, 1.0) * narrow + scatter)
+    moving = moving_of(problem)
+    narrow = np.zeros_like(cooled.normal)
+    narrow[np.ix_(moving, moving)] = _inverse(cooled.normal[np.ix_(moving, moving)])
+    if not len(moving):
+        return Settled(own, narrow)
+    look = posterior if len(moving) <= MOST_UNKNOWNS else perturbed
+    found = look(problem, cooled.z, narrow, loss=loss, temperature=inflation, seed=seed)
     best = cooled.z if cooled.cost <= found.cost else found.best
     lowest = min(cooled.cost, found.cost)
     mean = np.clip(found.mean, problem.lower, problem.upper)
-    at_mean = solution_at(problem, mean, cooled, loss, generations)
-    if at_mean.cost <= lowest + AS_GOOD * inflation * len(problem.names):
-        return Settled(at_mean, found.covariance + scatter)
-    return Settled(solution_at(problem, best, cooled, loss, generations), found.covariance + scatter)
+    solution = solution_at(problem, mean, cooled, loss, generations)
+    if solution.cost > lowest + AS_GOOD * inflation * len(problem.names):
+        solution = solution_at(problem, best, cooled, loss, generations)
+    ends = np.array([cooled.z, *others]) - np.mean([cooled.z, *others], axis=0)
+    off = found.mean - solution.z
+    return Settled(solution, found.covariance + ends.T @ ends / max(len(others), 1) + np.outer(off, off))
+
+
+def _inverse(normal: np.ndarray) -> np.ndarray:
+    """Of a normal matrix (n, n), scaled by its diagonal: rounding does not leave it indefinite."""
+    size = np.sqrt(np.diag(normal))
+    found = np.linalg.inv(normal / np.outer(size, size) + ROUNDING * np.eye(len(normal))) / np.outer(size, size)
+    return np.asarray(0.5 * (found + found.T))
 
 
 def spread_of(problem: CapResiduals, solution: Solution, loss: Loss, drawn: np.ndarray | None = None) -> Covariance:

@@ -24,12 +24,14 @@ MORE = 16
 """Candidates more in a generation of a later way: the problem has shown that it is not easy."""
 CHANCES = 6
 """Ways, at most."""
+MANY_CHANCES = 10
+"""The same with many unknowns, as those of a start."""
 
 
 @dataclass(frozen=True)
 class Ways:
-    """best: where the best way ended. others: unknowns (n,) at the ends of those that are about as good. costs: of all
-    ways at the end."""
+    """best: where the best way ended. others: unknowns (n,) at the ends of those that are about as good; where none is,
+    of the next best: nothing shows then that the best is right. costs: of all ways at the end."""
 
     best: Cooled
     others: tuple[np.ndarray, ...]
@@ -38,7 +40,7 @@ class Ways:
     @property
     def twice(self) -> bool:
         """Whether a second way ended at about the best cost."""
-        return bool(self.others)
+        return len(self.costs) > 1 and sorted(self.costs)[1] < self.best.cost + AGREE
 
 
 @dataclass(frozen=True)
@@ -79,9 +81,9 @@ def cool_growing(
             at = cool(stages[number], z, curvature, loss=loss, seed=own_seed, cooling=own, told=heard)
             z, curvature = at.z, at.normal
         ends.append(at)
-        best = min(ends, key=lambda one: one.cost)
-        others = tuple(one.z for one in ends if one is not best and one.cost < best.cost + AGREE)
-        ways = Ways(best, others, tuple(one.cost for one in ends))
+        best, *rest = sorted(ends, key=lambda one: one.cost)
+        close = [one for one in rest if one.cost < best.cost + AGREE] or rest[:1]
+        ways = Ways(best, tuple(one.z for one in close), tuple(one.cost for one in ends))
         easy = chance == 0 and at.generations <= EASY and at.rough <= ROUGH
         if easy or ways.twice:
             break

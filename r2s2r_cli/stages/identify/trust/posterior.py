@@ -20,8 +20,6 @@ ENOUGH = 20.0
 """Candidates that count (effective sample size)."""
 KEPT = 0.4
 """Share of the first covariance in those drawn from: few candidates must not make the next draw too narrow."""
-MOST_UNKNOWNS = 16
-"""With more, hardly any candidate drawn from a normal distribution counts."""
 
 
 @dataclass(frozen=True)
@@ -39,16 +37,14 @@ class Posterior:
 
 def posterior(
     problem: Population, z: np.ndarray, covariance: np.ndarray, *, loss: Loss, temperature: float = 1.0, seed: int = 0
-) -> Posterior | None:
+) -> Posterior:
     """Mean and covariance of the likelihood raised to the power 1 / temperature, times the priors, about z (n,) with
-    about this covariance (n, n). None for more than `MOST_UNKNOWNS` that move: there curvature has to do.
+    about this covariance (n, n). For unknowns, at least one, that are not many: or hardly any candidate counts.
 
     temperature: variance of the residuals over that of the noise as given, which makes a misfit count as noise.
     """
     moving = moving_of(problem)
     n = len(moving)
-    if not n or n > MOST_UNKNOWNS:
-        return None
     rng = np.random.default_rng([seed, n, 7])
     first = covariance[np.ix_(moving, moving)] * temperature
     middle, about = z[moving], first

@@ -89,7 +89,14 @@ class ArtifactSpec(Frozen):
     filename: str
     """Name inside the iteration directory or the project (`20-estimate.h5`)."""
     level: Literal["iteration", "project"]
+    executed: str | None = None
+    """Name of the second artifact of this kind in an iteration, that of the executed plan (`51-estimate.h5`)."""
     groups: tuple[GroupSpec, ...]
+
+    @property
+    def filenames(self) -> tuple[str, ...]:
+        """All names that artifacts of this kind have."""
+        return (self.filename,) if self.executed is None else (self.filename, self.executed)
 
     def group(self, path: str) -> GroupSpec | None:
         """The specification that a concrete group path falls under, or None."""

@@ -225,6 +225,7 @@ ESTIMATE = ArtifactSpec(
     version=1,
     title="states per frame",
     filename="20-estimate.h5",
+    executed="51-estimate.h5",
     level="iteration",
     groups=(
         RUN,

@@ -100,7 +100,8 @@ def layout_page(specs: Iterable[ArtifactSpec]) -> Iterator[str]:
         yield f"## {spec.kind}, version {spec.version}"
         yield ""
         place = "in the project" if spec.level == "project" else "in each iteration"
-        yield f"{_sentence(spec.title)}. `{spec.filename}` {place}."
+        names = " or, of the executed plan, ".join(f"`{name}`" for name in spec.filenames)
+        yield f"{_sentence(spec.title)}. {names} {place}."
         for group in spec.groups:
             yield from _group(group)
 

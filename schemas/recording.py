@@ -209,6 +209,7 @@ RECORDING = ArtifactSpec(
     version=1,
     title="raw runs",
     filename="10-record.h5",
+    executed="50-execute.h5",
     level="iteration",
     groups=(
         RUN, CAPS, COMMANDS, SENSORS, MOTORS, IMU, LINK, CAMERA, CAMERA_POSE, MOCAP, INTERVALS, SEGMENTS,

@@ -111,7 +111,7 @@ def stage_not_newer(links: Links) -> Iterator[Found]:
 )
 def name_fits_kind(links: Links) -> Iterator[Found]:
     """A recording under the name of an estimate, and the like."""
-    wanted = {spec.filename: spec.kind for spec in KINDS.values()}.get(links.filename)
+    wanted = {name: spec.kind for spec in KINDS.values() for name in spec.filenames}.get(links.filename)
     if wanted is not None and wanted != links.kind:
         yield Found("kind", "the file has the name of another kind", f"{wanted} in {links.filename}", links.kind)
 

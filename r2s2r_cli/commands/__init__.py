@@ -11,6 +11,7 @@ import typer
 
 from r2s2r_cli.commands.bench import bench_app
 from r2s2r_cli.commands.calibrate import calibrate
+from r2s2r_cli.commands.compare import compare
 from r2s2r_cli.commands.doctor import doctor_app
 from r2s2r_cli.commands.estimate import estimate
 from r2s2r_cli.commands.export import export
@@ -34,6 +35,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "import": import_,
     "estimate": estimate,
     "identify": identify,
+    "compare": compare,
     "floor": floor,
     "simulate": simulate,
     "rig": rig,

@@ -36,8 +36,10 @@ ROBOT_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
     "calibrate": {"name": (), "rods": ("name", "length_m", "cap_radius_m"), "sensors": ("cable",),
                   "cables": ("caps", "kind", "rest_length_m"), "pid": (), "limits": ()},
     "record": {"name": (), "motors": (), "pid": (), "limits": (), "sensors": ("cable", "slope_f_per_m", "offset_f")},
-    "estimate": {"name": (), "rods": ("length_m", "cap_radius_m"), "cables": ("caps", "kind"),
-                 "sensors": ("cable", "slope_f_per_m", "offset_f")},
+    "estimate": {"name": (), "rods": ("name", "length_m", "cap_radius_m", "radius_m", "parts"), "colors": (),
+                 "cables": ("caps", "kind"), "sensors": ("cable", "slope_f_per_m", "offset_f"), "rest_caps_m": ()},
+    "compare": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),
+                "sensors": ("cable", "stiffness_n_per_m", "rest_length_m"), "rest_caps_m": ()},
     "floor": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "contact": (), "sensors": (),
               "rest_caps_m": ()},
     "simulate": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),
@@ -48,7 +50,7 @@ ROBOT_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
 """Which part of robot.toml each stage uses; a change elsewhere does not make its results stale."""
 
 
-MEASURED = ("record",)
+MEASURED = ("record", "execute")
 """Stages whose artifacts are measurements."""
 
 
@@ -102,12 +104,14 @@ class StageRun(Generic[Report]):
     force: bool = False
     guard: Callable[[Header | None], None] | None = None
     """Raises where the artifact in the way must not be replaced."""
+    executed: bool = False
+    """Of the executed plan: 50-execute.h5, 51-estimate.h5."""
     not_applied: Callable[[Report], list[str]] | None = None
     """Why an artifact that is fresh has not had its effect elsewhere."""
 
     def __post_init__(self) -> None:
         self.inputs = self.find_inputs()
-        self.target = self.project.artifact(self.kind, self.iteration)
+        self.target = self.project.artifact(self.kind, self.iteration, executed=self.executed)
         self.wanted = wanted(self.project, self.iteration, self.stage, self.overrides, self.flags)
 
     def run(

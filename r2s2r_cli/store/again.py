@@ -25,9 +25,12 @@ def command_again(made: Provenance, artifact: Path, *, force: bool = False) -> s
         words += ["--use", flags["use"]] if "use" in flags else []
     elif made.stage == "simulate":
         words += flags.get("policies", ())
-        words += [word for option in ("random", "seed", "from") if flags.get(option) is not None
+        words += [word for option in ("random", "seed", "from", "model") if flags.get(option) is not None
                   for word in (f"--{option}", str(flags[option]))]  # fmt: skip
         words += [word for run in flags.get("replay", ()) for word in ("--replay", run)]
+    elif made.stage == "compare":
+        words += [word for name, path in flags.get("models", {}).items() for word in ("--model", f"{name}={path}")]
+        words += ["--of", flags.get("of", "record")]
     elif made.stage == "floor":
         words += [word for number in flags.get("iterations", ()) for word in ("--iteration", str(number))]
         words += ["--by", flags["by"]] if flags.get("by", "pose") != "pose" else []

@@ -32,9 +32,12 @@ class Iteration:
     number: int
     path: Path
 
-    def artifact(self, kind: str) -> Path:
-        """Where this iteration keeps its artifact of `kind`, written or not."""
-        return self.path / KINDS[kind].filename
+    def artifact(self, kind: str, *, executed: bool = False) -> Path:
+        """Where this iteration keeps its artifact of `kind`, written or not. executed: that of the executed plan."""
+        spec = KINDS[kind]
+        if executed and spec.executed is None:
+            raise ValueError(f"an execution leaves no artifact of kind {kind}")
+        return self.path / (spec.executed if executed and spec.executed else spec.filename)
 
 
 @dataclass(frozen=True)
@@ -109,13 +112,13 @@ class Project:
         raise UsageError(f"iteration {number} does not exist", where="--iteration", expected=f"one of: {known}",
                          received=str(number), hint="r2s2r status")  # fmt: skip
 
-    def artifact(self, kind: str, iteration: Iteration | None) -> Path:
-        """Where the artifact of `kind` lies: in the project, or in the iteration."""
+    def artifact(self, kind: str, iteration: Iteration | None, *, executed: bool = False) -> Path:
+        """Where the artifact of `kind` lies: in the project, or in the iteration. executed: of the executed plan."""
         if KINDS[kind].level == "project":
             return self.root / KINDS[kind].filename
         if iteration is None:
             raise ValueError(f"{kind} belongs to an iteration")
-        return iteration.artifact(kind)
+        return iteration.artifact(kind, executed=executed)
 
     def relative(self, path: Path) -> str:
         """`path` relative to the project, with forward slashes; above it with `../`."""
@@ -145,7 +148,11 @@ class Project:
     def artifacts(self) -> list[Path]:
         """Every artifact that is there, in the order of the data: of the project, then of each iteration."""
         places = [(self.root, "project"), *((iteration.path, "iteration") for iteration in self.iterations())]
-        candidates = [folder / s.filename for folder, level in places for s in KINDS.values() if s.level == level]
+        names = {
+            level: sorted(name for spec in KINDS.values() if spec.level == level for name in spec.filenames)
+            for level in ("project", "iteration")
+        }
+        candidates = [folder / name for folder, level in places for name in names[level]]
         return [path for path in candidates if path.is_file()]
 
     def journals(self) -> list[Path]:

@@ -153,9 +153,34 @@ def floor() -> ArtifactData:
     return ArtifactData("floor", {"caps": caps, "lengths": lengths, "numerics": numerics})
 
 
+def comparison() -> ArtifactData:
+    """One run of two intervals, two simulators: one is off by 1 mm along x, the other could not be simulated."""
+    n, points, caps = 2, 3, 6
+    p_WE = np.linspace(0.0, 0.1, n * points * caps * 3).reshape(n, points, caps, 3)
+    nan = np.full((n, points, caps, 3), np.nan)
+    both = np.stack([p_WE + np.array([1e-3, 0, 0]), nan])
+    by_interval = np.array([[1e-3, 1e-3], [np.nan, np.nan]])
+    whole = np.array([1e-3, np.nan])
+    real = {"target": np.array([[0.0] * 6, [1.0] * 6]), "duration": np.array([1.0, 1.5]), "p_WE_start": p_WE[0, 0],
+            "p_WE": p_WE, "com": p_WE.mean(axis=2)}  # fmt: skip
+    simulated = {
+        "compared": np.array([2, 0]), "trained_on": np.array([False, True]), "p_WE": both, "com": both.mean(axis=3),
+        "duration": np.array([[1.1, 1.4], [np.nan, np.nan]]), "segment_end": by_interval, "gait": by_interval,
+        "keyframe": by_interval, "com_end_error": whole, "heading_end_error": np.array([0.0, np.nan]),
+        "path_error": whole, "cap_rmse": whole,
+    }  # fmt: skip
+    models = {"name": np.array([b"initial", b"iteration 1"]), "words": np.array([b"robot.toml", b"30-identify.h5"]),
+              "srcc_com": np.full(2, np.nan), "srcc_turn": np.full(2, np.nan)}  # fmt: skip
+    return ArtifactData("comparison", {
+        "models": Group(models), "floor": Group(attributes={"com_end": 0.004}),
+        "runs/walk": Group(attributes={"policy": "walk", "robot": "threebar"}), "runs/walk/real": Group(real),
+        "runs/walk/simulated": Group(simulated),
+    })  # fmt: skip
+
+
 BUILDERS: dict[str, Callable[[], ArtifactData]] = {
     "calibration": calibration, "recording": recording, "estimate": estimate, "identification": identification,
-    "policy": policy, "simulation": simulation, "floor": floor,
+    "policy": policy, "simulation": simulation, "comparison": comparison, "floor": floor,
 }  # fmt: skip
 """One builder a kind."""
 

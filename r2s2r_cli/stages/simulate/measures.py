@@ -18,6 +18,15 @@ def com_path(com: np.ndarray) -> float:
 def heading_change(p_WE: np.ndarray) -> float | None:
     """Turn of the mean rod axis about the vertical [rad] over frames (frame, cap, 3) [m], whole turns counted.
 
+    None where it has no direction in the ground plane at some frame.
+    """
+    heading = headings(p_WE)
+    return None if heading is None else float(heading[-1] - heading[0])
+
+
+def headings(p_WE: np.ndarray) -> np.ndarray | None:
+    """Heading of the mean rod axis (frame,) [rad] over frames (frame, cap, 3) [m], whole turns counted.
+
     The mean of the unit axes, even to odd cap: for the 3-bar prism that is the axis it rolls about, and rolling does
     not change it. None where it has no direction in the ground plane at some frame.
     """
@@ -25,8 +34,7 @@ def heading_change(p_WE: np.ndarray) -> float | None:
     mean = (axis / np.linalg.norm(axis, axis=-1, keepdims=True)).mean(axis=1)
     if (np.linalg.norm(mean[:, :2], axis=-1) < UPRIGHT).any():
         return None
-    heading = np.unwrap(np.arctan2(mean[:, 1], mean[:, 0]))
-    return float(heading[-1] - heading[0])
+    return np.asarray(np.unwrap(np.arctan2(mean[:, 1], mean[:, 0])))
 
 
 def penetration(p_WE: np.ndarray, radius: np.ndarray) -> float:

@@ -1,0 +1,121 @@
+"""`r2s2r compare`: real runs beside the same policies in one or several simulators -> 60-compare.h5."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from r2s2r_cli.console import Console
+from r2s2r_cli.options import (
+    DrawOption,
+    DryRunOption,
+    ForceOption,
+    IterationOption,
+    JsonOption,
+    ProjectOption,
+    QuietOption,
+)
+from r2s2r_cli.store.project import Project
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from r2s2r_cli.artifact import ArtifactData
+    from r2s2r_cli.commands.compare_inputs import Asked
+    from schemas.results_compare import CompareReport
+
+
+class Of(StrEnum):
+    """What `--of` takes."""
+
+    RECORD = "record"
+    EXECUTE = "execute"
+
+
+def compare(
+    model: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--model", metavar="[NAME=]FILE",
+            help="A 30-identify.h5; repeatable. Default: all up to this iteration. robot.toml is always there.",
+        ),
+    ] = None,
+    of: Annotated[
+        Of | None,
+        typer.Option("--of", help="Runs of 51-estimate.h5 (execute) or 20-estimate.h5. Default: executed, if any."),
+    ] = None,
+    project: ProjectOption = None,
+    iteration: IterationOption = None,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+    draw: DrawOption = True,
+    dry_run: DryRunOption = False,
+    force: ForceOption = False,
+) -> None:  # fmt: skip
+    """Compare real runs with the same policies in the simulator: ends, headings, paths, caps, times, ranking of gaits.
+
+    Every policy is simulated with the controller in the loop from the real start; key frames are by command replay.
+    Each error stands beside the floor: what a perfect simulator would be found to be wrong by.
+
+    Example: r2s2r compare --iteration 2
+    """
+    from r2s2r_cli.commands.compare_inputs import Asked
+    from r2s2r_cli.commands.stage import StageRun, show_outcome
+    from schemas.results_compare import CompareReport
+
+    console = Console(json=json, quiet=quiet)
+    here = Project.find(project)
+    place = here.iteration(iteration)
+    executed = place.artifact("estimate", executed=True).exists() if of is None else of is Of.EXECUTE
+    asked = Asked(here, place, tuple(model or ()), "execute" if executed else "record")
+    run = StageRun(
+        stage="compare", kind="comparison", project=here, iteration=place, find_inputs=asked.refs,
+        report_model=CompareReport, flags=asked.flags(), dry_run=dry_run, force=force,
+    )  # fmt: skip
+    result, report = run.run(lambda: _compute(asked, console), (lambda data, said: _draw(data, said)) if draw else None)
+    show_outcome(result, console)
+    if report is not None:
+        _show(report, console)
+
+
+def _compute(asked: Asked, console: Console) -> tuple[ArtifactData, CompareReport]:
+    from r2s2r_cli.commands.interrupts import whole_items
+
+    (stage,) = whole_items(_loaded())
+    runs, models = asked.runs(), asked.simulators()
+    settings = asked.project.config(asked.iteration, {}).simulate
+    with console.progress("compare, runs", len(runs) * len(models)) as advance:
+        data, report = stage.compare(
+            runs, models, settings, keyframe_floor_m=asked.keyframe_floor(), cache_dir=asked.project.cache,
+            done=lambda: advance(1),
+        )  # fmt: skip
+    return data, report
+
+
+def _loaded() -> Iterator[Any]:
+    """The stage, with its libraries: compiled modules do not take an exception out of the blue while they load."""
+    import r2s2r_cli.engine  # noqa: F401 - torch, roma, llvmlite
+    import r2s2r_cli.stages.compare as stage
+
+    yield stage
+
+
+def _draw(data: ArtifactData, report: CompareReport) -> Iterator[tuple[str, bytes]]:
+    from r2s2r_cli.views.compare import draw_comparison
+    from r2s2r_cli.views.compare_page import comparison_page
+
+    pictures = dict(draw_comparison(data))
+    for run, png in pictures.items():
+        yield f"-{run}.png", png
+    yield ".html", comparison_page(report, pictures)
+
+
+def _show(report: CompareReport, console: Console) -> None:
+    from r2s2r_cli.views.compare_page import comparison_tables
+
+    for table in comparison_tables(report):
+        console.table(table.title, table.columns, table.rows)
+    for text in report.warnings:
+        console.warn(text)

@@ -1,0 +1,105 @@
+"""How far the robot repeats itself: runs of one policy laid on each other at the start; and the floors that follow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.stages.compare.walk import Walk, same_targets
+from r2s2r_cli.stages.measures.floor import contrast_squares
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Repeats of one policy. com_mean, com_sd (2,): where the centre of mass ended, from where it started, the heading
+    at the start being the x axis [m]; turn_mean, turn_sd: how far it turned [rad], None without a heading;
+    duration_mean, duration_sd [s]. Standard deviations are those of one run, with n - 1."""
+
+    policy: str
+    runs: tuple[str, ...]
+    com_mean: np.ndarray
+    com_sd: np.ndarray
+    turn_mean: float | None
+    turn_sd: float | None
+    duration_mean: float
+    duration_sd: float
+
+
+@dataclass(frozen=True)
+class Floors:
+    """What a perfect simulator would be found to be wrong by, in a single run: root mean square of the repeats about
+    their mean. com [m], heading [rad], segment: duration of an interval [s]. None: nothing repeats."""
+
+    com: float | None = None
+    heading: float | None = None
+    segment: float | None = None
+
+
+def grouped(walks: Mapping[str, Walk], policies: Mapping[str, str]) -> dict[str, list[str]]:
+    """Names of the runs of each policy that at least two runs have and that have the same targets."""
+    found: dict[str, list[str]] = {}
+    for name in walks:
+        group = found.setdefault(policies[name], [])
+        whole = len(walks[name].intervals)
+        if not group or same_targets(walks[group[0]].intervals, walks[name].intervals) == whole == len(
+            walks[group[0]].intervals
+        ):
+            group.append(name)
+    return {policy: runs for policy, runs in found.items() if len(runs) > 1}
+
+
+def repeatability(walks: Mapping[str, Walk], policies: Mapping[str, str]) -> tuple[Repeatability, ...]:
+    """Of every policy with at least two runs."""
+    return tuple(
+        _of(policy, [walks[name] for name in runs], tuple(runs)) for policy, runs in grouped(walks, policies).items()
+    )
+
+
+def floors(walks: Mapping[str, Walk], policies: Mapping[str, str]) -> Floors:
+    """Over all policies with at least two runs; every orthogonal contrast of repeats counts once."""
+    com, turn, segment = [], [], []
+    for runs in grouped(walks, policies).values():
+        group = [walks[name] for name in runs]
+        com.append(contrast_squares(np.array([ended(walk) for walk in group])[:, None, :]))
+        turns = [turned(walk) for walk in group]
+        if all(one is not None for one in turns):
+            turn.append(contrast_squares(np.array(turns, dtype=float)[:, None, None]))
+        lasted = np.array([walk.durations for walk in group])
+        segment.append(contrast_squares(lasted[:, :, None]))
+    return Floors(*(_rms(one) for one in (com, turn, segment)))
+
+
+def ended(walk: Walk) -> np.ndarray:
+    """Where the centre of mass ended (2,) [m], from where it started, along and across the heading at the start.
+
+    Without a heading along the axes of W: runs that started turned differently then differ by more than they repeat.
+    """
+    away = (walk.com[-1] - walk.com[0])[:2]
+    if walk.heading is None:
+        return away
+    c, s = np.cos(walk.heading[0]), np.sin(walk.heading[0])
+    return np.array([c * away[0] + s * away[1], -s * away[0] + c * away[1]])
+
+
+def turned(walk: Walk) -> float | None:
+    """How far it turned from the first frame to the last [rad], whole turns counted."""
+    return None if walk.heading is None else float(walk.heading[-1] - walk.heading[0])
+
+
+def _of(policy: str, group: Sequence[Walk], runs: tuple[str, ...]) -> Repeatability:
+    ends = np.array([ended(walk) for walk in group])
+    turns = [turned(walk) for walk in group]
+    known = np.array([one for one in turns if one is not None])
+    whole = len(known) == len(group)
+    lasted = np.array([walk.durations.sum() for walk in group])
+    return Repeatability(
+        policy, runs, ends.mean(axis=0), ends.std(axis=0, ddof=1),
+        float(known.mean()) if whole else None, float(known.std(ddof=1)) if whole else None,
+        float(lasted.mean()), float(lasted.std(ddof=1)),
+    )  # fmt: skip
+
+
+def _rms(squares: list[np.ndarray]) -> float | None:
+    return float(np.sqrt(np.concatenate(squares).mean())) if squares else None

@@ -1,0 +1,110 @@
+"""Real runs to compare with: what an estimate says of them, and the policy that they executed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.calibrate.masses import mass_properties
+from r2s2r_cli.stages.compare.walk import Walk
+from r2s2r_cli.stages.identify.data import RunData
+from r2s2r_cli.stages.identify.load import run_data
+from r2s2r_cli.stages.record.plan import with_rest
+from r2s2r_cli.stages.segments import Intervals
+from r2s2r_cli.stages.simulate.policies import Sequence as Targets, sequence, stored_policies
+from schemas.robot import Robot
+
+
+@dataclass(frozen=True)
+class RealRun:
+    """One executed policy. walk: smoothed. targets: what the controller was given, rest before and after included.
+    data: what a replay of its commands needs; None where the motor commands were not logged."""
+
+    name: str
+    policy: str
+    walk: Walk
+    targets: Targets
+    data: RunData | None
+
+
+def real_runs(estimate: ArtifactData, recording: ArtifactData | None, robot: Robot) -> tuple[RealRun, ...]:
+    """All runs of an estimate. Raises InputError where there is none, or one that allows no comparison."""
+    found = tuple(_run(estimate, recording, run, robot) for run in estimate.runs())
+    if not found:
+        raise InputError("there is no run to compare with", where="estimate", expected="at least one estimated run",
+                         received="none", hint="r2s2r estimate")  # fmt: skip
+    return found
+
+
+def cap_shares(robot: Robot) -> np.ndarray:
+    """Share of the robot's mass that stands at each cap, (cap,): the lever rule along each rod."""
+    bodies = [mass_properties(rod.parts) for rod in robot.rods]
+    mass = np.array([body.mass for body in bodies])
+    odd = np.array([0.5 + body.com / rod.length_m for body, rod in zip(bodies, robot.rods, strict=True)])
+    return np.asarray((np.stack([1 - odd, odd], axis=1) * mass[:, None]).reshape(-1) / mass.sum())
+
+
+def _run(estimate: ArtifactData, recording: ArtifactData | None, run: str, robot: Robot) -> RealRun:
+    groups = dict(estimate.streams(run))
+    told = str(groups[""].attributes.get("robot", robot.name))
+    if told != robot.name:
+        raise InputError(f"run {run} is of another robot", where=f"runs/{run}", expected=robot.name, received=told,
+                         hint="compare in the project of the robot that was recorded")  # fmt: skip
+    frames = groups["frames"]
+    intervals = _intervals(groups, run, frames)
+    return RealRun(
+        name=run, policy=_policy(groups[""], run),
+        walk=Walk(frames["t"], frames["p_WE"], cap_shares(robot), intervals),
+        targets=_targets(estimate, recording, run, intervals, robot),
+        data=_data(estimate, recording, run),
+    )  # fmt: skip
+
+
+def _intervals(groups: dict[str, Group], run: str, frames: Group) -> Intervals:
+    """The complete intervals from the first on. Raises InputError where there are fewer than two: no gait."""
+    held = groups.get("intervals")
+    whole = Intervals.from_group(held) if held is not None else None
+    count = 0 if whole is None else int(np.argmin(np.append(whole.complete, False)))
+    if whole is None or count < 2:
+        raise InputError(
+            f"run {run} has no gait to compare", where=f"runs/{run}/intervals",
+            expected="at least two complete target intervals", received=f"{count} of {len(frames['t'])} frames",
+            hint="r2s2r record gait.toml --port ...",
+        )  # fmt: skip
+    return Intervals(**{name: value[:count] for name, value in vars(whole).items()})
+
+
+def _policy(root: Group, run: str) -> str:
+    """Name of the policy: that of the run without the number of its repeat."""
+    repeat = root.attributes.get("repeat")
+    return run.removesuffix(f"-{repeat}") if repeat is not None else run
+
+
+def _targets(
+    estimate: ArtifactData, recording: ArtifactData | None, run: str, intervals: Intervals, robot: Robot
+) -> Targets:
+    """Of the policy that the run names, with its holds and the rest round it; of a log the targets that it shows."""
+    for data in (recording, estimate):
+        group = None if data is None else data.group(run, "policy")
+        if data is not None and group is not None:
+            policy = sequence(stored_policies(data)[run], robot)
+            rest = float(data.groups[f"runs/{run}"].attributes.get("rest", 0.0))
+            return with_rest(policy, rest=rest, timeout=robot.pid.step_timeout_s)
+    none = np.zeros(len(intervals))
+    return Targets(intervals.target, none, none + robot.pid.step_timeout_s)
+
+
+def _data(estimate: ArtifactData, recording: ArtifactData | None, run: str) -> RunData | None:
+    try:
+        return run_data(recording, estimate, run)
+    except InputError:
+        return None  # without motor commands there is nothing to replay; the closed loop is compared
+
+
+def policies_of(runs: Sequence[RealRun]) -> dict[str, str]:
+    """Policy of each run by its name."""
+    return {run.name: run.policy for run in runs}

@@ -1,0 +1,124 @@
+"""What a comparison measures, on motions whose errors are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.stages.compare.errors import run_errors
+from r2s2r_cli.stages.compare.ranking import LEAST, ranking
+from r2s2r_cli.stages.compare.repeats import ended, floors, repeatability, turned
+from r2s2r_cli.stages.compare.walk import Walk, same_targets
+from r2s2r_cli.stages.measures.align import PlanarMove
+from r2s2r_cli.stages.segments import Intervals
+
+PRISM = np.array([[-0.15, 0.0, 0.02], [0.15, 0.02, 0.1], [-0.16, 0.1, 0.02], [0.14, 0.12, 0.02], [-0.14, 0.05, 0.12],
+                  [0.16, 0.04, 0.11]])  # fmt: skip
+SHARE = np.full(6, 1 / 6)
+
+
+def walk(speed: float = 0.1, turn: float = 0.0, pace: float = 1.0, move: PlanarMove | None = None) -> Walk:
+    """Two intervals of a rigid robot that goes along x at `speed` [m/s] and turns at `turn` [rad/s] about its middle;
+    pace: how fast it goes through the same motion; move: where it stands and looks."""
+    t = np.linspace(0.0, 2.0 / pace, 201)
+    s = t * pace
+    middle = PRISM.mean(axis=0)
+    p = np.empty((len(t), 6, 3))
+    for k, at in enumerate(s):
+        p[k] = PlanarMove(turn * at, np.zeros(3)).turn(PRISM - middle) + middle + [speed * at, 0, 0]
+    p = p if move is None else move.move(p)
+    first, last = np.array([0, 100]), np.array([99, 200])
+    target = np.array([[0.0] * 6, [1.0] * 6])
+    return Walk(t, p, SHARE, Intervals(first, last, t[first], t[last], target, np.array([True, True])))
+
+
+def test_a_perfect_simulator_has_no_error_wherever_the_robot_stood() -> None:
+    """Place and heading of the start drop out."""
+    errors = run_errors(walk(turn=0.3), walk(turn=0.3, move=PlanarMove(1.2, np.array([0.4, -0.3, 0.0]))))
+    assert errors.com_end == pytest.approx(0.0, abs=1e-12)
+    assert errors.heading_end == pytest.approx(0.0, abs=1e-12)
+    assert errors.path == pytest.approx(0.0, abs=1e-12)
+    assert errors.cap == pytest.approx(0.0, abs=1e-12)
+    assert errors.gait == pytest.approx(0.0, abs=1e-12)
+
+
+def test_another_pace_is_an_error_of_time_and_of_nothing_else() -> None:
+    """Runs are compared at equal shares of each interval, as the key frames of the paper are."""
+    errors = run_errors(walk(), walk(pace=0.8))
+    assert errors.cap == pytest.approx(0.0, abs=1e-9)
+    assert errors.duration_real == pytest.approx([1.0, 1.0])
+    assert errors.duration_sim == pytest.approx([1.25, 1.25])
+
+
+def test_a_slower_walk_is_short_by_what_it_did_not_walk() -> None:
+    """0.1 against 0.08 m/s for 2 s: 40 mm at the end, of which each interval adds 20 (its first frame to its end)."""
+    errors = run_errors(walk(0.1), walk(0.08))
+    assert errors.com_end == pytest.approx(0.04)
+    assert errors.segment_end == pytest.approx([0.02, 0.04])
+    assert errors.gait == pytest.approx([0.02, 0.02])
+    shares = np.arange(1, 41) / 40
+    assert errors.path == pytest.approx(0.04 * np.sqrt(np.mean(shares**2)))
+    assert errors.heading_end == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_turn_counts_whole_turns() -> None:
+    """More than one turn apart is more than 2 pi, not its remainder."""
+    errors = run_errors(walk(turn=0.5), walk(turn=4.0))
+    assert errors.heading_end == pytest.approx(7.0)
+
+
+def test_runs_with_other_intervals_are_refused() -> None:
+    """One would be read for the other."""
+    with pytest.raises(ValueError, match="intervals"):
+        run_errors(walk(), walk().first(1))
+
+
+def test_same_targets_counts_from_the_first() -> None:
+    """Until the first that differs; a shorter one ends it."""
+    one = walk().intervals
+    other = Intervals(**{**vars(one), "target": np.array([[0.0] * 6, [0.5] * 6])})
+    assert same_targets(one, one) == 2
+    assert same_targets(one, other) == 1
+    assert same_targets(one, walk().first(1).intervals) == 1
+
+
+def test_ends_do_not_depend_on_where_the_robot_started() -> None:
+    """Along and across its heading at the start."""
+    plain = ended(walk(turn=0.2))
+    moved = ended(walk(turn=0.2, move=PlanarMove(-2.0, np.array([1.0, 2.0, 0.0]))))
+    assert moved == pytest.approx(plain)
+    assert turned(walk(turn=0.2)) == pytest.approx(0.4)
+
+
+def test_repeatability_and_floor_are_those_of_the_scatter() -> None:
+    """Speeds 0.09, 0.10, 0.11 m/s: 20 mm apart at the end, so sd 20 mm, and the floor is the sd of a single run."""
+    walks = {f"run-{k}": walk(0.1 + 0.01 * k) for k in (-1, 0, 1)}
+    policies = dict.fromkeys(walks, "run")
+    (one,) = repeatability(walks, policies)
+    along = np.linalg.norm(one.com_sd)
+    assert along == pytest.approx(0.02)
+    assert np.linalg.norm(one.com_mean) == pytest.approx(0.2)
+    assert floors(walks, policies).com == pytest.approx(0.02)
+    assert floors(walks, policies).heading == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_single_run_has_no_floor() -> None:
+    """Nothing repeats: nothing is claimed."""
+    assert floors({"run": walk()}, {"run": "run"}).com is None
+    assert repeatability({"run": walk()}, {"run": "run"}) == ()
+
+
+def test_ranking_is_of_order_and_not_of_size() -> None:
+    """A simulator that doubles every way ranks perfectly; one that turns the order round has -1."""
+    speeds = {"a": 0.02, "b": 0.05, "c": 0.08, "d": 0.12}
+    policies = {name: name for name in speeds}
+    real = {name: walk(v, turn=v) for name, v in speeds.items()}
+    doubled = {name: walk(2 * v, turn=2 * v) for name, v in speeds.items()}
+    reverse = {name: walk(0.2 - v, turn=-v) for name, v in speeds.items()}
+    good, bad = ranking(real, doubled, policies), ranking(real, reverse, policies)
+    assert good is not None
+    assert bad is not None
+    assert (good.com, good.turn) == pytest.approx((1.0, 1.0))
+    assert (bad.com, bad.turn) == pytest.approx((-1.0, -1.0))
+    few = dict(list(real.items())[: LEAST - 1])
+    assert ranking(few, few, policies) is None

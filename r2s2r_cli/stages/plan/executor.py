@@ -6,6 +6,7 @@ environments that end at different times. This is the same loop, tick by tick; f
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +22,7 @@ from schemas.robot import Robot
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from r2s2r_cli.engine import LatchedPid
+    from r2s2r_cli.engine import LatchedPid, Parameters
     from r2s2r_cli.engine.link import DelayLine
 
 CHUNK = 4096
@@ -51,14 +52,46 @@ class Standing:
 
 
 @dataclass(frozen=True)
+class Track:
+    """One environment, tick by tick. s: flat states, the start included, (T + 1, NS); u: commands, (T, actuated);
+    index: number of the target, (T,); done: latched after the tick, (T, actuated)."""
+
+    s: Tensor
+    u: Tensor
+    index: Tensor
+    done: Tensor
+
+
+@dataclass(frozen=True)
 class Executed:
-    """What became of policies of S targets. ends: the robots when each target was left, S of them; ticks: control ticks
-    until then, (B, S); given_up: at its timeout, (B, S); failed: the simulation left the finite numbers, (B,)."""
+    """What became of policies of up to S targets. ends: the robots when each target was left, S of them; ticks: control
+    ticks until then, (B, S); given_up: at its timeout, (B, S); failed: the simulation left the finite numbers, (B,);
+    counts: targets of each, (B,). What lies behind them is the start, and 0. tracks: where they were asked for."""
 
     ends: tuple[Standing, ...]
     ticks: np.ndarray
     given_up: np.ndarray
     failed: np.ndarray
+    counts: np.ndarray
+    tracks: tuple[Track, ...] = ()
+
+    @property
+    def last(self) -> Standing:
+        """The robots when their last target was left."""
+        return self.before_last(0)
+
+    def before_last(self, back: int) -> Standing:
+        """The robots so many targets before their last one was left; each has more targets than that."""
+        import torch
+
+        row, at = torch.arange(len(self.counts)), torch.as_tensor(self.counts - 1 - back)
+        s, line = (torch.stack([getattr(end, name) for end in self.ends])[at, row] for name in ("s", "line"))
+        return Standing(s, line, self.ends[0].draw)
+
+    @property
+    def total(self) -> np.ndarray:
+        """Ticks until the last target was left, (B,)."""
+        return np.asarray(self.ticks[np.arange(len(self.counts)), self.counts - 1])
 
     @property
     def sound(self) -> np.ndarray:
@@ -161,14 +194,21 @@ class Executor:
         p_WB = unpack_state(self.structure, at.s).p_WB
         return np.asarray(((p_WB * mass[..., None]).sum(1) / mass.sum(1, keepdim=True)).numpy())
 
-    def run(self, at: Standing, targets: np.ndarray) -> Executed:
-        """Targets (B, S, actuated) from where the robots stand, with the robot's controller; no time is held."""
+    def run(
+        self, at: Standing, targets: np.ndarray, counts: np.ndarray | None = None, *, record: bool = False
+    ) -> Executed:
+        """Targets (B, S, actuated) from where the robots stand, with the robot's controller; no time is held.
+
+        counts: how many of its targets each is to reach, (B,); None: all. record: keep every tick.
+        """
         import torch
 
+        counts = np.full(len(at), targets.shape[1]) if counts is None else np.asarray(counts)
         parts = []
         for first in range(0, len(at), CHUNK):
             rows = np.arange(first, min(first + CHUNK, len(at)))
-            parts.append(self._run(at.take(rows), torch.as_tensor(np.ascontiguousarray(targets[rows], dtype=float))))
+            goals = torch.as_tensor(np.ascontiguousarray(targets[rows], dtype=float))
+            parts.append(self._run(at.take(rows), goals, counts[rows], record))
         if len(parts) == 1:
             return parts[0]
         ends = tuple(
@@ -176,10 +216,13 @@ class Executor:
                      torch.cat([p.ends[k].draw for p in parts]))
             for k in range(targets.shape[1])
         )  # fmt: skip
-        return Executed(ends, *(np.concatenate([getattr(p, name) for p in parts])
-                                for name in ("ticks", "given_up", "failed")))  # fmt: skip
+        named = {
+            name: np.concatenate([getattr(p, name) for p in parts])
+            for name in ("ticks", "given_up", "failed", "counts")
+        }
+        return Executed(ends, **named, tracks=tuple(track for p in parts for track in p.tracks))
 
-    def _run(self, at: Standing, targets: Tensor) -> Executed:
+    def _run(self, at: Standing, targets: Tensor, counts: np.ndarray, record: bool) -> Executed:
         import torch
 
         from r2s2r_cli.engine.flat import unpack_state
@@ -196,10 +239,11 @@ class Executor:
         n = self.substeps(at)
         h, count = self.step / n, self.whole * n
         delayed = bool((self.delay > 0).any())
+        kept: list[tuple[Tensor, ...]] = []
 
         live = torch.arange(batch)
-        s, s_line, draw, goal = at.s, at.line, at.draw, targets
-        theta, p, pid = self.theta.map(lambda x: x[draw]), self.packed[draw], self.pid(draw)
+        s, s_line, draw, goal, asked = at.s, at.line, at.draw, targets, torch.as_tensor(counts)
+        theta, p, pid = self._numbers(draw)
         memory, where = pid.start(s.new_zeros(batch, self.structure.n_cables)), start_progress(batch)
         line = self._line(draw, s_line) if delayed else None
         with torch.no_grad():
@@ -208,11 +252,11 @@ class Executor:
                 length = cap_lengths(self.cable_caps, end_caps(theta, state))
                 for effect in self.structure.effects:
                     length = effect.sensing(theta.of(effect.name), length)
+                running = where.index < asked
                 wanted = goal[torch.arange(len(s)), where.index.clamp(max=steps - 1)]
-                running = ~where.finished(steps)
                 u, memory = pid.tick(memory, length, wanted)
                 u = torch.where(running[:, None], u, torch.zeros_like(u))
-                before = where.index
+                before, done = where.index, memory.done
                 where, moved = advance(where, memory.done, hold, timeout)
                 memory = memory.restarted(moved.changed)
                 if line is None:
@@ -223,25 +267,37 @@ class Executor:
                     s_line = torch.cat([s_line[:, 1:], u[:, None]], dim=1)
                 self.steps += len(s) * count
                 sane = torch.isfinite(s).all(dim=1)
-                if bool(moved.changed.any()):
-                    left, step_of = live[moved.changed], before[moved.changed]
-                    ends_s[left, step_of], ticks[left.numpy(), step_of.numpy()] = s[moved.changed], tick
-                    ends_line[left, step_of] = s_line[moved.changed]
-                    given_up[left.numpy(), step_of.numpy()] = moved.timed_out[moved.changed].numpy()
-                over = where.finished(steps) | ~sane
+                changed = moved.changed & running
+                if bool(changed.any()):
+                    left, step_of = live[changed], before[changed]
+                    ends_s[left, step_of], ticks[left.numpy(), step_of.numpy()] = s[changed], tick
+                    ends_line[left, step_of] = s_line[changed]
+                    given_up[left.numpy(), step_of.numpy()] = moved.timed_out[changed].numpy()
+                if record:
+                    kept.append((live[running], s[running], u[running], before[running], done[running]))
+                over = (where.index >= asked) | ~sane
                 failed[live[~sane].numpy()] = True
                 if bool(over.all()):
                     break
                 if int(over.sum()) * 8 >= len(over):
                     keep = ~over
-                    live, s, s_line, draw, goal = live[keep], s[keep], s_line[keep], draw[keep], goal[keep]
-                    theta, p, pid = theta.map(lambda x, keep=keep: x[keep]), p[keep], self.pid(draw)
+                    live, s, s_line, draw = live[keep], s[keep], s_line[keep], draw[keep]
+                    goal, asked = goal[keep], asked[keep]
+                    theta, p, pid = self._numbers(draw)
                     memory = replace(memory, total=memory.total[keep], previous=memory.previous[keep],
                                      done=memory.done[keep])  # fmt: skip
                     where = replace(where, index=where.index[keep], elapsed=where.elapsed[keep], held=where.held[keep])
                     line = None if line is None else self._line(draw, s_line)
         ends = tuple(Standing(ends_s[:, k], ends_line[:, k], at.draw) for k in range(steps))
-        return Executed(ends, ticks, given_up, failed)
+        return Executed(ends, ticks, given_up, failed, counts, tuple(_tracks(at.s, kept)) if record else ())
+
+    def _numbers(self, draw: Tensor) -> tuple[Parameters, Tensor, LatchedPid]:
+        """Parameters, packed ones and the controller of environments with these draws."""
+
+        def of(x: Tensor) -> Tensor:
+            return x[draw]
+
+        return self.theta.map(of), self.packed[draw], self.pid(draw)
 
     def _line(self, draw: Tensor, recent: Tensor) -> DelayLine:
         """The commands under way as the engine's link takes them."""
@@ -259,3 +315,14 @@ class Executor:
             theta = self.theta.map(lambda x: x[at.draw])
             self._substeps = self.simulator.substeps(theta, unpack_state(self.structure, at.s), self.step)
         return self._substeps
+
+
+def _tracks(start: Tensor, kept: list[tuple[Tensor, ...]]) -> Iterator[Track]:
+    """The ticks of every environment, of those of all of them."""
+    import torch
+
+    live = torch.cat([rows for rows, *_ in kept])
+    columns = [torch.cat([tick[k] for tick in kept]) for k in range(1, 5)]
+    for k in range(len(start)):
+        s, u, index, done = (column[live == k] for column in columns)
+        yield Track(torch.cat([start[k : k + 1], s]), u, index, done)

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from r2s2r_cli.stages.plan.executor import Executed, Executor, Standing
+from r2s2r_cli.stages.plan.executor import Executor, Standing
 from r2s2r_cli.stages.plan.placement import Reference, turned, wrapped
 from r2s2r_cli.stages.plan.rewards import Outcomes
 from r2s2r_cli.stages.plan.symmetry import principal_axis
@@ -70,38 +70,34 @@ def outcomes(
     """What came of gaits from poses at rest (one, or one a row) to poses at rest."""
     first, last = reference.place(start.caps), reference.place(end.caps)
     batch = len(last.yaw)
-    group = reference.group
     yaw, element = np.broadcast_to(first.yaw, batch), np.broadcast_to(first.element, batch)
     moved = end.com - start.com
     flat = turned(moved[:, :2], -yaw)
     one, two = (principal_axis(pose.caps) for pose in (start, end))
     heading = np.arctan2(two[:, 1], two[:, 0]) - np.arctan2(one[:, 1], one[:, 0])
-    relative = np.array(
-        [group.product(int(b), group.inverse(int(a))) for a, b in zip(element, last.element, strict=True)]
-    )
+    table = reference.group.relative()
     return Outcomes(
-        com=np.concatenate([flat, moved[:, 2:]], axis=1), turn=wrapped(heading), element=relative.reshape(batch),
+        com=np.concatenate([flat, moved[:, 2:]], axis=1), turn=wrapped(heading), element=table[element, last.element],
         error=last.error, duration=ticks * period, switched=np.asarray(switched, dtype=float),
     )  # fmt: skip
+
+
+def padded(gaits: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Target sequences (S_k, motor) as one array (B, S, motor), the last target repeated, and their lengths (B,)."""
+    counts = np.array([len(one) for one in gaits])
+    longest = int(counts.max())
+    return np.stack([np.concatenate([one, np.repeat(one[-1:], longest - len(one), axis=0)]) for one in gaits]), counts
 
 
 def run_gaits(
     executor: Executor, reference: Reference, at: Standing, gaits: list[Gait], rows: np.ndarray
 ) -> tuple[Outcomes, np.ndarray]:
-    """Gait k from robot rows[k] of `at`, all in one call a length; outcomes, and whether every target was reached, (B,).
+    """Gait k from robot rows[k] of `at`, all in one call; outcomes, and whether every target was reached, (B,).
 
     at: robots at rest on the triangle of the reference.
     """
-    order, parts, sound = [], [], np.zeros(len(gaits), dtype=bool)
-    for length in sorted({len(gait.targets) for gait in gaits}):
-        chosen = np.array([k for k, gait in enumerate(gaits) if len(gait.targets) == length])
-        begun = at.take(rows[chosen])
-        run: Executed = executor.run(begun, np.stack([gaits[k].targets for k in chosen]))
-        switched = np.array([gaits[k].switched for k in chosen])
-        parts.append(outcomes(reference, seen(executor, begun), seen(executor, run.ends[-1]), run.ticks[:, -1],
-                              executor.period, switched))  # fmt: skip
-        sound[chosen] = run.sound
-        order.append(chosen)
-    from r2s2r_cli.stages.plan.rewards import joined
-
-    return joined(parts).take(np.argsort(np.concatenate(order))), sound
+    begun = at.take(rows)
+    run = executor.run(begun, *padded([gait.targets for gait in gaits]))
+    switched = np.array([gait.switched for gait in gaits])
+    first, last = seen(executor, begun), seen(executor, run.last)
+    return outcomes(reference, first, last, run.total, executor.period, switched), run.sound

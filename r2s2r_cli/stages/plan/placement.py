@@ -47,6 +47,12 @@ class Reference:
         """The triangle that it stands on."""
         return support_caps(self.p)
 
+    def axis_angles(self) -> np.ndarray:
+        """Direction of the principal axis over the ground [rad] of the reference after each symmetry, (element,)."""
+        relabelled = np.stack([self.p[np.argsort(element.caps)] for element in self.group.elements])
+        axis = principal_axis(relabelled)
+        return np.asarray(np.arctan2(axis[:, 1], axis[:, 0]))
+
     def place(self, p_WE: np.ndarray) -> Placement:
         """The placement of poses p_WE (B, cap, 3) [m]."""
         shown = np.asarray(p_WE)[:, self.group.caps()]  # (B, element, cap, 3): cap i of the reference is played by this

@@ -1,8 +1,8 @@
 """Gaits judged over what is not known: the simulator's numbers, and the pose that the robot starts from.
 
-The score is mean minus so many standard deviations of the reward over all pairs of drawn numbers and start poses; a gait
-that gives a target up, or does not come back to rest, has earned nothing there. A gait that works in one simulator only
-loses to one that works in all of them.
+The score is mean minus so many standard deviations of the reward over all pairs of drawn numbers and start poses; a
+gait that gives a target up, or does not come back to rest, has earned nothing there. A gait that works in one simulator
+only loses to one that works in all of them.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from schemas.robot import Robot
 
 @dataclass(frozen=True)
 class Primitive:
-    """A gait and what it is worth for one behaviour. nominal: reward with the best numbers from the rest pose; mean, sd:
-    over all pairs; score: mean - spread x sd; worked: share of the pairs in which it came back to rest.
+    """A gait and what it is worth for one behaviour. nominal: reward with the best numbers from the rest pose; mean,
+    sd: over all pairs; score: mean - spread x sd; worked: share of the pairs in which it came back to rest.
 
     move: (3,) shift [m] of the centre of mass over the ground in the frame of the start and turn [rad] of the principal
     axis, means where it worked and ended on its usual triangle; move_sd: (3,) their standard deviations; element: that

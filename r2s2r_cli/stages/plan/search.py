@@ -61,6 +61,10 @@ class _Level:
     parent: np.ndarray
 
 
+_Closed = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Points, ticks and soundness of nodes that were brought to rest."""
+
+
 class Search:
     """One search from one rested robot. executor: with one draw, the best values."""
 
@@ -80,13 +84,12 @@ class Search:
         parts: list[Outcomes] = []
         motors = self.executor.structure.n_actuated
         origin = np.ones((1, 0, motors))
+        closed: _Closed | None = None
         for depth in range(1, self.settings.depth):
-            if depth == 1:
+            if closed is None:
                 level = self._expanded(self.start, origin, np.zeros(1, dtype=int), np.zeros(1, dtype=int))
             else:
-                going = (
-                    self._promising(levels[-1], closed) if depth > 2 or self.settings.beam else levels[-1].same.leaders
-                )
+                going = self._promising(levels[-1], closed)
                 level = self._expanded(levels[-1].at, levels[-1].targets, going, levels[-1].ticks)
             levels.append(level)
             closed = self._closed(level)
@@ -120,7 +123,7 @@ class Search:
         same = alike(self.reference.group, path[:, -1], pose.caps, self.executor.speeds(ends), self.settings.merge_m)
         return _Level(path, ends, pose, spent, same, parents[good])
 
-    def _closed(self, level: _Level) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _closed(self, level: _Level) -> _Closed:
         """Every node brought to rest: points (B, cap + 1, 3), ticks (B,), and whether it got there (B,); leaders are
         simulated, the others told."""
         leaders = level.same.leaders
@@ -136,17 +139,12 @@ class Search:
     def _told(self, level: _Level, member: np.ndarray, points: np.ndarray) -> np.ndarray:
         return carried(self.reference.group, level.same, level.pose.caps, member, points)
 
-    def _unfolded(
-        self, levels: list[_Level], closed: tuple[np.ndarray, np.ndarray, np.ndarray]
-    ) -> tuple[list[Gait], Outcomes]:
+    def _unfolded(self, levels: list[_Level], closed: _Closed) -> tuple[list[Gait], Outcomes]:
         """The gaits of the last level: its nodes, and their copies behind every node that is like one of their
         ancestors."""
-        points, ticks, sound = (one[closed[2]] for one in closed)
-        level = levels[-1]
-        targets, parent, rows = level.targets, level.parent, np.flatnonzero(sound)
         node = np.flatnonzero(closed[2])
-        tail, parent = targets[node][:, -1:], parent[node]
-        del rows
+        points, ticks = closed[0][node], closed[1][node]
+        tail, parent = levels[-1].targets[node][:, -1:], levels[-1].parent[node]
         for above in reversed(levels[:-1]):
             children: dict[int, np.ndarray] = {int(k): np.flatnonzero(parent == k) for k in np.unique(parent)}
             member = [m for m in range(len(above.ticks)) if int(above.same.leader[m]) in children]
@@ -170,7 +168,7 @@ class Search:
         good = np.flatnonzero(came.error < self.settings.rest_error_m)
         return [gaits[k] for k in good], came.take(good)
 
-    def _promising(self, level: _Level, closed: tuple[np.ndarray, np.ndarray, np.ndarray]) -> np.ndarray:
+    def _promising(self, level: _Level, closed: _Closed) -> np.ndarray:
         """Leaders that go on: for each behaviour in turn the one that came farthest, brought to rest or as it is."""
         leaders, beam = level.same.leaders, self.settings.beam
         if not beam or len(leaders) <= beam:

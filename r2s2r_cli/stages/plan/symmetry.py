@@ -74,6 +74,12 @@ class SymmetryGroup:
         """Number of the element that undoes element k."""
         return self.index(tuple(int(i) for i in np.argsort(self.elements[k].caps)))
 
+    def relative(self) -> np.ndarray:
+        """Table (element, element): what takes a robot that has undergone the first to one that has undergone the
+        second, in the labels of the first."""
+        n = range(len(self))
+        return np.array([[self.product(b, self.inverse(a)) for b in n] for a in n])
+
     def caps(self) -> np.ndarray:
         """Permutations of all elements, (element, cap)."""
         return np.array([element.caps for element in self.elements])

@@ -40,9 +40,9 @@ def test_a_batch_does_what_the_closed_loop_does_one_by_one() -> None:
                         [[1, 1, 1, 1, 1, 0.5], [0, 1, 1, 1, 1, 1]]], dtype=float)  # fmt: skip
     run = made.run(at, targets)
     for k in range(3):
-        theta = made.theta.map(lambda x, k=k: x[k : k + 1])
+        theta, _, pid = made._numbers(torch.tensor([k]))
         one = closed_loop(
-            made.simulator, theta, unpack_state(made.structure, at.s[k : k + 1]), made.pid(torch.tensor([k])),
+            made.simulator, theta, unpack_state(made.structure, at.s[k : k + 1]), pid,
             torch.as_tensor(targets[k]), torch.zeros(2, dtype=torch.float64),
             torch.full((2,), 1.3, dtype=torch.float64), link=Link(delay=made.delay[k : k + 1, None]),
         )  # fmt: skip
@@ -58,7 +58,8 @@ def test_a_batch_does_what_the_closed_loop_does_one_by_one() -> None:
 
 def test_two_targets_are_one_after_the_other() -> None:
     """A run of two targets is a run of the first, and one of the second from where that ended."""
-    made = executor(*(lambda b: (b, b.draws(1, np.random.default_rng(0))))(assumed(subject().robot)))
+    belief = assumed(subject().robot)
+    made = executor(belief, belief.draws(1, np.random.default_rng(0)))
     at = made.standing(np.repeat(subject().p_WE.numpy(), 2, axis=0), np.zeros(2, dtype=int))
     targets = np.array(
         [[[1, 0, 1, 1, 0, 1], [1, 1, 1, 1, 1, 1]], [[0, 1, 1, 1, 1, 0], [0, 0, 1, 1, 1, 0]]], dtype=float
@@ -69,3 +70,10 @@ def test_two_targets_are_one_after_the_other() -> None:
     assert torch.equal(whole.ends[1].s, rest.ends[0].s)
     assert (whole.ticks[:, 1] == half.ticks[:, 0] + rest.ticks[:, 0]).all()
     assert whole.sound.all()
+    # One target less for the second robot: it stops there, and the first goes on as before.
+    fewer = made.run(at, targets, np.array([2, 1]), record=True)
+    assert torch.equal(fewer.last.s, torch.stack([whole.ends[1].s[0], whole.ends[0].s[1]]))
+    assert fewer.total.tolist() == [whole.ticks[0, 1], whole.ticks[1, 0]]
+    assert torch.equal(fewer.before_last(0).s, torch.stack([track.s[-1] for track in fewer.tracks]))
+    assert [len(track.u) for track in fewer.tracks] == fewer.total.tolist()
+    assert fewer.tracks[0].index.tolist() == [0] * whole.ticks[0, 0] + [1] * (fewer.total[0] - whole.ticks[0, 0])

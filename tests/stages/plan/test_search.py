@@ -12,7 +12,7 @@ from r2s2r_cli.stages.plan.alike import alike, carried, told_targets
 from r2s2r_cli.stages.plan.belief import assumed
 from r2s2r_cli.stages.plan.executor import Executor, Standing
 from r2s2r_cli.stages.plan.gaits import Gait, neighbours, run_gaits
-from r2s2r_cli.stages.plan.placement import Reference, reference_of, turned
+from r2s2r_cli.stages.plan.placement import Reference, reference_of
 from r2s2r_cli.stages.plan.rewards import BEHAVIOURS, Outcomes, reward_named
 from r2s2r_cli.stages.plan.robust import primitive
 from r2s2r_cli.stages.plan.search import Found, Search, SearchSettings, best_of
@@ -58,6 +58,14 @@ def test_the_shapes_next_to_one() -> None:
     assert not (every == bent).all(axis=1).any() and not (every == 1).all(axis=1).any()
 
 
+def relabelled_and_moved(points: np.ndarray, yaw: float, shift: np.ndarray, caps: tuple[int, ...]) -> np.ndarray:
+    """Caps and further points (n, 3), turned about the vertical, shifted, the caps relabelled."""
+    flat = np.concatenate([turned(points[:, :2], yaw) + shift, points[:, 2:]], axis=1)
+    made = flat.copy()
+    made[list(caps)] = flat[:6]
+    return made
+
+
 def test_like_poses_are_told_their_future() -> None:
     """A pose, and the same relabelled, moved and turned: one class; the leader's future told of the member is that of
     the member, point by point and target by target."""
@@ -69,17 +77,8 @@ def test_like_poses_are_told_their_future() -> None:
     for k in range(1, len(group)):
         g = group.elements[k]
         yaw, shift = float(generator.uniform(-3, 3)), generator.normal(size=2)
-
-        def moved(
-            points: np.ndarray, yaw: float = yaw, shift: np.ndarray = shift, caps: tuple[int, ...] = g.caps
-        ) -> np.ndarray:
-            flat = np.concatenate([turned(points[:, :2], yaw) + shift, points[:, 2:]], axis=1)
-            made = flat.copy()
-            made[list(caps)] = flat[:6]
-            return made
-
-        poses.append(moved(pose))
-        futures.append(moved(future))
+        poses.append(relabelled_and_moved(pose, yaw, shift, g.caps))
+        futures.append(relabelled_and_moved(future, yaw, shift, g.caps))
         shapes.append(g.relabelled(shape))
         afters.append(g.relabelled(after))
     p, f = np.array(poses), np.array(futures)

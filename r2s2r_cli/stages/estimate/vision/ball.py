@@ -20,15 +20,24 @@ WIDE_PX = 3.0
 """The same in the first step, when its place is not certain to a pixel."""
 PIXEL_SD = 0.32
 """What the mask differs by from the modelled rim, a pixel: 1 / sqrt(12) from its being yes or no, and the colour's noise."""
-RIM_SD_PX = 0.05
+RIM_SD_PX = 0.10
 """Common error of the disc across the line of sight: uneven light, a rim that the range cuts on one side."""
-CORE = 0.85
-"""Depths beyond this share of the disc's radius are left out: edges fray there."""
+CORE, FRAY_PX = 0.85, 1.5
+"""Depths beyond this share of the disc's radius, or so close to its rim, are left out: edges fray."""
 DEPTHS = 64
 """Depths that are used at most; neighbours share most of their error, so more would tell nothing more."""
-GATE_SD = 4.0
+DEPTHS_LEAST = 5
+"""Fewer depths on a ball could all be of something else: then only its colour counts."""
+GATE_SD, GATE_RADII = 4.0, 0.05
+"""A depth that differs from the median by more than these standard deviations and share of the radius is left out."""
+ALONG_SD_M = 3e-4
+"""Common error along the line of sight: rounding, and noise that is not quite as the floor shows it."""
+SHIFT_SD_PX = 3.0
+"""Less certain, a comparison of depth and colour is not told."""
 _STEPS = 4
 _STEP_PX = 3.0
+_WEAK = np.diag([1.0, 1.0, 0.1**-2])
+"""The start is good to a metre across the line of sight and 0.1 m along it: keeps what is not seen at all finite."""
 
 
 @dataclass(frozen=True)
@@ -66,13 +75,29 @@ class _Disc:
     def of(cls, center: np.ndarray, radius: float, x: np.ndarray, y: np.ndarray) -> _Disc:
         D = float(np.linalg.norm(center))
         along = center / D
-        first = np.array([along[2], 0.0, -along[0]])
-        first /= np.linalg.norm(first)
-        E = np.column_stack([first, np.cross(along, first), along])
+        across = np.hypot(along[0], along[2])
+        i, k = along[2] / across, -along[0] / across
+        E = np.array([
+            [i, along[1] * k, along[0]], [0.0, along[2] * i - along[0] * k, along[1]], [k, -along[1] * i, along[2]]
+        ])  # fmt: skip
         q = x * along[0] + y * along[1] + along[2]
         a = (x * E[0, 0] + y * E[1, 0] + E[2, 0]) / q
         b = (x * E[0, 1] + y * E[1, 1] + E[2, 1]) / q
         return cls(E, D, a, b, np.hypot(a, b), radius / float(np.sqrt(max(D * D - radius**2, 1e-9))))
+
+
+@dataclass(frozen=True)
+class _Depths:
+    """Depths on a ball: slopes x, y of their rays, z [m], (n,), and the inverse of the covariance of 1 / z (n, n)."""
+
+    x: np.ndarray
+    y: np.ndarray
+    z: np.ndarray
+    weight: np.ndarray
+
+    @classmethod
+    def none(cls) -> _Depths:
+        return cls(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros((0, 0)))
 
 
 class BallFitter:
@@ -87,13 +112,13 @@ class BallFitter:
         self.swell_px, self.swell_sd_px = swell_px, swell_sd_px
 
     def place(
-        self, patch: Patch, told: np.ndarray, hidden: np.ndarray, center: np.ndarray, radius: float, sd_px: float
+        self, patch: Patch, told: np.ndarray, hidden: np.ndarray, center: np.ndarray, radius: float, reach_px: float
     ) -> np.ndarray:
         """A start within a pixel [m] (3,): `center` moved across the picture to where the colour fits what should be seen.
 
         told: pixels whose colour tells something. hidden: pixels where something is before the ball if it is at `center`; it moves with the
-        ball, as the rod behind it does. Both bool (v, u). sd_px: of the prediction; of two places that fit
-        equally well the likelier one is taken. The distance stays.
+        ball, as the rod behind it does. Both bool (v, u). reach_px: three standard deviations of the prediction;
+        it moves no farther, and of two places that fit equally well to the nearer. The distance stays.
         """
         import cv2
 
@@ -115,53 +140,48 @@ class BallFitter:
         cost -= 2 * cv2.matchTemplate(padded(told & patch.colored), template, cv2.TM_CCORR)
         dv = np.arange(cost.shape[0]) - pad - v0
         du = np.arange(cost.shape[1]) - pad - u0
-        cost = cost + 0.5 * (dv[:, None] ** 2 + du[None, :] ** 2) / max(sd_px, 1.0) ** 2
+        far = dv[:, None] ** 2 + du[None, :] ** 2
+        cost = np.where(far > (reach_px + 1.0) ** 2, np.inf, cost + 0.5 * far / max(reach_px / 3, 1.0) ** 2)
         k, i = divmod(int(np.argmin(cost)), cost.shape[1])
         move = np.array([du[i], dv[k], 0.0]) * center[2] / self.f
         return np.asarray(center + move)
 
-    def fit(
-        self, patch: Patch, valid: np.ndarray, seen: np.ndarray, center: np.ndarray, radius: float
-    ) -> BallFit | None:
-        """The ball from a start within a pixel or two; None where too little is seen of it.
+    def fit(self, patch: Patch, valid: np.ndarray, seen: np.ndarray, center: np.ndarray, radius: float) -> BallFit:
+        """The ball from a start within a pixel or two.
 
         valid: pixels whose colour tells something. seen: pixels whose depth may lie on the ball. Both bool (v, u).
         """
-        c, delta = center.copy(), self.swell_px
-        depths = self._depths(patch, seen, c, radius)
-        for _ in range(2):
-            c = self._along(patch, depths, c, radius)
-        told = valid
-        A = np.zeros((4, 4))
+        start = c = self._along(patch, seen, center, radius)
+        delta = self.swell_px
+        told, depths = valid, _Depths.none()
         for k in range(_STEPS):
             disc = _Disc.of(c, radius, patch.x, patch.y)
-            if k < 2:
-                told = valid & ~self._contradicting(patch, valid, disc)
-            A, g = self._rim(patch, told, disc, delta, RIM_PX if k else WIDE_PX)
             if k == 1:
-                depths = self._depths(patch, seen, c, radius)
-            J, r, C = self._lines(patch, depths, c, radius, disc)
-            if len(r):
-                W = np.linalg.solve(C, np.column_stack([J, r]))
-                A[:3, :3] += J.T @ W[:, :3]
-                g[:3] += J.T @ W[:, 3]
+                told = valid & ~self._contradicting(patch, valid, disc)
+                depths = self._depths(patch, seen, c, radius, disc)
+            rim, pull = self._rim(patch, told, disc, delta, RIM_PX if k else WIDE_PX)
+            line, draw = self._lines(depths, c, radius, disc)
+            A, g = rim.copy(), pull.copy()
+            A[:3, :3] += line
+            g[:3] += draw
             A[3, 3] += self.swell_sd_px**-2
             g[3] += (self.swell_px - delta) * self.swell_sd_px**-2
-            # Two bounds keep what is not seen at all finite; they are too wide to say anything.
-            step = np.linalg.solve(A + np.diag([1e0, 1e0, 1e0, 0.0]), g)
-            c = c + disc.E @ np.clip(step[:3], -_STEP_PX * c[2] / self.f, _STEP_PX * c[2] / self.f)
+            A[:3, :3] += _WEAK
+            g[:3] += _WEAK @ (disc.E.T @ (start - c))
+            cov = np.linalg.inv(A)
+            step = cov @ g
+            limit = _STEP_PX * c[2] / self.f
+            c = c + disc.E @ np.clip(step[:3], -limit, limit)
             delta += float(np.clip(step[3], -0.5, 0.5))
-        disc = _Disc.of(c, radius, patch.x, patch.y)
-        cov = np.linalg.inv(A + np.diag([1e0, 1e0, 1e0, 0.0]))
         across = (RIM_SD_PX * c[2] / self.f) ** 2
-        cov_C = disc.E @ (cov[:3, :3] + np.diag([across, across, (3e-4) ** 2])) @ disc.E.T
+        cov_C = disc.E @ (cov[:3, :3] + np.diag([across, across, ALONG_SD_M**2])) @ disc.E.T
         edge = np.abs(disc.rho - disc.rim) * self.f < RIM_PX / 2
-        inside = disc.rho < disc.rim
         expected = np.pi * (disc.rim * self.f) ** 2
-        shift, shift_cov = self._shift(patch, told, depths, c, radius, delta)
+        shift, shift_cov = self._shift(disc, rim[:2, :2], pull[:2], line, draw)
         return BallFit(
-            c, cov_C, float((patch.colored & inside).sum() / expected), float((told & edge).sum() / max(edge.sum(), 1)),
-            len(depths[0]), shift, shift_cov, delta, float(np.sqrt(cov[3, 3])),
+            c, cov_C, float((patch.colored & (disc.rho < disc.rim)).sum() / expected),
+            float((told & edge).sum() / max(edge.sum(), 1)), len(depths.z), shift, shift_cov, delta,
+            float(np.sqrt(cov[3, 3])),
         )  # fmt: skip
 
     def _rim(
@@ -191,66 +211,80 @@ class BallFitter:
         wrong = _in_company(outside) | _in_company(inside)
         return grown(wrong, 2) if wrong.any() else wrong
 
-    def _depths(self, patch: Patch, seen: np.ndarray, c: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
-        """Rows and columns of the depths on the ball, those that differ from the rest left out."""
-        disc = _Disc.of(c, radius, patch.zx, patch.zy)
-        rows, columns = np.nonzero(seen & patch.known & (disc.rho < CORE * disc.rim))
-        if not len(rows):
-            return rows, columns
-        off = patch.z[rows, columns] - ball_depth(patch.zx[rows, columns], patch.zy[rows, columns], c, radius)
-        off = off - np.nanmedian(off)
-        sd = float(c[2]) ** 2 * self.noise.sd + 0.05 * radius
-        good = np.abs(off) < GATE_SD * sd
-        rows, columns = rows[good], columns[good]
-        every = max(int(np.ceil(len(rows) / DEPTHS)), 1)
-        return rows[::every], columns[::every]
+    def _depths(self, patch: Patch, seen: np.ndarray, c: np.ndarray, radius: float, disc: _Disc) -> _Depths:
+        """The depths on the ball, those that differ from the rest left out."""
+        on = seen & patch.known & (_Disc.of(c, radius, patch.zx, patch.zy).rho < self._core(disc))
+        rows, columns = np.nonzero(on)
+        if len(rows) < DEPTHS_LEAST:
+            return _Depths.none()
+        x, y, z = patch.zx[rows, columns], patch.zy[rows, columns], patch.z[rows, columns]
+        off = z - ball_depth(x, y, c, radius)
+        good = np.abs(off - np.median(off)) < GATE_SD * (float(c[2]) ** 2 * self.noise.sd) + GATE_RADII * radius
+        every = max(int(np.ceil(good.sum() / DEPTHS)), 1)
+        pick = np.nonzero(good)[0][::every]
+        if len(pick) < DEPTHS_LEAST:
+            return _Depths.none()
+        x, y, z = x[pick], y[pick], z[pick]
+        slope = _slopes(x, y, c, radius, self.noise.sideways_px / self.f)
+        if slope is None:
+            return _Depths.none()
+        model, J = slope
+        sideways = np.hypot(*(J @ disc.E)[:, :2].T) * self.noise.sideways_px * model / self.f
+        C = self.noise.covariance(columns[pick].astype(float), rows[pick].astype(float), sideways**2)
+        return _Depths(x, y, z, np.linalg.inv(C))
 
-    def _along(self, patch: Patch, depths: tuple[np.ndarray, np.ndarray], c: np.ndarray, radius: float) -> np.ndarray:
+    def _core(self, disc: _Disc) -> float:
+        """Radius of the part of the disc whose depths are used, as a slope."""
+        return min(CORE * disc.rim, max(disc.rim - FRAY_PX / self.f, 0.5 * disc.rim))
+
+    def _along(self, patch: Patch, seen: np.ndarray, c: np.ndarray, radius: float) -> np.ndarray:
         """The centre moved along its line of sight to where the depths have it."""
-        if not len(depths[0]):
-            return c
-        off = patch.z[depths] - ball_depth(patch.zx[depths], patch.zy[depths], c, radius)
-        move = float(np.nanmedian(off))
-        return c * (1.0 + move / c[2]) if np.isfinite(move) else c
+        off = patch.z - ball_depth(patch.zx, patch.zy, c, radius)
+        off = off[seen & patch.known & np.isfinite(off)]
+        return c * (1.0 + float(np.median(off)) / c[2]) if len(off) else c
 
-    def _lines(
-        self, patch: Patch, depths: tuple[np.ndarray, np.ndarray], c: np.ndarray, radius: float, disc: _Disc
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Jacobian (n, 3) by metres across, across, along, residuals (n,) and covariance (n, n) of inverse depths."""
-        x, y, z = patch.zx[depths], patch.zy[depths], patch.z[depths]
-        model = ball_depth(x, y, c, radius)
-        good = np.isfinite(model)
-        rows, columns = depths[0][good], depths[1][good]
-        x, y, z, model = x[good], y[good], z[good], model[good]
-        ray = np.stack([x, y, np.ones_like(x)], axis=-1)
-        n = (ray * model[:, None] - c) / radius
-        slope = n / (n * ray).sum(axis=-1)[:, None]  # dz / dc
-        J = (-slope / model[:, None] ** 2) @ disc.E
-        r = 1.0 / z - 1.0 / model
-        sideways = np.hypot(J[:, 0], J[:, 1]) * self.noise.sideways_px * model / self.f
-        return J, r, self.noise.covariance(columns.astype(float), rows.astype(float), sideways**2)
+    def _lines(self, depths: _Depths, c: np.ndarray, radius: float, disc: _Disc) -> tuple[np.ndarray, np.ndarray]:
+        """Normal matrix (3, 3) and right-hand side (3,) of the depths, for metres across, across and along."""
+        found = _slopes(depths.x, depths.y, c, radius, self.noise.sideways_px / self.f) if len(depths.z) else None
+        if found is None:
+            return np.zeros((3, 3)), np.zeros(3)
+        model, J = found[0], found[1] @ disc.E
+        weighted = J.T @ depths.weight
+        return weighted @ J, weighted @ (1.0 / depths.z - 1.0 / model)
 
     def _shift(
-        self, patch: Patch, told: np.ndarray, depths: tuple[np.ndarray, np.ndarray], c: np.ndarray, radius: float,
-        delta: float,
-    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-        """Lateral place by depth alone minus by colour alone [px], (2,) and (2, 2)."""
-        nothing = np.full(2, np.nan), np.full((2, 2), np.nan)
-        disc = _Disc.of(c, radius, patch.x, patch.y)
-        A, g = self._rim(patch, told, disc, delta, RIM_PX)
-        J, r, C = self._lines(patch, depths, c, radius, disc)
-        if len(r) < 12:
-            return nothing
-        W = np.linalg.solve(C, np.column_stack([J, r]))
-        B = J.T @ W[:, :3]
-        if np.linalg.cond(B) > 1e8 or np.linalg.cond(A[:2, :2]) > 1e4:
-            return nothing
-        by_depth, by_color = np.linalg.solve(B, J.T @ W[:, 3]), np.linalg.solve(A[:2, :2], g[:2])
-        cov = np.linalg.inv(B)[:2, :2] + np.linalg.inv(A[:2, :2])
+        self, disc: _Disc, rim: np.ndarray, pull: np.ndarray, line: np.ndarray, draw: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Lateral place by depth alone minus by colour alone [px], (2,) and (2, 2); NaN where one of both tells nothing."""
+        B, A = line + np.eye(3), rim + np.eye(2)
+        cov = np.linalg.inv(B)[:2, :2] + np.linalg.inv(A)
+        px = self.f / (disc.D * disc.E[2, 2])
+        if not np.trace(cov) * px**2 < SHIFT_SD_PX**2:
+            return np.full(2, np.nan), np.full((2, 2), np.nan)
         # The two axes across the line of sight as the picture's: u and v, but for the slant of a cap far off its middle.
-        px = self.f / c[2]
         turn = disc.E[:2, :2]
-        return turn @ (by_depth[:2] - by_color) * px, turn @ cov @ turn.T * px**2
+        off = np.linalg.solve(B, draw)[:2] - np.linalg.solve(A, pull)
+        return turn @ off * px, turn @ cov @ turn.T * px**2
+
+
+def _slopes(
+    x: np.ndarray, y: np.ndarray, c: np.ndarray, radius: float, sideways: float
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Depths [m] (n,) that rays on a ball report on average, and d(1 / z) / dc [1/m^2] (n, 3); None where one misses it.
+
+    sideways: standard deviation by which a ray misses its pixel, as a slope. A ball curves away on all sides, so that what is
+    seen there lies behind by half the variance times the Laplacian of its surface, (r^2 + q^2) / q^3 at a depth q before
+    its middle.
+    """
+    z = ball_depth(x, y, c, radius)
+    if not np.isfinite(z).all():
+        return None
+    ray = np.stack([x, y, np.ones_like(x)], axis=-1)
+    n = ray * z[:, None] - c
+    facing = -(n * ray).sum(axis=-1)
+    q = np.maximum(facing / np.sqrt((ray * ray).sum(axis=-1)), 0.4 * radius)
+    model = z + 0.5 * (sideways * z) ** 2 * (radius**2 + q**2) / q**3
+    return model, n / (facing * z**2)[:, None]
 
 
 def _in_company(pixels: np.ndarray) -> np.ndarray:

@@ -44,7 +44,7 @@ def balls(sighter: Sighter, pictures: Pictures) -> list[list[BallFit]]:
     for rod, (found, pair) in enumerate(zip(fits, pairs, strict=True)):
         chosen = []
         for end, i in enumerate(pair):
-            _, better = sighter.one(pictures, 2 * rod + end, p, sd)
+            better = sighter.one(pictures, 2 * rod + end, p, sd).fit
             chosen.append(better or found[i])
         rest = [fit for i, fit in enumerate(found) if i not in pair]
         result.append([*chosen, *rest])
@@ -74,7 +74,7 @@ def _of_rod(sighter: Sighter, pictures: Pictures, rod: int) -> list[BallFit]:
         if depth is None:
             continue
         alone[2 * rod] = ray * (depth + 0.7 * sighter.cap_radius[2 * rod])
-        _, fit = sighter.one(pictures, 2 * rod, alone, sd)
+        fit = sighter.one(pictures, 2 * rod, alone, sd).fit
         if fit is not None:
             found.append(fit)
     found.sort(key=lambda fit: -fit.visible)

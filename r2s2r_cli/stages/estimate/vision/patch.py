@@ -30,6 +30,14 @@ class Patch:
     u0: int
     v0: int
 
+    def part(self, rows: slice, columns: slice) -> Patch | None:
+        """A part of it, from `start` to `stop`, both given; None where it is smaller than three pixels either way."""
+        area = (rows, columns)
+        if min(self.x[area].shape) < 3:
+            return None
+        arrays = (self.x, self.y, self.colored, self.known, self.z, self.zx, self.zy)
+        return Patch(*(array[area] for array in arrays), self.u0 + columns.start, self.v0 + rows.start)
+
 
 def in_front(patch: Patch, z_cap: np.ndarray, sd: np.ndarray) -> np.ndarray:
     """Pixels where something stands before the cap, with one pixel about them, bool.

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from r2s2r_cli.devices.camera import Intrinsics
 from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.estimate.vision.ball import BallFit, BallFitter
+from r2s2r_cli.stages.estimate.vision.ball import DEPTHS_LEAST, BallFit, BallFitter
 from r2s2r_cli.stages.estimate.vision.colors import blank, hsv_of, mask, ranges_of
 from r2s2r_cli.stages.estimate.vision.detect import balls, candidates
 from r2s2r_cli.stages.estimate.vision.frames import ImageFrame
@@ -35,7 +35,11 @@ LEAST_PIXELS = 6
 LEAST_VISIBLE, LEAST_RIM = 0.08, 0.12
 SD_MOST_M = 0.03
 """A sighting across the line of sight worse than this says nothing."""
-DEPTHS_LEAST = 3
+FAR_SD = 5.0
+"""Depths that differ from the prediction by more than GATE_SD of its own standard deviations and these of a depth are of
+something else."""
+STRAY_PX = 2.0
+"""A fit that ends farther outside of where it was looked for has gone to something else."""
 EDGE_PX = 0.7
 """What hides a cap is taken for larger by this: pixels on its edge may be of either."""
 MOVED_PX = 1.0
@@ -51,6 +55,15 @@ class Pictures:
     index: int
     color: np.ndarray
     z: np.ndarray
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A cap in a frame: why it is seen or not, its fit if it is, and whether parts of the robot are in its way."""
+
+    code: int
+    fit: BallFit | None = None
+    crowded: bool = False
 
 
 class Sighter:
@@ -90,15 +103,13 @@ class Sighter:
         sd = np.sqrt(np.clip(np.trace(cov_C, axis1=1, axis2=2), 0.0, None))
         p = np.array(p_C, dtype=float)
         found = [self.one(pictures, cap, p, sd) for cap in range(caps)]
-        moved = np.zeros(caps, dtype=bool)
-        for cap, (_, fit) in enumerate(found):
-            if fit is not None:
-                moved[cap] = self._px(fit.center - p[cap], fit.center) > MOVED_PX
-        if moved.any():
-            for cap, (_, fit) in enumerate(found):
-                if fit is not None:
-                    p[cap], sd[cap] = fit.center, np.sqrt(np.trace(fit.cov))
-            found = [self.one(pictures, cap, p, sd) for cap in range(caps)]
+        moved = False
+        for cap, seen in enumerate(found):
+            if seen.fit is not None:
+                moved |= self._px(seen.fit.center - p[cap], seen.fit.center) > MOVED_PX
+                p[cap], sd[cap] = seen.fit.center, np.sqrt(np.trace(seen.fit.cov))
+        if moved:
+            found = [self.one(pictures, cap, p, sd) if seen.crowded else seen for cap, seen in enumerate(found)]
         return self._sightings(found)
 
     def detect(self, frame: ImageFrame) -> tuple[Candidate, ...]:
@@ -149,39 +160,56 @@ class Sighter:
             self._depth_lens.y[area], u0, v0,
         )  # fmt: skip
 
+    def _patch_about(self, patch: Patch, center: np.ndarray, reach_px: float) -> Patch | None:
+        """The part of a patch within reach of a point; None where nothing of it is."""
+        u, v = self.lens.project(center)
+        u0, u1 = max(int(np.floor(u - reach_px)) - patch.u0, 0), int(np.ceil(u + reach_px)) - patch.u0
+        v0, v1 = max(int(np.floor(v - reach_px)) - patch.v0, 0), int(np.ceil(v + reach_px)) - patch.v0
+        return patch.part(slice(v0, max(v1, v0)), slice(u0, max(u1, u0)))
+
     def _px(self, off: np.ndarray, center: np.ndarray) -> float:
         """Length across the line of sight [px] of a difference of points [m] near `center`."""
         along = center / np.linalg.norm(center)
         return float(np.linalg.norm(off - (off @ along) * along) * self._f / center[2])
 
-    def one(self, pictures: Pictures, cap: int, p_C: np.ndarray, sd: np.ndarray) -> tuple[int, BallFit | None]:
+    def one(self, pictures: Pictures, cap: int, p_C: np.ndarray, sd: np.ndarray) -> Seen:
         """Code and fit of one cap; p_C, sd: of all caps, those of the others for what hides it."""
         center, radius = p_C[cap], float(self.cap_radius[cap])
         if not (np.isfinite(center).all() and center[2] > 3 * radius):
-            return OUT_OF_VIEW, None
+            return Seen(OUT_OF_VIEW)
         disc_px = self._f * radius / center[2]
         spare = float(min(GATE_SD * sd[cap] * self._f / center[2], REACH_PX))
         patch = self.patch(pictures, cap // 2, center, 1.3 * disc_px + spare + 4.0)
         if patch is None:
-            return OUT_OF_VIEW, None
+            return Seen(OUT_OF_VIEW)
         if int(patch.colored.sum()) < LEAST_PIXELS:
-            return HIDDEN, None
+            return Seen(HIDDEN)
         margin = np.minimum(sd / np.sqrt(3.0), 0.01) + EDGE_PX * center[2] / self._f
         margin[cap] = EDGE_PX * center[2] / self._f
+        far = GATE_SD * float(sd[cap]) + FAR_SD * float(self._noise_sd(center[2])) + radius
         hidden = self._hidden(patch, p_C, cap, 0.0 * margin)
         told = ~in_front(patch, np.full_like(patch.z, center[2] - radius), self._noise_sd(center[2]))
-        start = self._fitter.place(patch, told, hidden, center, radius, spare / GATE_SD)
-        start = start * (self._distance(patch, start, radius) / start[2])
+        told &= ~self._twin(patch, p_C, cap, margin)
+        start = self._fitter.place(patch, told, hidden, center, radius, spare)
+        start = start * (self._distance(patch, start, radius, far) / start[2])
+        close = self._patch_about(patch, start, 1.2 * disc_px + 6.0)
+        if close is None:
+            return Seen(OUT_OF_VIEW)
+        patch = close
         moved = p_C.copy()
         moved[cap] = start
-        hidden = self._hidden(patch, moved, cap, margin)
-        z_cap = ball_depth(patch.x, patch.y, start, radius)
-        z_cap = np.where(np.isfinite(z_cap), z_cap, start[2])
-        hidden |= in_front(patch, z_cap, self._noise_sd(z_cap))
-        valid = ~hidden
-        seen = valid & moved_by(patch.colored, self.survey.shift_px)
-        fit = self._fitter.fit(patch, valid, seen, start, radius)
-        return self._judged(patch, cap, fit)
+        model = self._hidden(patch, moved, cap, margin)
+        own = ball_depth(patch.x, patch.y, start, radius)
+        z_cap = np.where(np.isfinite(own), own, start[2])
+        valid = ~(model | in_front(patch, z_cap, self._noise_sd(z_cap)))
+        seen = moved_by(patch.colored & valid, self.survey.shift_px)
+        seen &= np.abs(patch.z - center[2]) < far
+        twin = self._twin(patch, moved, cap, margin)
+        patch = replace(patch, colored=patch.colored & ~twin)
+        fit = self._fitter.fit(patch, valid & ~twin, seen, start, radius)
+        if self._px(fit.center - center, center) > spare + STRAY_PX:
+            return Seen(DOUBTFUL)
+        return self._judged(cap, fit, bool((model & np.isfinite(own)).any()))
 
     def _noise_sd(self, z: np.ndarray | float) -> np.ndarray:
         """Of depths z [m]."""
@@ -193,34 +221,44 @@ class Sighter:
         own = ball_depth(patch.x, patch.y, p_C[cap], float(self.cap_radius[cap]))
         return np.asarray(z < np.where(np.isfinite(own), own, p_C[cap, 2]))
 
-    def _distance(self, patch: Patch, center: np.ndarray, radius: float) -> float:
+    def _twin(self, patch: Patch, p_C: np.ndarray, cap: int, margin: np.ndarray) -> np.ndarray:
+        """Pixels beside a cap, or before it, that may show the other cap of its rod: they have the same colour. Bool (v, u)."""
+        twin = cap ^ 1
+        center, radius = p_C[twin], float(self.cap_radius[twin] + margin[twin])
+        if not center[2] > 2 * radius:
+            return np.zeros(patch.x.shape, dtype=bool)
+        z = ball_depth(patch.x, patch.y, center, radius)
+        own = ball_depth(patch.x, patch.y, p_C[cap], float(self.cap_radius[cap]))
+        return np.asarray(np.isfinite(z) & ~(own < z))
+
+    def _distance(self, patch: Patch, center: np.ndarray, radius: float, far: float) -> float:
         """Z of the centre [m] by the depths in its disc; that of `center` where there are none."""
         off = patch.z - ball_depth(patch.zx, patch.zy, center, radius)
-        on = patch.known & patch.colored & np.isfinite(off)
+        on = patch.known & patch.colored & (np.abs(off) < far)
         return float(center[2] + np.median(off[on])) if on.sum() >= DEPTHS_LEAST else float(center[2])
 
-    def _judged(self, patch: Patch, cap: int, fit: BallFit | None) -> tuple[int, BallFit | None]:
+    def _judged(self, cap: int, fit: BallFit, crowded: bool) -> Seen:
         """What a fit is worth."""
-        if fit is None or fit.visible < LEAST_VISIBLE:
-            return HIDDEN, None
+        if fit.visible < LEAST_VISIBLE:
+            return Seen(HIDDEN, crowded=crowded)
         along = fit.center / np.linalg.norm(fit.center)
         across = np.trace(fit.cov) - along @ fit.cov @ along
         if fit.rim < LEAST_RIM or not 0 <= across < SD_MOST_M**2 or fit.visible > 1.5:
-            return DOUBTFUL, None
+            return Seen(DOUBTFUL, crowded=crowded)
         ground = self.survey.ground
         if ground is not None and fit.depths >= DEPTHS_LEAST:
             low = self.cap_radius[cap] - float(ground.height(fit.center))
             if low > LOW_M + 4 * np.sqrt(ground.normal_C @ fit.cov @ ground.normal_C):
-                return DOUBTFUL, None
-        return (SEEN if fit.depths >= DEPTHS_LEAST else COLOR_ONLY), fit
+                return Seen(DOUBTFUL, crowded=crowded)
+        return Seen(SEEN if fit.depths >= DEPTHS_LEAST else COLOR_ONLY, fit, crowded)
 
-    def _sightings(self, found: list[tuple[int, BallFit | None]]) -> Sightings:
+    def _sightings(self, found: list[Seen]) -> Sightings:
         caps = len(found)
         p, cov = np.full((caps, 3), np.nan), np.full((caps, 3, 3), np.nan)
         visible, code = np.zeros(caps), np.zeros(caps, dtype=np.uint8)
         weight, total = np.zeros((2, 2)), np.zeros(2)
-        for cap, (reason, fit) in enumerate(found):
-            code[cap] = reason
+        for cap, seen in enumerate(found):
+            code[cap], fit = seen.code, seen.fit
             if fit is None:
                 continue
             p[cap], cov[cap], visible[cap] = fit.center, fit.cov, min(fit.visible, 1.0)

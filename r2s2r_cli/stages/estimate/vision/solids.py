@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,22 +37,24 @@ class Body:
         self.parts = tuple(parts)
 
     def nearest(self, x: np.ndarray, y: np.ndarray, p_C: np.ndarray, cap: int, margin: np.ndarray) -> np.ndarray:
-        """Depth [m] at which rays (x, y, 1) meet the robot first, cap `cap` itself left out; inf where they miss it.
+        """Depth [m] at which rays (x, y, 1) meet what of the robot may hide cap `cap`; inf where they miss it.
 
         p_C: all caps [m] (cap, 3); one with a NaN is left out, and so are the parts of its rod. margin: by which each
         cap is taken for larger [m], (cap,), as its position is not exact; parts of rods by what lies between their caps'.
         """
         z = np.full(x.shape, np.inf)
-        slope = np.array([x.mean(), y.mean()])
-        reach = float(np.hypot(np.ptp(x), np.ptp(y))) / 2
+        last = (x.shape[0] - 1, x.shape[1] - 1)
+        slope = ((x[0, 0] + x[last]) / 2, (y[0, 0] + y[last]) / 2)
+        reach = math.hypot(x[last] - x[0, 0], y[last] - y[0, 0]) / 2
+        behind = float(p_C[cap, 2])
         for i, center in enumerate(p_C):
-            radius = self.cap_radius[i] + margin[i]
-            if i != cap and _touches(center, radius, slope, reach):
+            radius = float(self.cap_radius[i] + margin[i])
+            if i != cap and center[2] - radius < behind and _touches(center, radius, slope, reach):
                 np.fmin(z, ball_depth(x, y, center, radius), out=z)
         for part in self.parts:
             even, odd = p_C[2 * part.rod], p_C[2 * part.rod + 1]
             along = odd - even
-            length = float(np.linalg.norm(along))
+            length = math.sqrt(float(along @ along))
             if not length > 1e-6:
                 continue
             share = 0.5 + part.offset / length
@@ -61,7 +64,8 @@ class Body:
             half, radius = part.half + spare, part.radius + spare
             if part.half >= length / 2 - 1e-3:
                 half = length / 2  # the rod itself ends in its caps
-            if _touches(middle, float(np.hypot(half, radius)), slope, reach):
+            nearest = middle[2] - half * abs(w[2]) - radius * math.sqrt(max(1 - w[2] ** 2, 0.0))
+            if nearest < behind and _touches(middle, math.hypot(half, radius), slope, reach):
                 np.fmin(z, _cylinder_depth(x, y, middle, w, half, radius), out=z)
         return z
 
@@ -95,10 +99,10 @@ def _cylinder_depth(
     return z
 
 
-def _touches(center: np.ndarray, radius: float, slope: np.ndarray, reach: float) -> bool:
-    """Whether a ball may be seen within `reach` (in slope) of a direction; not where it is not known or behind."""
-    if not center[2] > radius + 0.02:
+def _touches(center: np.ndarray, radius: float, slope: tuple[float, float], reach: float) -> bool:
+    """Whether a ball may be seen within `reach` (in slope) of a direction; not where it is not known or too close."""
+    x, y, z = (float(value) for value in center)
+    if not z > radius + 0.02:
         return False
-    off = float(np.hypot(*(center[:2] / center[2] - slope)))
-    stretch = 1.0 + float(center[:2] @ center[:2]) / center[2] ** 2
-    return off < reach + stretch * radius / (center[2] - radius)
+    off = math.hypot(x / z - slope[0], y / z - slope[1])
+    return off < reach + (1.0 + (x * x + y * y) / z**2) * radius / (z - radius)

@@ -60,6 +60,7 @@ def chain(
 
 
 STAGE_VERSIONS: dict[str, int] = {
-    "import": 1, "calibrate": 1, "record": 1, "estimate": 1, "identify": 1, "simulate": 1, "floor": 1, "compare": 1,
+    "import": 1, "calibrate": 1, "record": 1, "estimate": 1, "identify": 1, "simulate": 1, "floor": 1, "execute": 1,
+    "compare": 1,
 }  # fmt: skip
 """Raised by hand when a stage computes something else from the same input; `status` then calls its results stale."""

@@ -12,33 +12,37 @@ from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.store.project import Iteration, Project, journal_of
-from schemas.versions import KINDS
+from schemas.versions import KINDS, STAGE_VERSIONS
 
 if TYPE_CHECKING:
     from r2s2r_cli.stages.record import StreamLayout
     from r2s2r_cli.store.journal import Journal, JournalHead
     from r2s2r_cli.store.seal import Sealed
+    from schemas.header import InputRef
     from schemas.results_record import RecordReport
-
-STAGE = "record"
+SETTINGS = "record"
+"""Whoever executes a plan records it: the settings are the same."""
 
 
 @dataclass
 class Recording:
-    """Where a recording goes, and when it began. overrides, flags: of the command line."""
+    """Where a recording goes, and when it began. overrides, flags: of the command line. stage: `record`, or `execute`
+    for the runs of a plan, which have a file of their own. inputs: what the policies came from."""
 
     project: Project
     iteration: Iteration
     overrides: Mapping[str, Any]
     flags: Mapping[str, Any]
     seed: int | None
+    stage: str = "record"
+    inputs: Sequence[InputRef] = ()
     started: datetime = field(default_factory=lambda: datetime.now(UTC))
     clock: float = field(default_factory=time.monotonic)
 
     @property
     def target(self) -> Path:
         """The artifact."""
-        return self.iteration.artifact("recording")
+        return self.iteration.artifact("recording", executed=self.stage == "execute")
 
     def require_room(self, *, force: bool) -> None:
         """Raises UsageError where a recording is there: raw runs cannot be made again. force: it keeps another name."""
@@ -53,7 +57,7 @@ class Recording:
             raise UsageError(
                 "this iteration has a recording already, and what a robot did cannot be made again",
                 where=self.project.relative(self.target), expected="none", received="one",
-                hint=f"r2s2r record ... --iteration {newest + 1}   # or --force: the old one is kept as .replaced",
+                hint=f"r2s2r {self.stage} ... --iteration {newest + 1}   # or --force: the old one stays as .replaced",
             )  # fmt: skip
 
     def put_aside(self) -> Path | None:
@@ -87,10 +91,11 @@ class Recording:
         from r2s2r_cli.store.journal import Field, JournalHead, Stream
         from r2s2r_cli.store.provenance import build_provenance
 
-        use = wanted(self.project, self.iteration, STAGE, dict(self.overrides), self.flags)
+        use = wanted(self.project, self.iteration, SETTINGS, dict(self.overrides), self.flags)
         provenance = build_provenance(
-            stage=STAGE, stage_version=use.stage_version, argv=sys.argv, settings=use.settings,
-            overrides=self.overrides, robot=use.robot, inputs=(), started=self.started, wall_s=0.0, seed=self.seed,
+            stage=self.stage, stage_version=STAGE_VERSIONS[self.stage], argv=sys.argv, settings=use.settings,
+            overrides=self.overrides, robot=use.robot, inputs=self.inputs, started=self.started, wall_s=0.0,
+            seed=self.seed,
         )  # fmt: skip
         made = tuple(
             Stream(s.path, tuple(Field(name, dtype, shape) for name, dtype, shape in s.fields), s.attributes, s.name)

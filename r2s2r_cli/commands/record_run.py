@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from r2s2r_cli.stages.record import CameraFacts, RunPlan, Session
     from r2s2r_cli.store.project import Iteration, Project
     from schemas.config import RecordSettings
+    from schemas.header import InputRef
     from schemas.results import StageResult
     from schemas.results_record import RecordReport
     from schemas.robot import Robot
@@ -31,7 +32,7 @@ _RIG = "rig"
 
 @dataclass(frozen=True)
 class Wish:
-    """One command line of `record`, read and checked."""
+    """One command line of `record` or `execute` (stage), read and checked. inputs: what the policies came from."""
 
     project: Project
     iteration: Iteration
@@ -47,6 +48,12 @@ class Wish:
     seed: int | None
     draw: bool
     force: bool
+    stage: str = "record"
+    inputs: Sequence[InputRef] = ()
+
+    def recording(self) -> Recording:
+        """Where it goes."""
+        return Recording(self.project, self.iteration, self.overrides, self.flags, self.seed, self.stage, self.inputs)
 
 
 def carry_out(wish: Wish, console: Console) -> None:
@@ -55,9 +62,9 @@ def carry_out(wish: Wish, console: Console) -> None:
     from r2s2r_cli.stages.record import Session
     from r2s2r_cli.store.lock import writing
 
-    recording = Recording(wish.project, wish.iteration, wish.overrides, wish.flags, wish.seed)
+    recording = wish.recording()
     recording.require_room(force=wish.force)
-    with writing(wish.project.root, "record"):
+    with writing(wish.project.root, wish.stage):
         ended: BaseException | None = None
         session: Session | None = None
         try:
@@ -92,7 +99,7 @@ def look(wish: Wish, console: Console) -> None:
     from r2s2r_cli.views.record_page import look_tables, plan_table
     from schemas.results import StageResult
 
-    recording = Recording(wish.project, wish.iteration, wish.overrides, wish.flags, wish.seed)
+    recording = wish.recording()
     recording.require_room(force=wish.force)
     tables = [plan_table(wish.runs, wish.robot)]
     if wish.port:
@@ -106,7 +113,7 @@ def look(wish: Wish, console: Console) -> None:
         console.table(table.title, table.columns, table.rows)
     console.document(
         StageResult(
-            stage="record", state="dry_run", artifact=wish.project.relative(recording.target), content_sha256=None,
+            stage=wish.stage, state="dry_run", artifact=wish.project.relative(recording.target), content_sha256=None,
             reasons=("it was asked for",), inputs=(),
         )
     )  # fmt: skip
@@ -177,7 +184,7 @@ def _seal(wish: Wish, recording: Recording, session: Session, console: Console) 
         return None
     drawings = draw_recorded(wish.project, recording.target, report) if wish.draw else []
     return StageResult(
-        stage="record", state="done", artifact=wish.project.relative(recording.target), reasons=(), inputs=(),
+        stage=wish.stage, state="done", artifact=wish.project.relative(recording.target), reasons=(), inputs=(),
         content_sha256=sealed.header.content_sha256, drawings=tuple(drawings), report=report.model_dump(mode="json"),
     )  # fmt: skip
 

@@ -119,7 +119,7 @@ def _page(project: Project, place: Iteration) -> Path:
 def _compute(asked: Asked, settings: SimulateSettings, console: Console) -> tuple[ArtifactData, SimulateReport]:
     from r2s2r_cli.commands.interrupts import whole_items
 
-    (stage,) = whole_items(_loaded())
+    (stage,) = whole_items(loaded())
     requests, robot = asked.requests(), asked.project.robot()
     passed = {request.name: 0 for request in requests}
     with console.progress("simulate, targets", sum(map(stage.parts, requests))) as advance:
@@ -135,7 +135,7 @@ def _compute(asked: Asked, settings: SimulateSettings, console: Console) -> tupl
     return data, report
 
 
-def _loaded() -> Iterator[Any]:
+def loaded() -> Iterator[Any]:
     """The stage, with its libraries: compiled modules do not take an exception out of the blue while they load."""
     import r2s2r_cli.engine  # noqa: F401 - torch, roma, llvmlite
     import r2s2r_cli.stages.simulate as stage

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from r2s2r_cli.stages.estimate.kalman import process
 from r2s2r_cli.stages.estimate.motion.body import GROUND, Body
 from r2s2r_cli.stages.estimate.motion.chain import Normal
 from r2s2r_cli.stages.estimate.motion.crossing import add_crossings
@@ -12,14 +11,17 @@ from r2s2r_cli.stages.estimate.motion.data import MotionSettings
 from r2s2r_cli.stages.estimate.motion.evidence import Evidence
 from r2s2r_cli.stages.estimate.motion.factors import Frames
 
-SIGHTING_FREEDOM, SENSOR_FREEDOM = 8.0, 5.0
-"""Of Student's t. Few wild sightings (another thing of the same colour), more wild sensor samples (dropouts)."""
+SIGHTING_FREEDOM = 8.0
+"""Of Student's t: few sightings are wild (another thing of the same colour)."""
 START_SD = (3.0, 1.0)
 """Of position [m] and velocity [m/s] at the first frame: wide."""
 FLOOR_WALK_M = 2e-5
 """[m] Of the floor under the caps over 1 s: it stays, the walk only keeps the equations well-conditioned."""
 BELOW_SD_M = 1e-3
 """[m] Of how far a cap that is not known to touch may be below the floor."""
+LIFTED_M = 0.03
+"""[m] How high a cap may be that was taken to touch and does not: with the probability of that it widens the height
+(the variance of the mixture of both)."""
 SLIP_S = 0.3
 """[s] How long a cap keeps sliding: the slip speeds of neighbouring frames are one piece of evidence, not many."""
 
@@ -73,7 +75,7 @@ def _sensors(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body) -> N
         )
         slope = np.hstack([-u, u, -later * u, later * u, np.ones((len(x), 1))])
         residual = length + x[:, body.bias.start + s] - evidence.shown[:, s]
-        frames.scalar(states, slope, residual, weight, SENSOR_FREEDOM)
+        frames.scalar(states, slope, residual, weight, evidence.sensor_freedom)
 
 
 def _floor(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body, settings: MotionSettings) -> None:
@@ -88,11 +90,12 @@ def _floor(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body, settin
         slope = np.column_stack([-floor[:, 1], -floor[:, 2], one, -one, -p[:, 0], -p[:, 1]])
         touching = evidence.touching[:, cap]
         below = np.where(height < 0, 1 - touching, 0.0) / BELOW_SD_M**2
-        frames.scalar(states, slope, height, touching / settings.contact_sd_m**2 + below)
+        stands = touching / (settings.contact_sd_m**2 + (1 - touching) * LIFTED_M**2)
+        frames.scalar(states, slope, height, stands + below)
         if np.any(touching):
             for axis in range(2):
                 v = x[:, body.v(cap)[axis]]
-                frames.scalar(body.v(cap)[axis : axis + 1], one[:, None], v, touching * slip, 4.0)
+                frames.scalar(body.v(cap)[axis : axis + 1], one[:, None], v, touching**2 * slip, 4.0)
 
 
 def slip_weight(t: np.ndarray, settings: MotionSettings) -> np.ndarray:
@@ -104,9 +107,14 @@ def slip_weight(t: np.ndarray, settings: MotionSettings) -> np.ndarray:
 def transition_information(evidence: Evidence) -> np.ndarray:
     """Inverse covariance of position and velocity over each gap, (frame - 1, cap, 2, 2)."""
     dt = np.diff(evidence.t)
-    unit = np.array([np.linalg.inv(process(gap)) for gap in dt])
     density = evidence.density + (evidence.kick / dt)[:, None]
-    return np.asarray(unit[:, None] / density[:, :, None, None])
+    return np.asarray(unit_information(dt)[:, None] / density[:, :, None, None])
+
+
+def unit_information(dt: np.ndarray) -> np.ndarray:
+    """Inverse of `kalman.process`, (gap,) to (gap, 2, 2)."""
+    rows = np.array([[12.0 * dt**-3, -6.0 * dt**-2], [-6.0 * dt**-2, 4.0 / dt]])
+    return np.moveaxis(rows, 2, 0)
 
 
 def _motion(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body, settings: MotionSettings) -> np.ndarray:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from r2s2r_cli.stages.estimate.kalman import process
 from r2s2r_cli.stages.estimate.motion.body import Body
 from r2s2r_cli.stages.estimate.motion.chain import Marginals
+from r2s2r_cli.stages.estimate.motion.equations import unit_information
 from r2s2r_cli.stages.estimate.motion.evidence import Evidence
 
 WILD = 25.0
@@ -77,7 +77,7 @@ def gap_density(x: np.ndarray, marginal: Marginals, evidence: Evidence, body: Bo
         off[:, :, None] * off[:, None, :] + now[1:] - turned - np.swapaxes(turned, 1, 2)
         + np.einsum("kia,kabc,kjb->kijc", f, now[:-1], f)
     )  # fmt: skip
-    unit = np.array([np.linalg.inv(process(gap)) for gap in dt])
+    unit = unit_information(dt)
     each = np.einsum("kij,kjic->kc", unit, out)
     return np.asarray(each.reshape(len(dt), caps, 3).sum(axis=2) / _PARTS)
 

@@ -98,7 +98,8 @@ def first_evidence(prepared: Prepared, body: Body, settings: MotionSettings, swi
     return Evidence(
         t=prepared.t, seen=prepared.seen, information=information(prepared, np.ones(2)),
         density=np.full((gaps, body.caps), settings.acceleration), kick=kick,
-        shown=none, later=none, samples=none, sensor_weight=none, touching=np.zeros((len(prepared.t), body.caps)),
+        shown=none, later=none, samples=none, sensor_weight=none,
+        sensor_freedom=None, touching=np.zeros((len(prepared.t), body.caps)),
     )  # fmt: skip
 
 

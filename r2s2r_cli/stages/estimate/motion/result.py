@@ -21,7 +21,7 @@ from r2s2r_cli.stages.estimate.motion.data import (
 from r2s2r_cli.stages.estimate.motion.equations import SIGHTING_FREEDOM
 from r2s2r_cli.stages.estimate.motion.factors import heavy_tail
 from r2s2r_cli.stages.estimate.motion.prepare import Prepared
-from r2s2r_cli.stages.estimate.motion.rounds import State, cap_covariances, distances
+from r2s2r_cli.stages.estimate.motion.rounds import State, cap_covariances, distances, known
 
 USED = 0.3
 """A sighting whose weight fell below this share contradicts the rest: nearly 5 standard deviations off."""
@@ -33,8 +33,7 @@ def tracked_run(
     state: State, prepared: Prepared, clock: SensorClock, body: Body, settings: MotionSettings
 ) -> TrackedRun:
     """At the run's own frames; the knots in its holes are left out."""
-    assert state.marginal is not None and state.solved is not None
-    x, cov, rows = state.x, state.marginal.cov, prepared.given
+    x, cov, rows = state.x, known(state).cov, prepared.given
     p_cov = cap_covariances(cov, body)
     speed = 3 * body.caps
     v_cov = np.stack([cov[:, (b := body.p(c) + speed)[:, None], b] for c in range(body.caps)], axis=1)
@@ -61,7 +60,7 @@ def tracked_run(
         contact=contacts(state.evidence.touching)[rows], contact_probability=state.evidence.touching[rows],
         quality=quality[rows], mode=mode[rows], score=score[rows], noise_scale=np.sqrt(state.factor),
         acceleration=np.array([state.evidence.density[first == k].mean(axis=0) for k in range(len(rows) - 1)]),
-        rounds=state.rounds, settled=state.solved.settled,
+        rounds=state.rounds, settled=state.solved is not None and state.solved.settled,
     )  # fmt: skip
 
 

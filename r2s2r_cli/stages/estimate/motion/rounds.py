@@ -9,16 +9,14 @@ import numpy as np
 from r2s2r_cli.stages.estimate.motion.body import Body
 from r2s2r_cli.stages.estimate.motion.chain import Marginals, marginals
 from r2s2r_cli.stages.estimate.motion.data import MotionSettings
-from r2s2r_cli.stages.estimate.motion.equations import SENSOR_FREEDOM, SIGHTING_FREEDOM
 from r2s2r_cli.stages.estimate.motion.evidence import Evidence
-from r2s2r_cli.stages.estimate.motion.factors import heavy_tail
 from r2s2r_cli.stages.estimate.motion.noise import gap_density, next_density, sensor_variance, sighting_scale
 from r2s2r_cli.stages.estimate.motion.prepare import Prepared, information, principal
 from r2s2r_cli.stages.estimate.motion.solve import Solved, solve
 from r2s2r_cli.stages.estimate.motion.touching import touching_probability
 
-STEPS = 6
-"""Gauss-Newton steps between two looks at the noise, at most."""
+STEPS = 10
+"""Gauss-Newton steps of the last round, at most."""
 DEAD_NOISE_M = 0.02
 """[m] A sensor with more noise than this says nothing."""
 
@@ -46,8 +44,7 @@ def settle(state: State, body: Body, settings: MotionSettings, *, steps: int = S
 
 def learn(state: State, prepared: Prepared, body: Body) -> State:
     """Noise of sightings, sensors and motion from the present states."""
-    assert state.marginal is not None
-    evidence, cov = state.evidence, state.marginal.cov
+    evidence, cov = state.evidence, known(state).cov
     p_cov = cap_covariances(cov, body)
     rows = np.nonzero(prepared.sighted)
     p = body.positions(state.x)
@@ -66,7 +63,7 @@ def learn(state: State, prepared: Prepared, body: Body) -> State:
         square = residual[used] ** 2 / variance
         usual = square < 16.0 * max(float(np.median(square)) / 0.455, 0.1)
         noise[s] *= np.sqrt(sensor_variance(residual[used], variance, spread[used], usual))
-    each = gap_density(state.x, state.marginal, evidence, body)
+    each = gap_density(state.x, known(state), evidence, body)
     believed = prepared.sighted[1:] & prepared.sighted[:-1]
     density = next_density(each, evidence.kick, np.diff(evidence.t), believed)
     weight = sensor_weights(evidence.samples, noise)
@@ -74,11 +71,25 @@ def learn(state: State, prepared: Prepared, body: Body) -> State:
     return replace(state, evidence=evidence, factor=factor, noise=noise)
 
 
-def touch(state: State, body: Body) -> State:
-    """Contacts from the present heights."""
-    assert state.marginal is not None
-    height, sd = heights(state.x, state.marginal.cov, body)
-    return replace(state, evidence=replace(state.evidence, touching=touching_probability(state.evidence.t, height, sd)))
+def touch(state: State, prepared: Prepared, body: Body, *, hidden: bool) -> State:
+    """Contacts from the present heights. hidden: also of caps while they are not sighted.
+
+    Contacts that are put into the equations pull the heights they come from: where nothing else holds a height, a guess
+    would prove itself. So contacts of hidden caps are told once, from heights that know none of them.
+    """
+    marginal = known(state)
+    height, sd = heights(state.x, marginal.cov, body)
+    touching = touching_probability(state.evidence.t, height, sd)
+    if not hidden:
+        touching = np.where(prepared.sighted, touching, 0.0)
+    return replace(state, evidence=replace(state.evidence, touching=touching))
+
+
+def known(state: State) -> Marginals:
+    """Covariances of a state that was settled."""
+    if state.marginal is None:
+        raise ValueError("settle comes before anything that asks for covariances")
+    return state.marginal
 
 
 def sensor_weights(samples: np.ndarray, noise: np.ndarray) -> np.ndarray:
@@ -135,9 +146,3 @@ def sensor_residual(
     slope = np.hstack([-u, u, np.ones((len(x), 1))])
     variance = np.einsum("ki,kij,kj->k", slope, cov[:, states[:, None], states], slope)
     return evidence.shown[:, s] - length - x[:, bias], variance
-
-
-__all__ = [
-    "SENSOR_FREEDOM", "SIGHTING_FREEDOM", "State", "cap_covariances", "distances", "heavy_tail", "heights", "learn",
-    "sensor_residual", "sensor_weights", "settle", "touch",
-]  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-STEADY_S = 0.5
+STEADY_S = 1.5
 """[s] How long a cap usually stays on or off the floor."""
 GIVE_M = 2e-4
 """[m] By how much the heights of caps that carry weight differ."""

@@ -57,16 +57,11 @@ class RigCamera:
         place = self._place(t)
         solids = self._scene.solids(p_WE, t)
         moments = self._moments(place.X_WC, p_WE, v_WE)
-        views = [
-            render.draw(self._lens, self._scene.solids(p_WE + dt * v_WE, t + dt).seen_from(place.X_WC))
-            if v_WE is not None and dt
-            else render.draw(self._lens, solids.seen_from(place.X_WC))
-            for dt in moments
-        ]
+        # What gets in the way may come or go within the exposure: each moment has solids, and colours, of its own.
+        drawn = [self._scene.solids(p_WE + dt * v_WE, t + dt) if v_WE is not None and dt else solids for dt in moments]
+        views = [(render.draw(self._lens, one.seen_from(place.X_WC)), one.rgb) for one in drawn]
         seen = render.draw(self._depth_lens, solids.seen_from(place.X_WC), MARGIN_PX)
-        return Picture(
-            self._color.report(place.picture, views, solids.rgb, t, rng), self._depth.report(place.inverse, seen, rng)
-        )
+        return Picture(self._color.report(place.picture, views, t, rng), self._depth.report(place.inverse, seen, rng))
 
     def _moments(self, X_WC: np.ndarray, p_WE: np.ndarray, v_WE: np.ndarray | None) -> list[float]:
         """Times about the middle of the exposure [s] at which the robot is drawn: one for each pixel it moves."""

@@ -47,18 +47,17 @@ class ColorSensor:
         return np.clip(picture, 0, 255).astype(np.float32)
 
     def report(
-        self, floor: np.ndarray, views: Sequence[View], rgb: np.ndarray, t: float, rng: np.random.Generator
+        self, floor: np.ndarray, views: Sequence[tuple[View, np.ndarray]], t: float, rng: np.random.Generator
     ) -> np.ndarray:
-        """RGB uint8 (v, u, 3). floor: from `floor`. views: the solids at moments spread over the exposure.
-
-        rgb: colours of the solids 0 .. 255 (solid, 3). t: rig time, for the drift of the exposure.
+        """RGB uint8 (v, u, 3). floor: from `floor`. views: the solids at moments spread over the exposure, with their
+        colours 0 .. 255 (solid, 3). t: rig time, for the drift of the exposure.
         """
         picture = floor.astype(np.uint16)
-        rows, columns = _around(views)
+        rows, columns = _around([view for view, _ in views])
         if rows.stop > rows.start:
             part = floor[rows, columns]
             total = np.zeros_like(part)
-            for view in views:
+            for view, rgb in views:
                 one = part.copy()
                 covered = view.label >= 0
                 inner = one[view.top - rows.start :, view.left - columns.start :][

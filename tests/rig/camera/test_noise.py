@@ -274,3 +274,18 @@ def test_caps_are_found_where_they_are() -> None:
     bias = np.array(errors).reshape(10, len(seen), 3).mean(axis=0)
     assert np.linalg.norm(bias, axis=1).max() < 1e-3
     assert np.abs(bias.mean(axis=0)).max() < 0.4e-3
+
+
+def test_what_comes_within_an_exposure_is_seen_through() -> None:
+    """The robot moves, so three moments are drawn; a ball that comes before the last of them shows by a third."""
+    ball = {"a_m": (0.3, 0.0, 0.3), "b_m": (0.3, 0.0, 0.3), "radius_m": 0.1, "rgb": (255, 255, 255)}
+    v = np.tile([0.6, 0.0, 0.0], (len(CAPS), 1))
+    before, halfway, after = (
+        colors(settings(color={"exposure_s": 0.03}, occluders=(Occluder(**ball, from_s=from_s),)), t=1.0, v=v).color
+        for from_s in (9.0, 1.005, 0.5)
+    )
+    gone, there = before.astype(float), after.astype(float)
+    ball_only = (there != gone).any(axis=-1)
+    assert ball_only.sum() > 20
+    mixed = (2 * gone + there) / 3
+    assert np.abs(halfway[ball_only] - mixed[ball_only]).max() <= 2.0

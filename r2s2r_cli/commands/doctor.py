@@ -14,7 +14,7 @@ import typer
 
 from r2s2r_cli import __version__
 from r2s2r_cli.commands.doctor_camera import camera
-from r2s2r_cli.commands.doctor_ports import ports
+from r2s2r_cli.commands.doctor_ports import NO_PORTS, ports
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import GateError, R2S2RError
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
@@ -25,6 +25,7 @@ LIBRARIES: dict[str, tuple[str, str]] = {
     "torch": ("error", "pip install torch==2.13.0"),
     "cv2": ("error", "pip install --force-reinstall opencv-python-headless"),
     "serial": ("error", "pip install --force-reinstall pyserial"),
+    "mujoco": ("warning", "pip install 'r2s2r[rig]'"),
     "open3d": ("warning", "apt-get install libusb-1.0-0 libgl1 libegl1 libx11-6 libudev1 libidn2-0"),
 }
 """What is imported, in a process of its own; what its failure means; the remedy."""
@@ -43,7 +44,9 @@ def doctor(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Check this machine: versions, libraries (each imported in a process of its own), disk, the project.
+    """Check this machine: versions, libraries (each imported in a process of its own), disk, the project, serial ports.
+
+    `doctor ports PORT` looks at the robot on a port, `doctor camera` through a camera.
 
     Example: r2s2r doctor
     """
@@ -52,6 +55,7 @@ def doctor(
     console = Console(json=json, quiet=quiet)
     probes = [*_installation(), *_place(project)]
     if not quick:
+        probes += _outlets()
         with console.progress("libraries", len(LIBRARIES)) as advance:
             for name, (state, hint) in LIBRARIES.items():
                 probes.append(_library(name, state, hint))
@@ -110,6 +114,20 @@ def _place(project: Path | None) -> Iterator[Probe]:
     enough = free > MIN_FREE_BYTES
     yield Probe(name="disk", state="ok" if enough else "warning", found=f"{free / 1e9:.1f} GB free",
                 hint="" if enough else f"df -h '{root}'")  # fmt: skip
+
+
+def _outlets() -> Iterator[Probe]:
+    """Serial ports, and what reads a RealSense camera; the rig and TCP or UDP robots need neither."""
+    from importlib.util import find_spec
+
+    from r2s2r_cli.commands.doctor_ports import machine
+
+    for probe in machine():
+        yield probe.model_copy(update={"state": "ok", "hint": ""}) if probe.name == NO_PORTS else probe
+    modules = (("realsense", "pyrealsense2"), ("open3d", "open3d"))
+    ways = [f"--camera {way}" for way, module in modules if find_spec(module)]
+    yield Probe(name="RealSense cameras", state="ok",
+                found=" or ".join(ways) if ways else "neither pyrealsense2 nor open3d is installed")  # fmt: skip
 
 
 def _library(name: str, failed_state: str, hint: str) -> Probe:

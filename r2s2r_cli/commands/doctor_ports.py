@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from schemas.robot import Robot
 
 State = Literal["ok", "warning", "error"]
+NO_PORTS = "serial ports"
+"""The probe that says that there are none."""
 LOW_RATE = 0.8
 """Of the control rate: below it the gains of the controller, which count ticks, belong to another robot."""
 SLOW_S = 0.1
@@ -46,7 +48,7 @@ def ports(
     """
     console = Console(json=json, quiet=quiet)
     if port is None:
-        probes = list(_machine())
+        probes = list(machine())
     else:
         from r2s2r_cli.store.project import Project
 
@@ -62,7 +64,8 @@ def ports(
                         expected="working", received=failed[0].found, hint=failed[0].hint)  # fmt: skip
 
 
-def _machine() -> Iterator[Probe]:
+def machine() -> Iterator[Probe]:
+    """The serial ports of this machine, and whether this user may open them; none is opened."""
     from r2s2r_cli.hardware.ports import serial_ports
 
     found = serial_ports()
@@ -71,7 +74,7 @@ def _machine() -> Iterator[Probe]:
                     found=port.description + ("" if port.allowed else ", which this user may not open"),
                     hint="" if port.allowed else 'sudo usermod -aG dialout "$USER"  # then log in again')  # fmt: skip
     if not found:
-        yield Probe(name="serial ports", state="warning", found="none; TCP and UDP need none",
+        yield Probe(name=NO_PORTS, state="warning", found="none; TCP and UDP need none",
                     hint="r2s2r rig  # a virtual robot to try things on")  # fmt: skip
 
 

@@ -187,10 +187,12 @@ def test_inspect_refuses_what_is_no_hdf5(tmp_path: Path, content: bytes) -> None
 
 
 def test_doctor_names_the_project_and_the_libraries(project: Path) -> None:
-    """doctor finds this project, our schemas, and an HDF5 library that writes and reads."""
+    """doctor finds this project, our schemas, an HDF5 library that writes and reads, ports and ways to a camera."""
     probes = {probe["name"]: probe for probe in document("doctor")["probes"]}
     assert probes["schemas"]["state"] == probes["HDF5 write and read"]["state"] == "ok"
     assert str(project) in probes["project"]["found"]
+    assert "serial ports" in probes or any(name.startswith(("/dev/", "COM")) for name in probes)
+    assert probes["import mujoco"]["state"] == "ok" and "--camera open3d" in probes["RealSense cameras"]["found"]
     assert {probe["state"] for name, probe in probes.items() if name.startswith("import ")} <= {"ok", "warning"}
 
 

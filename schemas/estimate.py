@@ -152,6 +152,11 @@ TRACKS = GroupSpec(
         column("noise_sd", "float64", ("cap", "xyz"), "m", "noise of the observations that was assumed", frame="W"),
         column("held", "bool", ("cap", "xyz"), "bool", "the source held this coordinate (ground constraint of a tracker): "
           "its noise is not known, the median of the run stands in"),
+        column("observed", "float64", ("frame", "cap", "xyz"), "m", "camera images: caps as they were known at this frame "
+          "from it and those before it alone, cables and rods included; quality says which were seen", frame="W",
+          required=False),
+        column("observed_sd", "float64", ("frame", "cap", "xyz"), "m", "standard deviation of observed, per axis",
+          frame="W", required=False),
         column("speed_change", "float64", ("cap",), "m/s", "process noise: standard deviation of the change of velocity "
           "over 1 s, per axis, as used: twice the density of highest likelihood"),
         column("innovation_variance", "float64", ("cap",), "1", "mean squared innovation over its variance, at the highest "

@@ -36,7 +36,7 @@ HIDE_S = 1.0
 """So long a cap is hidden, and then so long seen again."""
 CLOCK_S = 0.05
 """Camera and robot clocks differ by up to this."""
-_VERSION = 3
+_VERSION = 4
 """Of kept cases: raise it when the same settings make another run."""
 
 
@@ -184,33 +184,35 @@ def _camera(setting: Setting, motion: Motion, seed: int) -> CameraSettings:
         "position_m": (float(middle[0]), float(middle[1]), setting.height_m),
         "look_at_m": (float(middle[0]), float(middle[1]), 0.0), "depth": depth,
     })  # fmt: skip
+    exposures = _exposures(camera, seed, float(motion.t[-1]))[:, 1]
     occluders: list[Occluder] = []
     if setting.hide_cap:
-        occluders += _hide_one(camera, motion, seed % motion.p_WE.shape[1])
+        occluders += _hide_one(camera, motion, seed % motion.p_WE.shape[1], exposures)
     if setting.blind_s:
-        occluders += _hide_all(camera, motion, setting.blind_s)
+        occluders += _hide_all(camera, motion, setting.blind_s, exposures)
     return camera.model_copy(update={"occluders": tuple(occluders)})
 
 
-def _hide_one(camera: CameraSettings, motion: Motion, cap: int) -> Iterator[Occluder]:
+def _hide_one(camera: CameraSettings, motion: Motion, cap: int, exposures: np.ndarray) -> Iterator[Occluder]:
     """Balls that follow a cap for HIDE_S, four fifths of the way from camera to cap, every other HIDE_S."""
     from r2s2r_cli.rig.camera.settings import Occluder
 
     eye, share, radius = np.array(camera.position_m), 0.8, 0.0175
     start = HIDE_S
     while start < motion.t[-1]:
-        span = (motion.t >= start) & (motion.t <= start + HIDE_S)
-        t, p = motion.t[span] - start, motion.p_WE[span, cap]
+        first, last = _between(start, exposures), _between(start + HIDE_S, exposures)
+        span = (motion.t >= first) & (motion.t <= last)
+        t, p = motion.t[span] - first, motion.p_WE[span, cap]
         way = eye + share * (p - eye)
         if len(t) > 1:
             line = np.polynomial.polynomial.polyfit(t, way, 1)
             off = np.linalg.norm(way - (line[0] + t[:, None] * line[1]), axis=1).max()
-            yield Occluder(a_m=_point(line[0]), b_m=_point(line[0]), v_m_per_s=_point(line[1]), from_s=start,
-                           until_s=start + HIDE_S, radius_m=float(1.25 * share * radius + off + 0.004))  # fmt: skip
+            yield Occluder(a_m=_point(line[0]), b_m=_point(line[0]), v_m_per_s=_point(line[1]), from_s=first,
+                           until_s=last, radius_m=float(1.25 * share * radius + off + 0.004))  # fmt: skip
         start += 2 * HIDE_S
 
 
-def _hide_all(camera: CameraSettings, motion: Motion, seconds: float) -> Iterator[Occluder]:
+def _hide_all(camera: CameraSettings, motion: Motion, seconds: float, exposures: np.ndarray) -> Iterator[Occluder]:
     """A ball half-way to the robot, when its caps go farthest in so long a time, in the middle of the run."""
     from r2s2r_cli.rig.camera.settings import Occluder
 
@@ -223,8 +225,14 @@ def _hide_all(camera: CameraSettings, motion: Motion, seconds: float) -> Iterato
     centre = p.mean(axis=(0, 1))
     a = _point(eye + share * (centre - eye))
     reach = np.linalg.norm((p - centre)[..., :2], axis=-1).max() + 0.06
-    yield Occluder(a_m=a, b_m=a, radius_m=float(1.3 * share * reach), from_s=float(motion.t[first]),
-                   until_s=float(motion.t[first] + seconds))  # fmt: skip
+    come, go = (_between(float(motion.t[first]) + wait, exposures) for wait in (0.0, seconds))
+    yield Occluder(a_m=a, b_m=a, radius_m=float(1.3 * share * reach), from_s=come, until_s=go)
+
+
+def _between(t: float, exposures: np.ndarray) -> float:
+    """The instant midway between the exposures before and after t [s]: nothing comes or goes in the midst of one."""
+    after = int(np.clip(np.searchsorted(exposures, t), 1, len(exposures) - 1))
+    return float(exposures[after - 1] + exposures[after]) / 2
 
 
 def _point(p: np.ndarray) -> tuple[float, float, float]:

@@ -86,8 +86,13 @@ def _frames(state: RunState) -> Group:
 
 def _tracks(state: RunState) -> Group:
     variance, lag1, white = whiteness(state.tracks.innovation)
+    known = {}
+    if state.camera is not None:
+        swept = state.camera.swept
+        known = {"observed": swept.known + np.array([0.0, 0.0, state.ground.shift]), "observed_sd": swept.known_sd}
     return Group(
         {
+            **known,
             "noise_sd": state.noise,
             "held": state.held,
             "speed_change": np.sqrt(state.tracks.density),

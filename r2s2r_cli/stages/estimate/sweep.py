@@ -17,7 +17,7 @@ from r2s2r_cli.stages.estimate.motion.forward import Forward
 from r2s2r_cli.stages.estimate.motion.labels import label
 from r2s2r_cli.stages.estimate.vision.frames import FrameSource, ImageFrame
 from r2s2r_cli.stages.estimate.vision.sight import Sighter
-from r2s2r_cli.stages.estimate.vision.sightings import HIDDEN, NO_PICTURE, Candidate, Sightings
+from r2s2r_cli.stages.estimate.vision.sightings import HIDDEN, Candidate
 from r2s2r_cli.stages.estimate.vision.world import from_world, to_world
 from schemas.robot import Robot
 
@@ -27,14 +27,20 @@ FRESH_S = 0.06
 
 @dataclass(frozen=True)
 class Swept:
-    """What the pass found, one row a frame. visible: share of each cap that is seen, (frame, cap). code: see REASONS of
-    vision/sightings.py, uint8 (frame, cap). shift_px: depth against colour, (frame, 2), NaN where unknown. first:
-    frame in which the caps were told apart. searched: frames in which they had to be found again, (frame,) bool."""
+    """What the pass found, one row a frame.
+
+    visible: share of each cap that is seen, (frame, cap). code: see REASONS of vision/sightings.py, uint8 (frame, cap).
+    shift_px: depth against colour, (frame, 2), NaN where unknown. known: caps from this frame and those before it alone
+    [m], (frame, cap, 3), known_sd [m]; of frames before `first` from those after. first: frame in which the caps were
+    told apart. searched: frames in which they had to be found again, (frame,) bool.
+    """
 
     sighted: Sighted
     visible: np.ndarray
     code: np.ndarray
     shift_px: np.ndarray
+    known: np.ndarray
+    known_sd: np.ndarray
     first: int
     searched: np.ndarray
 
@@ -50,10 +56,15 @@ class Sweep:
         self._run, self._source, self._sighter, self._X_WC, self._robot = run, source, sighter, X_WC, robot
         self._settings, self._advance = settings, advance
         self._lengths = _at_frames(source.t, readings)
+        self._stamps, self._samples = _in_order(readings)
+        before = np.searchsorted(self._stamps, source.t, side="right")
+        # What was heard long before the first frame is of no use to it.
+        self._since = np.concatenate([[np.searchsorted(self._stamps, source.t[0] - FRESH_S)], before])
         self._cable = np.zeros(0, dtype=int) if readings is None else readings.cable
         self._p, self._cov = np.full((n, caps, 3), np.nan), np.full((n, caps, 3, 3), np.nan)
         self._visible, self._code = np.zeros((n, caps)), np.full((n, caps), HIDDEN, dtype=np.uint8)
         self._shift = np.full((n, 2), np.nan)
+        self._known, self._known_sd = np.zeros((n, caps, 3)), np.zeros((n, caps, 3))
         self._searched = np.zeros(n, dtype=bool)
         self._seen = np.zeros(len(robot.rods), dtype=int)
 
@@ -72,17 +83,17 @@ class Sweep:
             raise self._not_found()
         if first:
             self._backwards(first, start)
-        return Swept(Sighted(self._source.t, self._p, self._cov), self._visible, self._code, self._shift, first,
-                     self._searched)  # fmt: skip
+        return Swept(Sighted(self._source.t, self._p, self._cov), self._visible, self._code, self._shift,
+                     self._known, self._known_sd, first, self._searched)  # fmt: skip
 
     def _backwards(self, first: int, start: np.ndarray) -> None:
-        back = self._started(float(self._source.t[first]), start)
+        back = self._started(float(self._source.t[first]), start, backwards=True)
         for frame in _in_reverse(self._source, first):
             self._look(back, frame)
 
-    def _started(self, t: float, p_WE: np.ndarray) -> Forward:
-        forward = Forward(self._robot, self._settings)
-        forward.start(t, p_WE)
+    def _started(self, t: float, p_WE: np.ndarray, *, backwards: bool = False) -> Forward:
+        forward = Forward(self._robot, self._settings, self._cable)
+        forward.start(t, p_WE, backwards=backwards)
         return forward
 
     def _begin(self, frame: ImageFrame) -> np.ndarray | None:
@@ -96,23 +107,30 @@ class Sweep:
         return found.p_WE if found is not None and found.sure else None
 
     def _look(self, forward: Forward, frame: ImageFrame) -> None:
-        k = frame.index
-        if len(self._cable):
-            forward.sense(frame.t, self._lengths[k])
+        self._sighted(forward, frame)
         p_WE, cov = forward.predict(frame.t)
-        if forward.lost and not self._find(forward, frame):
-            return
-        if forward.lost or self._searched[k]:
+        self._known[frame.index] = p_WE
+        self._known_sd[frame.index] = np.sqrt(np.diagonal(cov, axis1=1, axis2=2))
+
+    def _sighted(self, forward: Forward, frame: ImageFrame) -> None:
+        k = frame.index
+        for row in range(self._since[k], self._since[k + 1]):
+            forward.sense(float(self._stamps[row]), self._samples[row])
+        p_WE, cov = forward.predict(frame.t)
+        lost = forward.lost
+        if lost and self._find(forward, frame):
+            lost = False
             p_WE, cov = forward.predict(frame.t)
         seen = self._sighter.sight(frame, *from_world(self._X_WC, p_WE, cov))
-        self._keep(k, seen)
+        self._visible[k], self._code[k], self._shift[k] = seen.visible, seen.code, seen.shift_px
         p, cov_p = to_world(self._X_WC, seen.p_C, seen.cov_C)
-        forward.update(frame.t, p, cov_p)
-        self._p[k], self._cov[k] = p, cov_p
+        used = forward.update(frame.t, p, cov_p)
+        # Who is lost may look at the wrong cap: what contradicts the prediction is not even kept.
+        self._p[k] = np.where((used | ~np.array(lost))[:, None], p, np.nan)
+        self._cov[k] = cov_p
 
     def _find(self, forward: Forward, frame: ImageFrame) -> bool:
-        if frame.color is None or frame.depth is None:
-            self._code[frame.index] = NO_PICTURE
+        if frame.color is None:
             return False
         candidates = self._sighter.detect(frame)
         covs = [c.cov_C for c in candidates]
@@ -121,9 +139,6 @@ class Sweep:
         found = forward.reacquire(frame.t, self._in_world(candidates), cov)
         self._searched[frame.index] = found
         return found
-
-    def _keep(self, k: int, seen: Sightings) -> None:
-        self._visible[k], self._code[k], self._shift[k] = seen.visible, seen.code, seen.shift_px
 
     def _in_world(self, candidates: Iterable[Candidate]) -> list[np.ndarray]:
         found: list[list[np.ndarray]] = [[] for _ in self._robot.rods]
@@ -156,12 +171,19 @@ def _in_reverse(source: FrameSource, first: int) -> Iterable[ImageFrame]:
         yield source.frame(index)
 
 
+def _in_order(readings: Readings | None) -> tuple[np.ndarray, np.ndarray]:
+    """Stamps [s] and lengths [m] in the order of time."""
+    if readings is None:
+        return np.zeros(0), np.zeros((0, 0))
+    order = np.argsort(readings.t, kind="stable")
+    return readings.t[order], readings.length[order]
+
+
 def _at_frames(t: np.ndarray, readings: Readings | None) -> np.ndarray:
     """Median of each sensor's readings in the FRESH_S before each frame [m], (frame, sensor); NaN: none."""
     if readings is None:
         return np.zeros((len(t), 0))
-    order = np.argsort(readings.t, kind="stable")
-    stamps, length = readings.t[order], readings.length[order]
+    stamps, length = _in_order(readings)
     first, last = np.searchsorted(stamps, t - FRESH_S, side="right"), np.searchsorted(stamps, t, side="right")
     found = np.full((len(t), length.shape[1]), np.nan)
     for k, (a, b) in enumerate(zip(first, last, strict=True)):

@@ -26,19 +26,24 @@ LINKS, PROTOCOLS = ("pty", "tcp", "udp"), ("checked", "legacy", "boards")
 
 
 @pytest.mark.parametrize(
-    ("link", "protocol"),
+    ("link", "protocol", "shared"),
     [
-        pytest.param(link, protocol, marks=() if i == j else pytest.mark.slow)  # each of both once in the fast suite
-        for i, link in enumerate(LINKS) for j, protocol in enumerate(PROTOCOLS)
+        *(
+            pytest.param(link, protocol, False, marks=() if i == j else pytest.mark.slow)  # each once in the fast suite
+            for i, link in enumerate(LINKS) for j, protocol in enumerate(PROTOCOLS)
+        ),
+        ("udp", "boards", True), *(pytest.param("udp", name, True, marks=pytest.mark.slow) for name in PROTOCOLS[:2]),
     ],
 )  # fmt: skip
-def test_the_controller_reaches_its_target_in_every_protocol_over_every_link(link: str, protocol: str) -> None:
+def test_the_controller_reaches_its_target_in_every_protocol_over_every_link(
+    link: str, protocol: str, shared: bool
+) -> None:
     """2 s of the world: cable 0 is wound to its target, nothing is lost, what is measured is what is, motors end at 0.
 
     The sensors are off by their own errors: 5 mm of bias, 2 mm of bend; 20 mm is four of the whole.
     """
     robot = calibrated()
-    with running_rig(robot, link=link, protocol=protocol) as rig:
+    with running_rig(robot, link=link, protocol=protocol, shared=shared) as rig:
         with GuardedLink(open_link(rig.address, robot, protocol=protocol), robot) as host:
             samples = follow(host, robot, TARGET, 2.0)
             truth = rig.truth()[0]

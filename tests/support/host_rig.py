@@ -26,11 +26,13 @@ def free_udp_port() -> int:
 
 @contextmanager
 def running_rig(
-    robot: Robot, world: World | None = None, *, link: str = "pty", protocol: str = "checked", lock: bool = True
-) -> Iterator[Rig]:
-    """A rig that serves in a thread of this process."""
+    robot: Robot, world: World | None = None, *, link: str = "pty", protocol: str = "checked", lock: bool = True,
+    shared: bool = False,
+) -> Iterator[Rig]:  # fmt: skip
+    """A rig that serves in a thread of this process. shared: one UDP socket for all boards."""
     over = threading.Event()
-    outlet = Outlet(link=link, protocol=protocol, port=free_udp_port() if link == "udp" else None, lock=lock)
+    port = free_udp_port() if link == "udp" else None
+    outlet = Outlet(link=link, protocol=protocol, port=port, lock=lock, shared=shared)
     with Rig(robot, world or World(), outlet) as rig:
         thread = threading.Thread(target=rig.serve, args=(over.is_set,))
         thread.start()

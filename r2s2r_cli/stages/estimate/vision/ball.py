@@ -36,8 +36,9 @@ SHIFT_SD_PX = 3.0
 """Less certain, a comparison of depth and colour is not told."""
 _STEPS = 4
 _STEP_PX = 3.0
-_WEAK = np.diag([1.0, 1.0, 0.1**-2])
-"""The start is good to a metre across the line of sight and 0.1 m along it: keeps what is not seen at all finite."""
+BLIND_SD_M = 0.1
+"""Along the line of sight of a cap on which there is no depth; its size would tell more, but with the error of a rim that is
+half hidden."""
 
 
 @dataclass(frozen=True)
@@ -146,10 +147,22 @@ class BallFitter:
         move = np.array([du[i], dv[k], 0.0]) * center[2] / self.f
         return np.asarray(center + move)
 
-    def fit(self, patch: Patch, valid: np.ndarray, seen: np.ndarray, center: np.ndarray, radius: float) -> BallFit:
+    def fit(
+        self,
+        patch: Patch,
+        valid: np.ndarray,
+        seen: np.ndarray,
+        center: np.ndarray,
+        radius: float,
+        *,
+        far: float,
+        far_sd: float,
+    ) -> BallFit:
         """The ball from a start within a pixel or two.
 
         valid: pixels whose colour tells something. seen: pixels whose depth may lie on the ball. Both bool (v, u).
+        far, far_sd: distance [m] from the camera as it is predicted, and its standard deviation; it is kept where no
+        depth tells the distance, and the covariance does not count it.
         """
         start = c = self._along(patch, seen, center, radius)
         delta = self.swell_px
@@ -166,15 +179,19 @@ class BallFitter:
             g[:3] += draw
             A[3, 3] += self.swell_sd_px**-2
             g[3] += (self.swell_px - delta) * self.swell_sd_px**-2
-            A[:3, :3] += _WEAK
-            g[:3] += _WEAK @ (disc.E.T @ (start - c))
+            hold = np.array([1.0, 1.0, 100.0 if len(depths.z) else far_sd**-2])
+            A[:3, :3] += np.diag(hold)
+            back = disc.E.T @ (start - c)
+            back[2] = far - disc.D
+            g[:3] += hold * back
             cov = np.linalg.inv(A)
             step = cov @ g
             limit = _STEP_PX * c[2] / self.f
             c = c + disc.E @ np.clip(step[:3], -limit, limit)
             delta += float(np.clip(step[3], -0.5, 0.5))
         across = (RIM_SD_PX * c[2] / self.f) ** 2
-        cov_C = disc.E @ (cov[:3, :3] + np.diag([across, across, ALONG_SD_M**2])) @ disc.E.T
+        along = ALONG_SD_M if len(depths.z) else BLIND_SD_M
+        cov_C = disc.E @ (cov[:3, :3] + np.diag([across, across, along**2])) @ disc.E.T
         edge = np.abs(disc.rho - disc.rim) * self.f < RIM_PX / 2
         expected = np.pi * (disc.rim * self.f) ** 2
         shift, shift_cov = self._shift(disc, rim[:2, :2], pull[:2], line, draw)
@@ -241,7 +258,7 @@ class BallFitter:
         """The centre moved along its line of sight to where the depths have it."""
         off = patch.z - ball_depth(patch.zx, patch.zy, c, radius)
         off = off[seen & patch.known & np.isfinite(off)]
-        return c * (1.0 + float(np.median(off)) / c[2]) if len(off) else c
+        return c * (1.0 + float(np.median(off)) / c[2]) if len(off) >= DEPTHS_LEAST else c
 
     def _lines(self, depths: _Depths, c: np.ndarray, radius: float, disc: _Disc) -> tuple[np.ndarray, np.ndarray]:
         """Normal matrix (3, 3) and right-hand side (3,) of the depths, for metres across, across and along."""

@@ -29,15 +29,18 @@ from r2s2r_cli.stages.estimate.vision.solids import Body, ball_depth
 from schemas.robot import Robot
 
 GATE_SD = 3.0
-REACH_PX = 40.0
-"""A cap is looked for within this many standard deviations of its prediction, and no farther than this."""
+REACH_M, REACH_PX = 0.025, 40.0
+"""A cap is looked for within GATE_SD standard deviations of its prediction, REACH_M at least: motors start and stop between
+frames. And no farther than REACH_PX."""
 LEAST_PIXELS = 6
-LEAST_VISIBLE, LEAST_RIM = 0.08, 0.12
+LEAST_VISIBLE, LEAST_RIM = 0.12, 0.12
 SD_MOST_M = 0.03
 """A sighting across the line of sight worse than this says nothing."""
 FAR_SD = 5.0
 """Depths that differ from the prediction by more than GATE_SD of its own standard deviations and these of a depth are of
 something else."""
+FAR_SD_M = 0.005
+"""A predicted distance is not taken for better than this where nothing else tells it."""
 STRAY_PX = 2.0
 """A fit that ends farther outside of where it was looked for has gone to something else."""
 EDGE_PX = 0.7
@@ -178,7 +181,7 @@ class Sighter:
         if not (np.isfinite(center).all() and center[2] > 3 * radius):
             return Seen(OUT_OF_VIEW)
         disc_px = self._f * radius / center[2]
-        spare = float(min(GATE_SD * sd[cap] * self._f / center[2], REACH_PX))
+        spare = float(min(max(GATE_SD * sd[cap], REACH_M) * self._f / center[2], REACH_PX))
         patch = self.patch(pictures, cap // 2, center, 1.3 * disc_px + spare + 4.0)
         if patch is None:
             return Seen(OUT_OF_VIEW)
@@ -186,7 +189,7 @@ class Sighter:
             return Seen(HIDDEN)
         margin = np.minimum(sd / np.sqrt(3.0), 0.01) + EDGE_PX * center[2] / self._f
         margin[cap] = EDGE_PX * center[2] / self._f
-        far = GATE_SD * float(sd[cap]) + FAR_SD * float(self._noise_sd(center[2])) + radius
+        far = max(GATE_SD * float(sd[cap]), REACH_M) + FAR_SD * float(self._noise_sd(center[2])) + radius
         hidden = self._hidden(patch, p_C, cap, 0.0 * margin)
         told = ~in_front(patch, np.full_like(patch.z, center[2] - radius), self._noise_sd(center[2]))
         told &= ~self._twin(patch, p_C, cap, margin)
@@ -206,7 +209,8 @@ class Sighter:
         seen &= np.abs(patch.z - center[2]) < far
         twin = self._twin(patch, moved, cap, margin)
         patch = replace(patch, colored=patch.colored & ~twin)
-        fit = self._fitter.fit(patch, valid & ~twin, seen, start, radius)
+        fit = self._fitter.fit(patch, valid & ~twin, seen, start, radius,
+                               far=float(np.linalg.norm(center)), far_sd=max(float(sd[cap]), FAR_SD_M))  # fmt: skip
         if self._px(fit.center - center, center) > spare + STRAY_PX:
             return Seen(DOUBTFUL)
         return self._judged(cap, fit, bool((model & np.isfinite(own)).any()))
@@ -235,7 +239,7 @@ class Sighter:
         """Z of the centre [m] by the depths in its disc; that of `center` where there are none."""
         off = patch.z - ball_depth(patch.zx, patch.zy, center, radius)
         on = patch.known & patch.colored & (np.abs(off) < far)
-        return float(center[2] + np.median(off[on])) if on.sum() >= DEPTHS_LEAST else float(center[2])
+        return float(center[2] + np.median(off[on])) if on.sum() >= 2 * DEPTHS_LEAST else float(center[2])
 
     def _judged(self, cap: int, fit: BallFit, crowded: bool) -> Seen:
         """What a fit is worth."""

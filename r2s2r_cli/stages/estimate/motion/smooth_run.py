@@ -16,6 +16,8 @@ from r2s2r_cli.stages.estimate.motion.sensor_clock import find_clock
 from r2s2r_cli.stages.estimate.motion.sensors import bin_readings
 from schemas.robot import Robot
 
+BURSTS = 2.0
+"""What is used over what is likeliest (as in `stages/estimate/smooth.py`): robots accelerate in bursts."""
 FEW = 2
 """Gauss-Newton steps between two looks at the noise: it need not settle before the noise does."""
 SENSOR_FREEDOM = 5.0
@@ -58,7 +60,8 @@ def smooth_run(
     for left in reversed(range(TOGETHER)):
         state = learn(settle(state, body, settings, steps=FEW), prepared, body)
         state = touch(state, prepared, body, hidden=left == 0)
-    state = settle(state, body, settings)
+    density = BURSTS * state.evidence.density
+    state = settle(replace(state, evidence=replace(state.evidence, density=density)), body, settings)
     return tracked_run(state, prepared, clock, body, settings)
 
 

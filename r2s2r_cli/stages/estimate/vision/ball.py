@@ -1,7 +1,8 @@
 """Where a ball of known radius is, from the pixels of its colour and the depths on it: Gauss-Newton, with covariance.
 
-Across the line of sight the rim of the disc tells it, along the line the depths do. A ball about c is seen under the cone of half angle
-asin(r / |c|) about c, so in slopes about the direction of c its rim is a circle wherever it lies in the picture.
+Across the line of sight the rim of the disc tells it, along the line the depths do. A ball about c is seen under the
+cone of half angle asin(r / |c|) about c, so in slopes about the direction of c its rim is a circle wherever it lies in
+the picture.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ RIM_PX = 1.5
 WIDE_PX = 3.0
 """The same in the first step, when its place is not certain to a pixel."""
 PIXEL_SD = 0.32
-"""What the mask differs by from the modelled rim, a pixel: 1 / sqrt(12) from its being yes or no, and the colour's noise."""
+"""What a pixel of the mask differs by from the modelled rim: 1 / sqrt(12) as it is yes or no, and colour noise."""
 RIM_SD_PX = 0.10
 """Common error of the disc across the line of sight: uneven light, a rim that the range cuts on one side."""
 CORE, FRAY_PX = 0.85, 1.5
@@ -37,8 +38,7 @@ SHIFT_SD_PX = 3.0
 _STEPS = 4
 _STEP_PX = 3.0
 BLIND_SD_M = 0.1
-"""Along the line of sight of a cap on which there is no depth; its size would tell more, but with the error of a rim that is
-half hidden."""
+"""Along the line of sight of a cap without depth; its size would tell more, with the error of a half hidden rim."""
 
 
 @dataclass(frozen=True)
@@ -104,8 +104,8 @@ class _Depths:
 class BallFitter:
     """Fits balls; what it knows of the camera stays the same for all of them.
 
-    f: focal length [px]. noise: of depth. swell_px, swell_sd_px: by how much the discs look larger, and how well that is
-    known.
+    f: focal length [px]. noise: of depth. swell_px, swell_sd_px: by how much the discs look larger, and how well that
+    is known.
     """
 
     def __init__(self, f: float, noise: DepthNoise, swell_px: float, swell_sd_px: float) -> None:
@@ -115,11 +115,12 @@ class BallFitter:
     def place(
         self, patch: Patch, told: np.ndarray, hidden: np.ndarray, center: np.ndarray, radius: float, reach_px: float
     ) -> np.ndarray:
-        """A start within a pixel [m] (3,): `center` moved across the picture to where the colour fits what should be seen.
+        """A start within a pixel [m] (3,): `center`, moved to where the colour fits what should be seen.
 
-        told: pixels whose colour tells something. hidden: pixels where something is before the ball if it is at `center`; it moves with the
-        ball, as the rod behind it does. Both bool (v, u). reach_px: three standard deviations of the prediction;
-        it moves no farther, and of two places that fit equally well to the nearer. The distance stays.
+        told: pixels whose colour tells something. hidden: pixels where something is before the ball if it is at
+        `center`; it moves with the ball, as the rod behind it does. Both bool (v, u). reach_px: three standard
+        deviations of the prediction; it moves no farther, and of two places that fit equally well to the nearer. The
+        distance stays.
         """
         import cv2
 
@@ -204,7 +205,7 @@ class BallFitter:
     def _rim(
         self, patch: Patch, told: np.ndarray, disc: _Disc, delta: float, width: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Normal matrix (4, 4) and right-hand side (4,) of the rim for two metres across, one along, and the swelling [px]."""
+        """Normal matrix (4, 4) and right-hand side (4,) of the rim: metres across, across, along, px swelling."""
         rise = (disc.rim + delta / self.f - disc.rho) * self.f / width
         on = told & (np.abs(rise) < 0.5)
         if not on.any():
@@ -220,7 +221,7 @@ class BallFitter:
         return weight * (J.T @ J), weight * (J.T @ r)
 
     def _contradicting(self, patch: Patch, valid: np.ndarray, disc: _Disc) -> np.ndarray:
-        """Pixels about colour well outside of the disc, and about none well inside of it: another thing is in the way."""
+        """Pixels about colour well outside of the disc, and about none well inside: another thing is in the way."""
         px = 1.0 / self.f
         outside = patch.colored & (disc.rho > disc.rim + 2.0 * px) & (disc.rho < disc.rim + 5.0 * px)
         inside = ~patch.colored & valid & (disc.rho < disc.rim - 2.0 * px)
@@ -272,13 +273,13 @@ class BallFitter:
     def _shift(
         self, disc: _Disc, rim: np.ndarray, pull: np.ndarray, line: np.ndarray, draw: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Lateral place by depth alone minus by colour alone [px], (2,) and (2, 2); NaN where one of both tells nothing."""
+        """Lateral place by depth alone minus by colour alone [px], (2,), (2, 2); NaN where one tells nothing."""
         B, A = line + np.eye(3), rim + np.eye(2)
         cov = np.linalg.inv(B)[:2, :2] + np.linalg.inv(A)
         px = self.f / (disc.D * disc.E[2, 2])
         if not np.trace(cov) * px**2 < SHIFT_SD_PX**2:
             return np.full(2, np.nan), np.full((2, 2), np.nan)
-        # The two axes across the line of sight as the picture's: u and v, but for the slant of a cap far off its middle.
+        # The axes across the line of sight are those of the picture but for the slant of a cap far off its middle.
         turn = disc.E[:2, :2]
         off = np.linalg.solve(B, draw)[:2] - np.linalg.solve(A, pull)
         return turn @ off * px, turn @ cov @ turn.T * px**2
@@ -287,11 +288,11 @@ class BallFitter:
 def _slopes(
     x: np.ndarray, y: np.ndarray, c: np.ndarray, radius: float, sideways: float
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Depths [m] (n,) that rays on a ball report on average, and d(1 / z) / dc [1/m^2] (n, 3); None where one misses it.
+    """Depths [m] (n,) that rays on a ball report on average, and d(1 / z) / dc [1/m^2] (n, 3); None if one misses.
 
-    sideways: standard deviation by which a ray misses its pixel, as a slope. A ball curves away on all sides, so that what is
-    seen there lies behind by half the variance times the Laplacian of its surface, (r^2 + q^2) / q^3 at a depth q before
-    its middle.
+    sideways: standard deviation by which a ray misses its pixel, as a slope. A ball curves away on all sides, so that
+    what is seen there lies behind by half the variance times the Laplacian of its surface, (r^2 + q^2) / q^3 at a
+    depth q before its middle.
     """
     z = ball_depth(x, y, c, radius)
     if not np.isfinite(z).all():

@@ -1,4 +1,4 @@
-"""Caps found without a prediction: connected patches of a rod's colour, each tried as a ball, the best pair of a rod first."""
+"""Caps found without a prediction: patches of a rod's colour, each tried as a ball, the best pair of a rod first."""
 
 from __future__ import annotations
 

@@ -15,13 +15,13 @@ class Survey:
     """The camera as a look at some frames of the run shows it.
 
     ground: in frame C, mean over the frames looked at; None where none is seen. X_WC: pose of the camera (4, 4).
-    noise: of depth. shift_px: (u, v) by which depth lies beside colour. swell_px: by which the discs in colour are larger
-    than the caps are. warnings: what a person should know, in words.
+    noise: of depth. shift_px: (u, v) by which depth lies beside colour. swell_px: by which the discs in colour are
+    larger than the caps are. warnings: what a person should know, in words.
     """
 
     X_WC: np.ndarray
     ground: Ground | None = None
-    noise: DepthNoise = DepthNoise()
+    noise: DepthNoise = field(default_factory=DepthNoise)
     shift_px: tuple[float, float] = (0.0, 0.0)
     shift_sd_px: float = float("nan")
     swell_px: float = 0.0

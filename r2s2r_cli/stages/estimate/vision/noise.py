@@ -1,4 +1,4 @@
-"""How wrong a depth is, as the floor shows it: in inverse depth, where the noise of stereo cameras is the same everywhere."""
+"""How wrong a depth is, as the floor shows it; in inverse depth, where stereo noise is the same everywhere."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class DepthNoise:
 
 
 def measured(error: np.ndarray) -> DepthNoise:
-    """The noise of a floor. error: inverse depth minus that of the plane [1/m], (frame, v, u), NaN where it is no floor.
+    """The noise of a floor. error: inverse depth minus the plane's [1/m], (frame, v, u), NaN where no floor is.
 
     From the autocovariance along rows and columns: the shared part is the Gaussian that fits lags of 1 .. 20 px best,
     the white part what it leaves of the variance.

@@ -1,4 +1,4 @@
-"""The ground in frame C: RANSAC by open3d or, where that is not there, its twin in NumPy; then least squares on the inliers."""
+"""The ground in frame C: RANSAC by open3d or its twin in NumPy, then least squares on the inliers."""
 
 from __future__ import annotations
 

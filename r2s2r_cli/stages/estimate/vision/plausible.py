@@ -1,4 +1,4 @@
-"""Whether pictures, depth unit and focal length can belong to this robot: balls as large, and rods as long, as they should be."""
+"""Whether pictures, depth unit and focal length can belong to this robot: are balls as large, rods as long as given?"""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from r2s2r_cli.stages.estimate.vision.frames import ImageFrame
 from schemas.robot import Robot
 
 SIZE_RATIO = 1.35
-"""Discs whose radius differs from what their depth says by more: depth unit or focal length are wrong. A disc that is half hidden
-has 0.7 of its radius, so the upper quartile of all is taken."""
+"""Discs whose radius differs from what their depth says by more: depth unit or focal length are wrong. A disc
+that is half hidden has 0.7 of its radius, so the upper quartile of all is taken."""
 LENGTH_WARNS, LENGTH_FAILS = 0.02, 0.06
 """Rods whose length is wrong by more than this share."""
 _PATCH_PX = 8
@@ -32,7 +32,7 @@ def check_sizes(frames: Sequence[ImageFrame], robot: Robot, lens: Intrinsics, sc
             "the caps do not look as large as their depth says",
             where=f"{len(frames)} frames; depth_scale {scale:g} m, fx {lens.fx:g}",
             expected="discs of the radius of the caps in robot.toml",
-            received=f"{ratio:.2f} times that; with this robot and focal length depth_scale would be {scale / ratio:.2g} m",
+            received=f"{ratio:.2f} times that; with this focal length depth_scale would be {scale / ratio:.2g} m",
             hint="r2s2r import FOLDER --depth-scale 0.00025",
         )
 
@@ -55,7 +55,9 @@ def check_lengths(lengths: Sequence[float]) -> str | None:
             hint="r2s2r doctor camera --camera realsense",
         )
     if abs(off) > LENGTH_WARNS + 3 * spread:
-        return f"the rods look {100 * off:+.1f} % longer than robot.toml has them: focal length or depth unit are a little wrong"
+        return (
+            f"the rods look {100 * off:+.1f} % longer than in robot.toml: focal length or depth unit are a little wrong"
+        )
     return None
 
 

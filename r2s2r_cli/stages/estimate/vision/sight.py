@@ -30,15 +30,15 @@ from schemas.robot import Robot
 
 GATE_SD = 3.0
 REACH_M, REACH_PX = 0.025, 40.0
-"""A cap is looked for within GATE_SD standard deviations of its prediction, REACH_M at least: motors start and stop between
-frames. And no farther than REACH_PX."""
+"""A cap is looked for within GATE_SD standard deviations of its prediction, REACH_M at least: motors start and
+stop between frames. And no farther than REACH_PX."""
 LEAST_PIXELS = 6
 LEAST_VISIBLE, LEAST_RIM = 0.12, 0.12
 SD_MOST_M = 0.03
 """A sighting across the line of sight worse than this says nothing."""
 FAR_SD = 5.0
-"""Depths that differ from the prediction by more than GATE_SD of its own standard deviations and these of a depth are of
-something else."""
+"""Depths that differ from the prediction by more than GATE_SD of its own standard deviations and these of a depth are
+of something else."""
 FAR_SD_M = 0.005
 """A predicted distance is not taken for better than this where nothing else tells it."""
 STRAY_PX = 2.0
@@ -96,8 +96,9 @@ class Sighter:
     def sight(self, frame: ImageFrame, p_C: np.ndarray, cov_C: np.ndarray) -> Sightings:
         """Look for every cap where it is predicted.
 
-        p_C: predicted centres in frame C [m] (cap, 3); cov_C: their covariance [m^2] (cap, 3, 3); both tell where to look and what hides
-        what, and do not enter the result. Raises InputError for pictures that are not of this camera's size and type.
+        p_C: predicted centres in frame C [m] (cap, 3); cov_C: their covariance [m^2] (cap, 3, 3); both tell where to
+        look and what hides what, and do not enter the result. Raises InputError for pictures that are not of this
+        camera's size and type.
         """
         pictures = self._ready(frame)
         caps = len(p_C)
@@ -226,7 +227,7 @@ class Sighter:
         return np.asarray(z < np.where(np.isfinite(own), own, p_C[cap, 2]))
 
     def _twin(self, patch: Patch, p_C: np.ndarray, cap: int, margin: np.ndarray) -> np.ndarray:
-        """Pixels beside a cap, or before it, that may show the other cap of its rod: they have the same colour. Bool (v, u)."""
+        """Pixels beside a cap, or before it, that may show its rod's other cap, which has its colour. Bool (v, u)."""
         twin = cap ^ 1
         center, radius = p_C[twin], float(self.cap_radius[twin] + margin[twin])
         if not center[2] > 2 * radius:

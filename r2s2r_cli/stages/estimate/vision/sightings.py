@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 SEEN, COLOR_ONLY, OUT_OF_VIEW, HIDDEN, DOUBTFUL, NO_PICTURE = range(6)
-"""Codes of a cap in a frame. SEEN: from colour and depth. COLOR_ONLY: no depth on it, so its distance is only that which its size
-in the picture tells (wide). OUT_OF_VIEW: predicted outside of the picture. HIDDEN: nothing of its colour where it should
-be. DOUBTFUL: something of its colour that is not a sphere of its radius. NO_PICTURE: no colour picture, or it is blank.
+"""Codes of a cap in a frame. SEEN: from colour and depth. COLOR_ONLY: no depth on it, so its direction is measured and
+its distance is the predicted one, with 0.1 m. OUT_OF_VIEW: predicted outside of the picture. HIDDEN: nothing of its
+colour where it should be. DOUBTFUL: something of its colour that is no sphere of its radius, or too little of one.
+NO_PICTURE: no colour picture, or a blank one.
 """
 
 REASONS = {

@@ -12,8 +12,8 @@ from schemas.robot import Robot
 
 @dataclass(frozen=True)
 class Part:
-    """A cylinder along a rod. rod: its number. offset: of its middle from the rod's, towards the odd cap [m]; half length and
-    radius [m]."""
+    """A cylinder along a rod. rod: its number. offset: of its middle from the rod's, towards the odd cap [m];
+    half: of its length [m]; radius [m]."""
 
     rod: int
     offset: float
@@ -40,7 +40,8 @@ class Body:
         """Depth [m] at which rays (x, y, 1) meet what of the robot may hide cap `cap`; inf where they miss it.
 
         p_C: all caps [m] (cap, 3); one with a NaN is left out, and so are the parts of its rod. margin: by which each
-        cap is taken for larger [m], (cap,), as its position is not exact; parts of rods by what lies between their caps'.
+        cap is taken for larger [m], (cap,), as its position is not exact; parts of rods by what lies between their
+        caps'.
         """
         z = np.full(x.shape, np.inf)
         last = (x.shape[0] - 1, x.shape[1] - 1)

@@ -1,5 +1,7 @@
-"""A look at some frames spread over a run, before any is tracked: ground, camera pose, noise, depth against colour, and whether
-the pictures fit the robot at all."""
+"""A look at frames spread over a run, before any is tracked: ground, camera pose, noise, depth against colour.
+
+And whether the pictures fit the robot at all.
+"""
 
 from __future__ import annotations
 
@@ -65,7 +67,7 @@ def survey(
         method = "open3d" if open3d_there() else "numpy"
         if method == "numpy":
             warnings.append(
-                "open3d cannot be loaded; its twin in NumPy looks for the ground (`r2s2r doctor` says how to get open3d)"
+                "open3d cannot be loaded; its twin in NumPy looks for the ground (`r2s2r doctor` tells more)"
             )
     looked = [source.frame(int(i)) for i in index]
     usable = [frame for frame in looked if _usable(frame, lens)]
@@ -78,7 +80,7 @@ def survey(
         angle, height = disagreement(source.X_WC, ground)
         if angle > TILT_RAD or abs(height) > HEIGHT_M:
             warnings.append(
-                f"the recording's camera pose and the ground that is seen differ by {np.degrees(angle):.1f} degrees and "
+                f"the recording's camera pose and the ground that is seen differ by {np.degrees(angle):.1f} degrees, "
                 f"{1e3 * height:.0f} mm; the ground that is seen is used"
             )
         else:
@@ -117,8 +119,8 @@ def _usable(frame: ImageFrame, lens: Intrinsics) -> bool:
         ("depth", frame.depth, size, np.uint16),
     ):
         if picture.shape != shape or picture.dtype != kind:
-            raise _bad(f"a {name} picture is not one of this camera", f"frame {frame.index}", f"{np.dtype(kind)} {shape}",
-                       f"{picture.dtype} {picture.shape}")  # fmt: skip
+            raise _bad(f"a {name} picture is not one of this camera", f"frame {frame.index}",
+                       f"{np.dtype(kind)} {shape}", f"{picture.dtype} {picture.shape}")  # fmt: skip
     return not blank(frame.color) and bool((frame.depth > 0).any())
 
 
@@ -133,8 +135,8 @@ def _ground(
         if ground is not None:
             found.append(ground)
     if not found:
-        raise _bad("no plane goes through the depths, so there is no ground", f"{len(chosen)} frames", "a floor in view",
-                   "none")  # fmt: skip
+        raise _bad("no plane goes through the depths: there is no ground", f"{len(chosen)} frames",
+                   "a floor in view", "none")  # fmt: skip
     share = float(np.median([ground.share for ground in found]))
     if share < MIN_SHARE:
         warnings.append(f"the largest plane holds {share:.0%} of the depths only: it need not be the ground")

@@ -1,4 +1,4 @@
-"""Frame W for a camera that knows only the ground: z up, ground at z = 0, origin under the camera, x along the picture."""
+"""Frame W for a camera that knows only the ground: z up, ground at 0, origin under the camera, x along the picture."""
 
 from __future__ import annotations
 

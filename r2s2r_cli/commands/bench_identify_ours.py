@@ -78,7 +78,7 @@ class OurSide:
 
         Raises NumericalError where the start cannot be simulated.
         """
-        from r2s2r_cli.stages.identify.fit import first_round
+        from r2s2r_cli.stages.identify.rounds import first_round
         from r2s2r_cli.stages.identify.settled import spread_of
         from r2s2r_cli.stages.identify.solve.loss import LOSSES
 

@@ -12,14 +12,15 @@ import numpy as np
 from r2s2r_cli.stages.identify.closed_residuals import ClosedResiduals
 from r2s2r_cli.stages.identify.closed_surface import Surface, planes, posterior
 from r2s2r_cli.stages.identify.data import RunData, Selection
-from r2s2r_cli.stages.identify.fit import EXACT, training_windows
 from r2s2r_cli.stages.identify.free.base import values_of
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
+from r2s2r_cli.stages.identify.rounds import EXACT
 from r2s2r_cli.stages.identify.solve.cma_es import cma_es
 from r2s2r_cli.stages.identify.solve.linearised import cost_of
 from r2s2r_cli.stages.identify.solve.loss import LOSSES, Loss
 from r2s2r_cli.stages.identify.solve.record import Progress, Solution
+from r2s2r_cli.stages.identify.training import training_windows
 
 if TYPE_CHECKING:
     from r2s2r_cli.engine import State

@@ -11,7 +11,6 @@ import numpy as np
 from r2s2r_cli.stages.identify.closed_fit import ClosedFit, fit_closed
 from r2s2r_cli.stages.identify.closed_residuals import ClosedResiduals
 from r2s2r_cli.stages.identify.conclude import Fitted, concluded, start_found
-from r2s2r_cli.stages.identify.fit import Fit, training_windows
 from r2s2r_cli.stages.identify.found import Found, TraceStep
 from r2s2r_cli.stages.identify.free import select
 from r2s2r_cli.stages.identify.kept import Kept
@@ -19,9 +18,11 @@ from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import default_free
 from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.residuals import CapResiduals
+from r2s2r_cli.stages.identify.rounds import Fit
 from r2s2r_cli.stages.identify.solve.record import Progress as SolverProgress
 from r2s2r_cli.stages.identify.solve.starts import CLOSE
 from r2s2r_cli.stages.identify.task import Task, busy, specs_asked
+from r2s2r_cli.stages.identify.training import training_windows
 from r2s2r_cli.stages.identify.trust.identifiability import identifiability
 
 LOSS = (

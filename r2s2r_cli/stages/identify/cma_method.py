@@ -10,11 +10,11 @@ import numpy as np
 
 from r2s2r_cli.stages.identify.conclude import Fitted, concluded, start_found
 from r2s2r_cli.stages.identify.default_method import first_fit, holding, loss_words
-from r2s2r_cli.stages.identify.fit import START_SPREAD, Fit
 from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep
 from r2s2r_cli.stages.identify.free.base import values_of
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.request import Step
+from r2s2r_cli.stages.identify.rounds import START_SPREAD, Fit
 from r2s2r_cli.stages.identify.solve.cma_es import Sampled, cma_es
 from r2s2r_cli.stages.identify.solve.levenberg import levenberg_marquardt
 from r2s2r_cli.stages.identify.solve.loss import LOSSES

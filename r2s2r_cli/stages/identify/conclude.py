@@ -8,16 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from r2s2r_cli import __version__
-from r2s2r_cli.stages.identify.fit import Fit, training_windows
 from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep, Update
 from r2s2r_cli.stages.identify.held_out import Judged, held_out
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.residuals import CapResiduals
+from r2s2r_cli.stages.identify.rounds import Fit
 from r2s2r_cli.stages.identify.starts_found import start_shifts
 from r2s2r_cli.stages.identify.task import Task
+from r2s2r_cli.stages.identify.training import training_windows
 from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, identifiability
-from r2s2r_cli.stages.identify.trusted import profiled, sureness, weakest
+from r2s2r_cli.stages.identify.trusted import profiled, sureness, weakest, widened_by
 
 
 @dataclass(frozen=True)
@@ -54,9 +55,10 @@ def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:
     sure = sureness(fit, made.near, loss=recipe.loss, seed=request.seed)
     rows = weakest(sure, made.profiles)
     profiles, better = profiled(
-        fit, sure, rows, loss=recipe.loss,
+        fit, sure, rows, loss=recipe.loss, seed=request.seed,
         progress=lambda done: task.progress(Step("profiles", done, len(rows))),
     )  # fmt: skip
+    sure = widened_by(fit, sure, profiles)
     warnings = list(made.remarks)
     if better is not None:
         warnings.append(

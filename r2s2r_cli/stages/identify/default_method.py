@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from r2s2r_cli.stages.identify.conclude import Fitted, concluded, known_before, start_found
-from r2s2r_cli.stages.identify.fit import Fit, fit, more_starts
+from r2s2r_cli.stages.identify.fit import fit
 from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep
 from r2s2r_cli.stages.identify.free.base import values_of
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
+from r2s2r_cli.stages.identify.rounds import Fit, more_starts
 from r2s2r_cli.stages.identify.solve.record import Checkpoint as SolverCheckpoint, Progress as SolverProgress
 from r2s2r_cli.stages.identify.task import Task, free_parameters
 from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, Trust

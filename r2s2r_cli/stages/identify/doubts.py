@@ -48,7 +48,7 @@ def contradicted(parameters: Sequence[ParameterFound], profiles: Sequence[Profil
             ends = "..".join(f"{end:.4g}" if math.isfinite(end) else "" for end in (low, high))
             found.append(
                 f"{parameters[one.row].free.name} {value:.4g} lies outside the 95 % interval of its own profile "
-                f"likelihood, {ends}: the loss is rough there, and the printed sd says too little"
+                f"likelihood, {ends}: the loss is rough there. The interval reported holds both"
             )
     return tuple(found)
 

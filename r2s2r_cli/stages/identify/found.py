@@ -10,6 +10,7 @@ import numpy as np
 
 from r2s2r_cli.stages.identify.free.base import Free
 from r2s2r_cli.stages.identify.request import Request
+from r2s2r_cli.stages.identify.trust.covariance import correlation_of
 from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, Trust
 from r2s2r_cli.stages.measures.floor import Floor
 from r2s2r_cli.stages.measures.keyframes import frame_rmse
@@ -61,14 +62,13 @@ class TraceStep:
 
 @dataclass(frozen=True)
 class StartFound:
-    """One fit. first, last: (n,) in units. redrawn: of observations whose noise was drawn anew."""
+    """One fit. first, last: (n,) in units."""
 
     first: np.ndarray
     last: np.ndarray
     cost: float
     iterations: int
     reason: str
-    redrawn: bool = False
 
 
 @dataclass(frozen=True)
@@ -196,8 +196,4 @@ class Found:
     @property
     def correlation(self) -> np.ndarray | None:
         """Correlation of the coordinates, (n, n)."""
-        if self.covariance is None:
-            return None
-        sd = np.sqrt(np.diagonal(self.covariance))
-        sd = np.where((sd > 0) & np.isfinite(sd), sd, np.nan)
-        return np.asarray(self.covariance / np.outer(sd, sd))
+        return None if self.covariance is None else correlation_of(self.covariance)

@@ -78,7 +78,7 @@ def _covariance(found: Found) -> Group | None:
     if found.covariance is None or correlation is None:
         return None
     known = np.where(np.isfinite(found.covariance), found.covariance, _NAN)
-    return Group({"covariance": known, "correlation": np.clip(correlation, -1.0, 1.0)})
+    return Group({"covariance": known, "correlation": correlation})
 
 
 def _identifiability(found: Found) -> Group | None:
@@ -117,7 +117,7 @@ def _starts(found: Found) -> Group | None:
         return None
     return Group(
         {
-            "kind": np.array([one.redrawn for one in found.starts], np.uint8),
+            "kind": np.zeros(len(found.starts), np.uint8),
             "first": np.array([_with_fixed(found, one.first) for one in found.starts]),
             "last": np.array([_with_fixed(found, one.last) for one in found.starts]),
             "cost": floats([one.cost for one in found.starts]),

@@ -55,7 +55,7 @@ def report_of(found: Found) -> IdentifyReport:
             for one in found.profiles
         ),
         starts=tuple(
-            StartFigures(kind="noise drawn anew" if one.redrawn else "start", cost=one.cost, iterations=one.iterations,
+            StartFigures(kind="start", cost=one.cost, iterations=one.iterations,
                          reason=one.reason)
             for one in found.starts
         ),

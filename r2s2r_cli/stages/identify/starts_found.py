@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from r2s2r_cli.stages.identify.fit import Fit
 from r2s2r_cli.stages.identify.found import WindowFound
+from r2s2r_cli.stages.identify.rounds import Fit
 
 
 def start_shifts(fitted: Fit) -> tuple[WindowFound, ...]:

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from r2s2r_cli.stages.identify.fit import Fit
 from r2s2r_cli.stages.identify.found import ParameterFound, ProfileFound
 from r2s2r_cli.stages.identify.free.base import values_of
+from r2s2r_cli.stages.identify.rounds import MOST_UNKNOWNS, Fit, members_for
 from r2s2r_cli.stages.identify.settled import spread_of
 from r2s2r_cli.stages.identify.solve.loss import LOSSES
+from r2s2r_cli.stages.identify.solve.population import moving_of
 from r2s2r_cli.stages.identify.solve.problem import Evaluation
 from r2s2r_cli.stages.identify.solve.record import names_on_bound
 from r2s2r_cli.stages.identify.trust.covariance import Covariance
 from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, Trust, identifiability
-from r2s2r_cli.stages.identify.trust.profile import profile
+from r2s2r_cli.stages.identify.trust.profile import by_derivatives, by_population, profile
 from r2s2r_cli.stages.identify.trust.redraw import redraw_linear, spans
 from r2s2r_cli.stages.identify.trust.worth import worth
 
@@ -25,11 +26,13 @@ LINEAR_DRAWS = 1000
 
 @dataclass(frozen=True)
 class Sureness:
-    """parameters in the order of the fit; covariance of z; after: what the data say at the solution."""
+    """parameters in the order of the fit; covariance of z; after: what the data say at the solution. reach: (p, 2),
+    smallest and largest value of other starts and of noise drawn anew."""
 
     parameters: tuple[ParameterFound, ...]
     spread: Covariance
     after: Identifiability
+    reach: np.ndarray
 
 
 def sureness(fitted: Fit, others: np.ndarray, *, loss: str, seed: int) -> Sureness:
@@ -44,7 +47,14 @@ def sureness(fitted: Fit, others: np.ndarray, *, loss: str, seed: int) -> Surene
     )  # fmt: skip
     drawn = redraw_linear(problem, solution, group, loss=robust, block=problem.block, draws=LINEAR_DRAWS, seed=seed)
     reach = spans(frees, drawn.z, others if len(others) else None)
-    values = values_of(frees, solution.z[: len(frees)])
+    return Sureness(_parameters(fitted, spread, after, reach), spread, after, reach)
+
+
+def _parameters(
+    fitted: Fit, spread: Covariance, after: Identifiability, reach: np.ndarray
+) -> tuple[ParameterFound, ...]:
+    problem, frees = fitted.problem, fitted.problem.frees
+    values = values_of(frees, fitted.solution.z[: len(frees)])
     bound = names_on_bound(
         values, np.array([f.lower for f in frees]), np.array([f.upper for f in frees]), problem.names
     )
@@ -64,7 +74,7 @@ def sureness(fitted: Fit, others: np.ndarray, *, loss: str, seed: int) -> Surene
                 reason=reason,
             )
         )  # fmt: skip
-    return Sureness(tuple(found), spread, after)
+    return tuple(found)
 
 
 def weakest(sure: Sureness, count: int) -> tuple[int, ...]:
@@ -74,16 +84,21 @@ def weakest(sure: Sureness, count: int) -> tuple[int, ...]:
 
 
 def profiled(
-    fitted: Fit, sure: Sureness, rows: tuple[int, ...], *, loss: str, progress: Callable[[int], None]
+    fitted: Fit, sure: Sureness, rows: tuple[int, ...], *, loss: str, seed: int, progress: Callable[[int], None]
 ) -> tuple[tuple[ProfileFound, ...], np.ndarray | None]:
     """Profile likelihood of some parameters; and all unknowns where one came upon a lower cost, else None."""
+    problem, solution = fitted.problem, fitted.solution
+    few = len(moving_of(problem)) <= MOST_UNKNOWNS
     found: list[ProfileFound] = []
     better = None
     for number, row in enumerate(rows):
-        one = profile(
-            fitted.problem, fitted.solution, fitted.problem.frees, row, sure.spread, loss=LOSSES[loss], points=5,
-            max_iterations=3,
-        )  # fmt: skip
+        search = by_derivatives(problem, row, LOSSES[loss], max_iterations=3)
+        if few:
+            search = by_population(
+                problem, solution, row, LOSSES[loss], members=members_for(problem), inflation=sure.spread.inflation,
+                seed=seed,
+            )  # fmt: skip
+        one = profile(problem, solution, problem.frees, row, sure.spread, points=5, search=search)
         found.append(
             ProfileFound(
                 row=row, value=one.value, cost=one.rise, interval=(one.lower, one.upper), threshold=one.threshold,
@@ -93,3 +108,27 @@ def profiled(
         better = one.better if better is None else better
         progress(number + 1)
     return tuple(found), better
+
+
+def widened_by(fitted: Fit, sure: Sureness, profiles: Sequence[ProfileFound]) -> Sureness:
+    """The same with intervals that hold those of the profiles as well: where the cost is rough or crooked, these see
+    what a covariance does not. Standard deviations grow as the longer side of the interval, correlations stay."""
+    spread, frees = sure.spread, fitted.problem.frees
+    share = np.ones(len(frees))
+    low, high = spread.lower.copy(), spread.upper.copy()
+    for one in profiles:
+        k, free = one.row, frees[one.row]
+        ends = [one.value[at] if np.isnan(end) else end for at, end in zip((0, -1), one.interval, strict=True)]
+        z = float(spread.z[k])
+        usual = float(spread.quantile[k] * spread.sd_z[k])
+        if not (np.isfinite(usual) and usual > 0) or (low[k] <= min(ends) and max(ends) <= high[k]):
+            continue
+        low[k], high[k] = min(low[k], *ends), max(high[k], *ends)
+        far = max(z - free.to_z(low[k]), free.to_z(high[k]) - z) / usual
+        share[k] = far if 1.0 < far < np.inf else 1.0
+    if not (share > 1.0).any():
+        return sure
+    wide = replace(
+        spread, covariance=spread.covariance * np.outer(share, share), sd=spread.sd * share, lower=low, upper=high
+    )
+    return replace(sure, spread=wide, parameters=_parameters(fitted, wide, sure.after, sure.reach))

@@ -79,7 +79,7 @@ def found(**changes: Any) -> Found:
         "trace": (TraceStep(0, "all", 0, 50.0, np.array([1.0, 0.3])),
                   TraceStep(0, "all", 1, 12.0, np.array([0.8, 0.3]))),
         "starts": (StartFound(np.array([1.0, 0.3]), np.array([0.8, 0.3]), 12.0, 1, "small step"),
-                   StartFound(np.array([0.8, 0.3]), np.array([0.81, 0.3]), 13.0, 1, "small step", redrawn=True)),
+                   StartFound(np.array([0.8, 0.3]), np.array([0.81, 0.3]), 13.0, 1, "small step")),
         "profiles": (ProfileFound(0, np.array([0.7, 0.8, 0.9]), np.array([2.0, 0.0, 2.0]), (0.71, 0.89)),
                      ProfileFound(1, np.array([0.2, 0.4]), np.zeros(2), (math.nan, math.nan))),
         "windows": (WindowFound("line", 1, 1.0, 2.0, *[np.zeros((CAPS, 3))] * 3),),

@@ -16,10 +16,10 @@ from r2s2r_cli.stages.identify.closed_residuals import WIDTHS, ClosedResiduals
 from r2s2r_cli.stages.identify.closed_sensing import measured_sensing
 from r2s2r_cli.stages.identify.closed_surface import Surface
 from r2s2r_cli.stages.identify.data import Selection
-from r2s2r_cli.stages.identify.fit import training_windows
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
 from r2s2r_cli.stages.identify.solve.loss import LOSSES
+from r2s2r_cli.stages.identify.training import training_windows
 from r2s2r_cli.stages.identify.trust.covariance import covariance
 from r2s2r_cli.stages.measures.steps import steps_of
 from tests.stages.identify.planted_loop import crawl

@@ -133,16 +133,6 @@ class Mapping:
             jacobian[:, list(self._curved)] = ((after - before) / 2).T
         return jacobian
 
-    def com_shift(self, values: Vector) -> Tensor:
-        """How far each rod's centre of mass lies from that of robot.toml, along its axis [m], (rod,) or (B, rod).
-
-        A state's p_WB is the place of the centre of mass: a pose that was made from end caps with the robot's own
-        numbers goes to p_WB + com_shift R_WR e_z, else its caps move. Differentiable.
-        """
-        theta = self.theta(values)
-        shift = self._own.p_BE[..., 0, 2].to(theta.p_BE) - theta.p_BE[..., 0, 2]
-        return shift if values.ndim == 2 else shift[0]
-
     def observation(self, values: Vector) -> Observation:
         """What lies between the simulated robot and the log, of values (n,)."""
         return Observation(**{key: float(value) for key, value in self._outside("observation", values).items()})

@@ -44,7 +44,6 @@ def levenberg_marquardt(
     step_sd: float = 0.01,
     gradient_sd: float = 0.01,
     damping0: float = 1e-2,
-    jacobian_at_trial: bool = False,
     progress: Callable[[Progress], None] | None = None,
     checkpoint: Callable[[Checkpoint], None] | None = None,
     resume: Checkpoint | None = None,
@@ -55,10 +54,8 @@ def levenberg_marquardt(
     to where the simulation is not finite are refused like steps that raise the cost. An iteration is an accepted step.
 
     tolerance: relative decrease of the cost, step_sd: length of two steps in a row, gradient_sd: length of the undamped
-    step that is left, both in posterior standard deviations. jacobian_at_trial: evaluate trial points with the Jacobian
-    at once: cheaper where refusals are rarer than 1 in (Jacobian's cost / plain cost). checkpoint is called before
-    progress; what either raises goes through. resume: the same problem and options give the same bits as without the
-    interruption.
+    step that is left, both in posterior standard deviations. checkpoint is called before progress; what either raises
+    goes through. resume: the same problem and options give the same bits as without the interruption.
 
     Raises NumericalError where the start cannot be evaluated.
     """
@@ -72,7 +69,7 @@ def levenberg_marquardt(
         at = linearise(problem, np.array(state.z), loss)
     while state.reason is None and (reason := _at_rest(at, state, problem, gradient_sd, max_iterations)) is None:
         done = state.iteration
-        state, at, length = _iterate(problem, at, state, loss, jacobian_at_trial, (tolerance, step_sd))
+        state, at, length = _iterate(problem, at, state, loss, (tolerance, step_sd))
         if state.iteration == done:
             break
         if checkpoint is not None:
@@ -95,7 +92,7 @@ def _at_rest(at: Linearised, state: State, problem: Problem, gradient_sd: float,
 
 
 def _iterate(
-    problem: Problem, at: Linearised, state: State, loss: Loss, with_jacobian: bool, limits: tuple[float, float]
+    problem: Problem, at: Linearised, state: State, loss: Loss, limits: tuple[float, float]
 ) -> tuple[State, Linearised, float]:
     """One accepted step, or the same point with the reason why there is none."""
     damping, growth, counts = state.damping, state.growth, state.counts
@@ -109,7 +106,7 @@ def _iterate(
         new = None
         if step is not None and predicted > 0:
             z = np.clip(at.z + step, problem.lower, problem.upper)
-            new, gain, counts = _try(problem, z, at, predicted, loss, with_jacobian, counts)
+            new, gain, counts = _try(problem, z, at, predicted, loss, counts)
         length = 0.0 if step is None else at.length(step)
         if new is None:
             if step is not None and length <= TOO_SHORT * step_sd:
@@ -136,16 +133,14 @@ def _try(
     at: Linearised,
     predicted: float,
     loss: Loss,
-    with_jacobian: bool,
     counts: Counts,
 ) -> tuple[Linearised | None, float, Counts]:
     """The linearisation at z if its cost is lower than at `at`, the gain ratio, and the evaluations spent."""
     try:
-        if not with_jacobian:
-            counts = replace(counts, plain=counts.plain + 1)
-            cost, _ = cost_of(problem, z, problem.evaluate(z, jacobian=False), loss)
-            if not cost < at.cost:
-                return None, 0.0, counts
+        counts = replace(counts, plain=counts.plain + 1)
+        cost, _ = cost_of(problem, z, problem.evaluate(z, jacobian=False), loss)
+        if not cost < at.cost:
+            return None, 0.0, counts
         counts = replace(counts, jacobian=counts.jacobian + 1)
         new = linearise(problem, z, loss)
     except NumericalError:

@@ -155,8 +155,8 @@ def cool(
 
 
 def moving_of(problem: Problem) -> np.ndarray:
-    """Numbers of the unknowns that no prior holds, ascending."""
-    return np.flatnonzero(problem.prior_sd > HELD)
+    """Numbers of the unknowns that neither prior nor bounds hold, ascending."""
+    return np.flatnonzero((problem.prior_sd > HELD) & (problem.lower < problem.upper))
 
 
 def covariance_at(data: np.ndarray, prior: np.ndarray, temperature: float) -> np.ndarray:

@@ -58,10 +58,7 @@ class Covariance:
     @property
     def correlation(self) -> np.ndarray:
         """Of the coordinates, (p, p); nan beside a parameter that cannot move or of which nothing is known."""
-        sd = self.sd_z
-        sd = np.where((sd > 0) & np.isfinite(sd), sd, np.nan)
-        found: np.ndarray = np.clip(self.covariance / np.outer(sd, sd), -1.0, 1.0)
-        return found
+        return correlation_of(self.covariance)
 
     def alike(self, least: float = ALIKE) -> tuple[tuple[str, str, float], ...]:
         """Pairs of parameters with a correlation of at least that size, the strongest first."""
@@ -70,6 +67,14 @@ class Covariance:
             (self.names[j], self.names[i], float(correlation[i, j])) for i in range(len(self.names)) for j in range(i)
         ]
         return tuple(sorted((one for one in pairs if abs(one[2]) >= least), key=lambda one: -abs(one[2])))
+
+
+def correlation_of(covariance: np.ndarray) -> np.ndarray:
+    """Of a covariance (p, p), whose rows may be 0, infinite or nan: the correlation is nan there."""
+    sd = np.sqrt(np.diag(covariance))
+    sd = np.where((sd > 0) & np.isfinite(sd), sd, np.nan)
+    found: np.ndarray = np.clip(covariance / np.outer(sd, sd), -1.0, 1.0)
+    return found
 
 
 def covariance(

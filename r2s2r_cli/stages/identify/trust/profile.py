@@ -11,11 +11,12 @@ from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.identify.free.base import Free
 from r2s2r_cli.stages.identify.solve.levenberg import levenberg_marquardt
 from r2s2r_cli.stages.identify.solve.loss import LOSSES, Loss
+from r2s2r_cli.stages.identify.solve.population import Cooling, Population, cool
 from r2s2r_cli.stages.identify.solve.problem import Problem
 from r2s2r_cli.stages.identify.solve.record import Solution
 from r2s2r_cli.stages.identify.trust.covariance import Covariance
+from r2s2r_cli.stages.identify.trust.held_at import HeldAt, PopulationHeldAt
 from r2s2r_cli.stages.identify.trust.information import inverse, widths
-from r2s2r_cli.stages.identify.trust.wrapped import Wrapped
 
 ALIKE = 1.3
 """Ends of two intervals whose distances from the value differ by less than this factor are alike."""
@@ -23,6 +24,14 @@ FURTHER = (1.25, 1.6, 2.0)
 """Further points, in reaches, of a side on which the interval has not ended."""
 LOWER = 0.02
 """Fall of the cost that a profile may find by chance of ending iterations early."""
+LOWER_ROUGH = 0.5
+"""The same, in inflations, between searches by populations: that of a point one standard deviation from the minimum."""
+COOLER = 4.0
+"""First temperature of such a search, in inflations: it begins near its end."""
+GENERATIONS = 3
+Search = Callable[[np.ndarray, float, int], tuple[np.ndarray, float]]
+"""All unknowns and the cost with one of them held: from a start (n,), at a value, the how manyth of its side. Raises
+NumericalError."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +63,7 @@ def profile(
     loss: Loss = LOSSES["none"],
     points: int = 9,
     reach: float = 3.0,
-    max_iterations: int = 4,
+    search: Search | None = None,
 ) -> Profile:
     """Of parameter `index`, on `points` values out to `reach` standard deviations or to its bounds.
 
@@ -62,6 +71,9 @@ def profile(
     not risen as far. Each point starts from its neighbour, moved as the normal matrix says the others follow. The rise
     at the ends of the interval is that which makes it equal to the covariance's on a linear problem, inflation included
     (plain profiles: Raue et al. 2009, Bioinformatics 25, 1923). Points that cannot be simulated end the grid.
+
+    search: finds the others at a point; None: by derivatives. Where it is given, it finds them at the solution as well:
+    a solution may be a mean, which is no minimum, and rises count from like to like.
     """
     free, z0 = frees[index], float(solution.z[index])
     variance, bread = float(spread.covariance[index, index]), float(spread.bread[index, index])
@@ -71,14 +83,15 @@ def profile(
     threshold = 0.5 * scale * quantile**2
     near = np.arange(1, points // 2 + 1) / (points // 2)
     grid = sd * max(reach, 1.2 * quantile) * np.concatenate([near, FURTHER])
-    sides = [
-        _walk(problem, solution, index, sign * grid, threshold, len(near), loss, max_iterations) for sign in (-1.0, 1.0)
-    ]
-    path = [*reversed(sides[0]), (solution.z, solution.cost), *sides[1]]
+    middle = (solution.z, solution.cost) if search is None else search(solution.z, z0, 0)
+    find = search or by_derivatives(problem, index, loss)
+    sides = [_walk(problem, solution, middle, index, sign * grid, threshold, len(near), find) for sign in (-1.0, 1.0)]
+    path = [*reversed(sides[0]), middle, *sides[1]]
     z, cost = np.array([one[index] for one, _ in path]), np.array([one for _, one in path])
     lowest = int(np.argmin(cost))
-    better = path[lowest][0] if cost[lowest] < solution.cost - LOWER else None
-    rise = cost - (solution.cost if better is None else cost[lowest])
+    chance = LOWER if search is None else LOWER_ROUGH * scale
+    better = path[lowest][0] if cost[lowest] < middle[1] - chance else None
+    rise = cost - (middle[1] if better is None and search is None else cost[lowest])
     low, high = interval(z, rise / scale, quantile)
     value = np.array([free.from_z(float(one)) for one in z])
     centre = z0 if better is None else float(better[index])
@@ -91,25 +104,6 @@ def profile(
         free.name, value, rise, threshold, lower, upper, (float(spread.lower[index]), float(spread.upper[index])),
         better, words,
     )  # fmt: skip
-
-
-def profiles(
-    problem: Problem,
-    solution: Solution,
-    frees: Sequence[Free],
-    indices: Sequence[int],
-    spread: Covariance,
-    *,
-    progress: Callable[[float], None] | None = None,
-    **options: object,
-) -> tuple[Profile, ...]:
-    """Of several parameters, `Identifiability.weakest[:3]` of them; progress is told the share that is done."""
-    done = []
-    for index in indices:
-        done.append(profile(problem, solution, frees, index, spread, **options))  # type: ignore[arg-type]
-        if progress is not None:
-            progress(len(done) / len(indices))
-    return tuple(done)
 
 
 def interval(grid: np.ndarray, rise: np.ndarray, quantile: float) -> tuple[float, float]:
@@ -130,34 +124,55 @@ def interval(grid: np.ndarray, rise: np.ndarray, quantile: float) -> tuple[float
     return ends[0], ends[1]
 
 
+def by_derivatives(problem: Problem, index: int, loss: Loss, *, max_iterations: int = 4) -> Search:
+    """Levenberg-Marquardt, for costs that are smooth."""
+
+    def search(start: np.ndarray, at: float, number: int) -> tuple[np.ndarray, float]:
+        found = levenberg_marquardt(
+            HeldAt(problem, index, at), start, loss=loss, max_iterations=max_iterations, tolerance=1e-4, step_sd=0.03,
+            gradient_sd=0.01, damping0=1e-3,
+        )  # fmt: skip
+        return found.z, found.cost
+
+    return search
+
+
+def by_population(
+    problem: Population, solution: Solution, index: int, loss: Loss, *, members: int, inflation: float, seed: int
+) -> Search:
+    """Candidates about each point, as many as `members` in a generation, for costs that are rough."""
+    cooling = Cooling(members, hottest=COOLER * inflation, coldest=inflation, generations=GENERATIONS)
+
+    def search(start: np.ndarray, at: float, number: int) -> tuple[np.ndarray, float]:
+        held = PopulationHeldAt(problem, index, at)
+        found = cool(held, start, solution.normal, loss=loss, seed=1000 * seed + 100 * index + number, cooling=cooling)
+        return found.z, found.cost
+
+    return search
+
+
 def _walk(
-    problem: Problem, solution: Solution, index: int, offsets: np.ndarray, threshold: float, usual: int, loss: Loss,
-    max_iterations: int,
+    problem: Problem, solution: Solution, middle: tuple[np.ndarray, float], index: int, offsets: np.ndarray,
+    threshold: float, usual: int, find: Search,
 ) -> list[tuple[np.ndarray, float]]:  # fmt: skip
-    """All unknowns and costs with one held at offsets from the solution, outwards; beyond the `usual` number of points
+    """All unknowns and costs with one held at offsets from the middle, outwards; beyond the `usual` number of points
     only while the cost is below the threshold."""
     full = inverse(solution.normal)
     follow = full[:, index] / full[index, index] if full[index, index] > 0 else np.zeros(len(solution.z))
     follow[index] = 1.0
     found: list[tuple[np.ndarray, float]] = []
-    z, cost = solution.z, solution.cost
+    z, cost = middle
     for k, offset in enumerate(offsets):
         at = float(np.clip(solution.z[index] + offset, problem.lower[index], problem.upper[index]))
         enough = 2.0 * threshold if k < usual else threshold
-        if at == z[index] or cost > solution.cost + enough:
+        if at == z[index] or cost > middle[1] + enough:
             break
-        lower, upper = problem.lower.copy(), problem.upper.copy()
         start = z + (at - z[index]) * follow
-        lower[index] = upper[index] = start[index] = at
-        held = Wrapped(problem, lower=lower, upper=upper)
+        start[index] = at
         try:
-            point = levenberg_marquardt(
-                held, start, loss=loss, max_iterations=max_iterations, tolerance=1e-4, step_sd=0.03, gradient_sd=0.01,
-                damping0=1e-3,
-            )  # fmt: skip
+            z, cost = find(np.clip(start, problem.lower, problem.upper), at, k + 1)
         except NumericalError:
             break
-        z, cost = point.z, point.cost
         found.append((z, cost))
     return found
 

@@ -7,17 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import roma
 import torch
 
 from r2s2r_cli.effects import GroundSlope, with_off_values
-from r2s2r_cli.engine import check_parameters, end_caps
+from r2s2r_cli.engine import check_parameters
 from r2s2r_cli.engine.hooks import effective
 from r2s2r_cli.engine.parameters import shapes, value
 from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.stages.identify.free import Mapping, catalogue, select
 from r2s2r_cli.stages.identify.free.catalogue import entries
-from r2s2r_cli.stages.model import parameters_of, rest_state, structure_of
+from r2s2r_cli.stages.model import parameters_of, structure_of
 from tests.support.varied import varied
 
 ROBOT = varied()
@@ -92,20 +91,6 @@ def test_a_centre_of_mass_leaves_the_rod_as_it_is() -> None:
         for side, cap in enumerate(cable.caps):
             to_cap = [one.p_BS[0, k, side] - one.p_BE[0, cap // 2, 0] for one in (theta, own)]
             assert to_cap[0] == pytest.approx(to_cap[1])
-
-
-def test_a_pose_follows_its_centre_of_mass() -> None:
-    """Bodies moved by com_shift along their axes have the end caps that they had; the shift has derivative 1."""
-    made = mapping("friction", "com.1")
-    x = torch.tensor([0.5, 0.02], dtype=torch.float64)
-    state = rest_state(ROBOT)
-    along = roma.unitquat_to_rotmat(state.q_WR)[..., 2]
-    moved = replace(state, p_WB=state.p_WB + made.com_shift(x)[..., None] * along)
-    before = end_caps(parameters_of(ROBOT), state)
-    assert end_caps(made.theta(x), moved) == pytest.approx(before, abs=1e-15)
-    assert float((end_caps(made.theta(x), state) - before).abs().max()) > 1e-3
-    slope = torch.func.jacfwd(made.com_shift)(x)
-    assert slope.tolist() == [[0.0, 0.0], [0.0, 1.0], [0.0, 0.0]]
 
 
 def test_an_attachment_phase_turns_the_points_of_one_rod() -> None:

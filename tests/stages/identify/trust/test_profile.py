@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from r2s2r_cli.stages.identify.solve.loss import LOSSES
 from r2s2r_cli.stages.identify.trust.covariance import covariance
-from r2s2r_cli.stages.identify.trust.profile import interval, profile, profiles
+from r2s2r_cli.stages.identify.trust.profile import by_population, interval, profile
 from tests.stages.identify.solve.problems import formula
 from tests.stages.identify.trust.planted import linear_frees, planted, solved
 
@@ -23,7 +24,8 @@ def test_linear_problem_has_a_parabola():
     solution = solved(case.problem)
     spread = covariance(case.problem, solution, case.frees, cluster=case.cluster)
     assert spread.inflation > 2
-    for found in profiles(case.problem, solution, case.frees, (0, 2), spread):
+    for index in (0, 2):
+        found = profile(case.problem, solution, case.frees, index, spread)
         np.testing.assert_allclose((found.lower, found.upper), found.quadratic, rtol=2e-3)
         assert found.words == "agrees with the covariance"
         assert found.better is None
@@ -62,6 +64,21 @@ def test_better_minimum_is_reported():
     assert found.better is not None
     assert abs(found.better[0]) < 0.1
     assert found.words.startswith("a better fit was found")
+
+
+def test_a_population_sees_the_same_parabola():
+    """Found by candidates, the profile of a linear problem with nuisances is that of the covariance, also about a
+    solution that is a standard deviation off along another unknown: rises count from the minimum."""
+    case = planted(4, windows=3, offsets=2)
+    best = solved(case.problem)
+    off = best.z.copy()
+    off[1] += np.sqrt(np.linalg.inv(best.normal)[1, 1])
+    solution = solved(case.problem, off)
+    spread = covariance(case.problem, solution, case.frees)
+    search = by_population(case.problem, solution, 0, LOSSES["none"], members=40, inflation=1.0, seed=3)
+    found = profile(case.problem, solution, case.frees, 0, spread, search=search)
+    half = 0.5 * (found.quadratic[1] - found.quadratic[0])
+    np.testing.assert_allclose((found.lower, found.upper), best.z[0] + np.array([-half, half]), atol=0.05 * half)
 
 
 def test_interval_of_a_parabola_is_exact():

@@ -37,6 +37,8 @@ class LengthFloor(Frozen):
     contrasts: int
     phases: int
     basis: str
+    within_m: float | None = None
+    """The same with each iteration about its own means; None: of one iteration."""
     cables: tuple[CableFloor, ...]
 
 
@@ -55,6 +57,10 @@ class FloorReport(Frozen):
 
     runs: tuple[str, ...]
     """Runs that were looked at, with their iteration: 1:crawl."""
+    used: tuple[str, ...] = ()
+    """Those of them that had something to compare."""
+    given_up: int = 0
+    """Target intervals left out, since their target was given up."""
     caps: CapFloor | None = None
     lengths: LengthFloor | None = None
     numerics: NumericsFloor | None = None

@@ -64,6 +64,9 @@ def floor_tables(report: FloorReport) -> list[PageTable]:
     """The numbers, with units."""
     found = []
     caps, lengths, numerics = report.caps, report.lengths, report.numerics
+    if report.runs:
+        used = [("runs", ", ".join(report.used) or "none"), ("without a phase that comes twice", _unused(report))]
+        found.append(PageTable("measured on", ["what", "found"], used))
     if caps is not None:
         interval = "too few comparisons" if caps.lower_m is None or caps.upper_m is None or caps.level is None else (
             f"{1e3 * caps.lower_m:.1f} to {1e3 * caps.upper_m:.1f} mm ({caps.level:.0%})")  # fmt: skip
@@ -102,6 +105,10 @@ def floor_page(report: FloorReport, picture: bytes) -> bytes:
             labels=list(report.warnings), tables=floor_tables(report), pictures=[Picture("floor", picture)],
         )
     )  # fmt: skip
+
+
+def _unused(report: FloorReport) -> str:
+    return ", ".join(run for run in report.runs if run not in report.used) or "none"
 
 
 def _mm(value: float | None) -> str:

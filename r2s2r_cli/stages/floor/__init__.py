@@ -21,6 +21,8 @@ __all__ = ["Numerics", "SeenRun", "SensedRun", "floor", "seen_run", "sensed_run"
 
 REPEATS = 3
 """Fewer repeats of a policy than this are no basis of their own (design.md, section 2)."""
+APART = 1.5
+"""Floor over all iterations to that within each beyond which the report warns."""
 FEW = 6
 """Contrasts below which the report warns: see docs/concepts/measures.md, section 4."""
 _SETS = ("ramps", "holds", "reversals", "repeats")
@@ -61,6 +63,8 @@ def floor(
         groups["numerics"] = numerics.to_group()
     report = FloorReport(
         runs=_names(seen, sensed),
+        used=_used(caps.phases if caps else (), lengths.phases if lengths else ()),
+        given_up=max(sum(run.given_up for run in seen), sum(run.given_up for run in sensed)),
         caps=_cap_report(caps, groups["caps"]) if caps is not None else None,
         lengths=_length_report(lengths, groups["lengths"]) if lengths is not None else None,
         numerics=_numerics_report(numerics) if numerics is not None else None,
@@ -82,6 +86,11 @@ def basis(phases: Phases, policies: Mapping[str, str]) -> str:
 def _names(seen: Sequence[SeenRun], sensed: Sequence[SensedRun]) -> tuple[str, ...]:
     """Each run once."""
     return tuple(dict.fromkeys([*(run.name for run in seen), *(run.name for run in sensed)]))
+
+
+def _used(*phases: Phases) -> tuple[str, ...]:
+    """Runs that something was compared of, in their order."""
+    return tuple(dict.fromkeys(run for part in phases for phase in part for run, _ in phase))
 
 
 def _complete(run: SeenRun) -> tuple[Step, ...]:
@@ -137,7 +146,7 @@ def _length_report(found: LengthRepeats, group: Group) -> LengthFloor:
     )
     return LengthFloor(
         floor_m=found.floor, contrasts=found.contrasts, phases=len(found.phases), cables=cables,
-        basis=str(group.attributes["basis"]),
+        within_m=found.within, basis=str(group.attributes["basis"]),
     )  # fmt: skip
 
 
@@ -154,6 +163,14 @@ def _known(value: float) -> float | None:
 
 def _warnings(report: FloorReport, observed: bool) -> list[str]:
     found = []
+    if report.given_up:
+        found.append(f"intervals left out since their target was given up: {report.given_up}")
+    lengths = report.lengths
+    if lengths is not None and lengths.within_m is not None and lengths.floor_m > APART * lengths.within_m:
+        found.append(
+            f"within an iteration the cable lengths repeat to {1e3 * lengths.within_m:.2f} mm, over all of them to "
+            f"{1e3 * lengths.floor_m:.2f} mm: other days, calibrations or robots; --iteration N measures one"
+        )
     if report.caps is None:
         why = "no phase of a gait comes twice" if observed else "no run has observed end caps"
         found.append(f"no floor of the end caps: {why}")

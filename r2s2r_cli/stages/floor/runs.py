@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,8 @@ class SeenRun:
     """A run with end caps: a `stages.measures.steps.ObservedRun`.
 
     name: iteration and run, `1:crawl`. t: (frame,) [s]. observed: (frame, cap, 3) [m], ground at z = 0. noise: (cap, 3)
-    [m]. quality: codes of `schemas.estimate.QUALITY`, (frame, cap).
+    [m]. quality: codes of `schemas.estimate.QUALITY`, (frame, cap). given_up: how many intervals are not complete in
+    `intervals` because their target was given up: where the robot was then is no place that it goes to.
     """
 
     name: str
@@ -26,18 +27,20 @@ class SeenRun:
     noise: np.ndarray
     quality: np.ndarray
     intervals: Intervals
+    given_up: int = 0
 
 
 @dataclass(frozen=True)
 class SensedRun:
     """A run with cable sensors. t: (sample,) [s]; length: (sample, sensor) [m], NaN: not in this sample; cable: that
-    each sensor measures, (sensor,)."""
+    each sensor measures, (sensor,). given_up: as of `SeenRun`."""
 
     name: str
     t: np.ndarray
     length: np.ndarray
     cable: np.ndarray
     intervals: Intervals
+    given_up: int = 0
 
 
 def seen_run(name: str, estimate: ArtifactData, recording: ArtifactData | None, run: str) -> SeenRun | None:
@@ -52,9 +55,8 @@ def seen_run(name: str, estimate: ArtifactData, recording: ArtifactData | None, 
     frames, tracks, ground = groups["frames"], groups["tracks"], groups["ground"]
     caps = None if recording is None else recording.group(run, "caps")
     observed = frames["p_WE"] if caps is None else _caps_at(caps, frames, ground, name)
-    return SeenRun(
-        name, frames["t"], observed, tracks["noise_sd"], frames["quality"], Intervals.from_group(groups["intervals"])
-    )
+    table, given_up = _reached(Intervals.from_group(groups["intervals"]), recording, run)
+    return SeenRun(name, frames["t"], observed, tracks["noise_sd"], frames["quality"], table, given_up)
 
 
 def sensed_run(name: str, recording: ArtifactData, run: str, robot: Robot) -> SensedRun | None:
@@ -73,7 +75,23 @@ def sensed_run(name: str, recording: ArtifactData, run: str, robot: Robot) -> Se
     if length.shape[1] != len(robot.sensors) or not np.isfinite(length).any():
         return None
     cable = np.array([sensor.cable for sensor in robot.sensors], dtype=np.int64)
-    return SensedRun(name, sensors["t"], length, cable, Intervals.from_group(intervals))
+    return SensedRun(name, sensors["t"], length, cable, *_reached(Intervals.from_group(intervals), recording, run))
+
+
+def _reached(table: Intervals, recording: ArtifactData | None, run: str) -> tuple[Intervals, int]:
+    """The intervals, complete only where all cables were done by their end, and how many that changed.
+
+    A recording without done flags (of another program) says nothing of it: all stay as they are.
+    """
+    commands = None if recording is None else recording.group(run, "commands")
+    if commands is None or "done" not in commands:
+        return table, 0
+    t = commands["t"]
+    done: np.ndarray = np.all(commands["done"], axis=1)
+    ends = np.append(table.t_first[1:], np.inf)  # done flags stay until the next target
+    reached = np.array([bool(done[(t >= a) & (t < b)].any()) for a, b in zip(table.t_first, ends, strict=True)])
+    complete = table.complete & reached
+    return replace(table, complete=complete), int((table.complete & ~reached).sum())
 
 
 def _caps_at(caps: Group, frames: Group, ground: Group, name: str) -> np.ndarray:

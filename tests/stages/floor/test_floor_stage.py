@@ -7,11 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.floor import Numerics, SeenRun, SensedRun, floor
+from r2s2r_cli.stages.floor import Numerics, SeenRun, SensedRun, floor, sensed_run
 from r2s2r_cli.stages.floor.lengths import length_repeats
 from r2s2r_cli.stages.segments import target_intervals
+from schemas.results_floor import FloorReport
 from tests.stages.measures.gait import FRAMES, path, run
+from tests.support.fake_robot import calibrated
 
 RATE = 50.0
 HOLD_S = 2.0
@@ -115,3 +118,46 @@ def replace_name(one: object, name: str) -> SeenRun:
     keys = ("t", "observed", "noise", "quality", "intervals")
     made = SeenRun(name, *(getattr(one, key) for key in keys))
     return replace(made, name=name)
+
+
+def test_iterations_that_lie_apart_are_told_from_repeats() -> None:
+    """Two iterations that repeat to 1 mm each and are 10 mm apart: the floor has both, and the warning each of them."""
+    first, second = (sensed(f"{i}:a", 40, spread=0.001, noise=1e-4, seed=i) for i in (1, 2))
+    second.length[:] += 0.01
+    _, report = floor([], [first, second], policies={})
+    assert report.lengths is not None and report.lengths.within_m is not None
+    assert report.lengths.within_m == pytest.approx(0.001, rel=0.15)
+    assert report.lengths.floor_m == pytest.approx(np.hypot(0.001, 0.005), rel=0.1)
+    assert any("--iteration N" in text for text in report.warnings)
+    assert report.used == report.runs == ("1:a", "2:a")
+    _, alone = floor([], [first], policies={})
+    assert alone.lengths is not None and alone.lengths.within_m is None
+    assert not any("--iteration N" in text for text in alone.warnings)
+
+
+def test_where_a_target_was_given_up_the_robot_is_not_judged() -> None:
+    """A recording of ten targets, the fifth given up 50 mm off: without its done flags it counts, with them it does
+    not, nor does the step after it, and the report says so."""
+    robot, n = calibrated(), 50
+    motors = len(robot.actuated)
+    t = np.arange(10 * n) / RATE
+    level = np.repeat(np.tile([0.0, 1.0], 5), n)
+    target = np.repeat(level[:, None], motors, axis=1)
+    done = np.tile(np.arange(n) > 30, 10)
+    lost = (t >= 4 * n / RATE) & (t < 5 * n / RATE)
+    length = 0.1 + 0.1 * np.repeat(level[:, None], len(robot.sensors), axis=1) + np.where(lost, 0.05, 0.0)[:, None]
+    table = target_intervals(t, target, control=np.zeros_like(target)).to_group()
+
+    def measured(flags: np.ndarray) -> FloorReport:
+        commands = Group({"t": t, "target": target, "done": np.repeat(flags[:, None], motors, axis=1)})
+        groups = {"sensors": Group({"t": t, "length": length}), "intervals": table, "commands": commands}
+        recording = ArtifactData("recording", {f"runs/a/{name}": group for name, group in groups.items()})
+        found = sensed_run("1:a", recording, "a", robot)
+        assert found is not None
+        return floor([], [found], policies={})[1]
+
+    fooled, report = measured(done), measured(done & ~lost)
+    assert fooled.lengths is not None and fooled.lengths.floor_m > 0.01 and fooled.given_up == 0
+    assert report.lengths is not None and report.lengths.floor_m < 1e-9 and report.given_up == 1
+    assert fooled.lengths.contrasts - report.lengths.contrasts == 2
+    assert "intervals left out since their target was given up: 1" in report.warnings

@@ -21,6 +21,7 @@ from r2s2r_cli.store.project import Project
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from r2s2r_cli.artifact import ArtifactData
     from schemas.results_estimate import EstimateReport
@@ -80,20 +81,44 @@ def estimate(
                 pictures=lambda run, name: file.pictures(f"runs/{run}/camera/{name}"),
             )  # fmt: skip
 
-    result, report = run.run(compute, (lambda data, said: _draw(data, here.robot(), said)) if draw else None)
+    result, report = run.run(compute, (lambda data, said: _draw(data, here.robot(), said, source)) if draw else None)
     show_outcome(result, console)
     if report is not None:
         _show(report, console)
 
 
-def _draw(data: ArtifactData, robot: Robot, report: EstimateReport) -> Iterator[tuple[str, bytes]]:
+def _draw(data: ArtifactData, robot: Robot, report: EstimateReport, source: Path) -> Iterator[tuple[str, bytes]]:
     from r2s2r_cli.views.estimate import draw_estimate
     from r2s2r_cli.views.estimate_page import estimate_page
 
     pictures = dict(draw_estimate(data, robot))
     for run, png in pictures.items():
         yield f"-{run}.png", png
+    for run in [run for run in data.runs() if data.group(run, "camera") is not None]:
+        for suffix, drawn in _seen(data, run, robot, source):
+            if suffix.endswith(".png"):
+                pictures[f"{run}{suffix.removesuffix('.png').replace('-', ', ')}"] = drawn
+            yield f"-{run}{suffix}", drawn
     yield ".html", estimate_page(report, data, pictures)
+
+
+def _seen(data: ArtifactData, run: str, robot: Robot, source: Path) -> Iterator[tuple[str, bytes]]:
+    """What only a run of camera images has: confidence and residuals, the model over the pictures, the film of it."""
+    from r2s2r_cli.stages.estimate.camera_input import kept_frames
+    from r2s2r_cli.store.frames import PictureFile
+    from r2s2r_cli.store.read import read_artifact
+    from r2s2r_cli.views.estimate_camera import draw_camera_run
+    from r2s2r_cli.views.estimate_overlay import overlay_film, overlay_strip
+
+    yield "-camera.png", draw_camera_run(data, run)
+    _, recording = read_artifact(source, "recording")
+    with PictureFile(source) as file:
+        _, frames = kept_frames(
+            run, dict(recording.streams(run)), lambda of, name: file.pictures(f"runs/{of}/camera/{name}")
+        )
+        for suffix, draw in (("-overlay.png", overlay_strip), ("-overlay.mp4", overlay_film)):
+            if drawn := draw(data, run, robot, frames.color_of):
+                yield suffix, drawn
 
 
 def _show(report: EstimateReport, console: Console) -> None:

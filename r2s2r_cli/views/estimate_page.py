@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 
 from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.views.page import Page, PageTable, Picture, counted, render
-from schemas.results_estimate import EstimateReport, EstimateRun
+from schemas.results_estimate import CameraFigures, EstimateReport, EstimateRun
 
 _MADE = ("simulated", "kinematic sample")
 _AXES = "xyz"
@@ -16,6 +17,8 @@ def report_tables(report: EstimateReport) -> Iterator[PageTable]:
     """What was estimated, two tables a run."""
     for run in report.runs:
         yield PageTable(f"run {run.run}", ["what", "found"], list(_rows(run)))
+        if run.camera is not None:
+            yield from _camera_tables(run.run, run.camera)
         yield PageTable(
             f"run {run.run}: end caps",
             ["cap", "noise sd x, y, z [mm]", "sd after smoothing [mm]", "in contact", "lowest [mm]",
@@ -46,6 +49,44 @@ def estimate_page(report: EstimateReport, data: ArtifactData, pictures: Mapping[
             pictures=[Picture(f"run {run}", png) for run, png in pictures.items()],
         )
     )
+
+
+def _camera_tables(run: str, camera: CameraFigures) -> Iterator[PageTable]:
+    yield PageTable(f"run {run}: camera", ["what", "found"], list(_camera_rows(camera)))
+    yield PageTable(
+        f"run {run}: sightings", ["cap", "seen and used", "rejected", "longest without [s]", "residual [sd]"],
+        [[str(cap.cap), f"{cap.seen:.1%}", str(cap.rejected), f"{cap.hidden_longest_s:.2f}",
+          "" if cap.residual_sd is None else f"{cap.residual_sd:.2f}"] for cap in camera.sight],
+    )  # fmt: skip
+    if camera.sensors:
+        yield PageTable(
+            f"run {run}: cable sensors against the camera", ["cable", "bias [mm]", "noise sd [mm]", ""],
+            [[str(one.cable), f"{1e3 * one.bias_m:+.1f} +- {1e3 * one.bias_sd_m:.1f}",
+              "" if one.noise_sd_m is None else f"{1e3 * one.noise_sd_m:.1f}", "not used" if one.dead else ""]
+             for one in camera.sensors],
+        )  # fmt: skip
+
+
+def _camera_rows(camera: CameraFigures) -> Iterator[tuple[str, str]]:
+    yield (
+        "camera",
+        f"{camera.height_m:.3f} m above the ground, {math.degrees(camera.tilt_rad):.1f} degrees off the vertical",
+    )
+    if camera.plane_share is not None and camera.depth_noise_sd_m is not None:
+        noise = f"depth scatters by {1e3 * camera.depth_noise_sd_m:.1f} mm about it"
+        yield "ground seen", f"{camera.plane_share:.0%} of the pixels with depth, {noise}"
+    yield "depth beside colour", "{:+.2f}, {:+.2f} px, corrected".format(*camera.shift_px)
+    yield "noise of sightings", "{:.2f} times what one frame tells across the line of sight, {:.2f} along".format(
+        *camera.noise_scale)  # fmt: skip
+    if camera.delay_s is not None and camera.delay_sd_s is not None:
+        text = f"{1e3 * camera.delay_s:.0f} +- {1e3 * camera.delay_sd_s:.0f} ms later than the pictures (clock and lag)"
+        yield "cable sensors", text
+    elif camera.sensors:
+        yield "cable sensors", "nothing moved enough to tell their clock from the camera's"
+    yield "caps told apart", f"at {camera.begun_t_s:.2f} s" + (
+        f", found again in {counted(camera.searched, 'frame')}" if camera.searched else "")  # fmt: skip
+    for words, count in camera.modes.items():
+        yield words.partition(":")[0], counted(count, "frame")
 
 
 def _rows(run: EstimateRun) -> Iterator[tuple[str, str]]:

@@ -79,6 +79,10 @@ class DecodedFrames:
             depth=self._decoded(self.depth, depth, deep=True) if 0 <= depth < len(self.depth) else None,
         )
 
+    def color_of(self, index: int) -> np.ndarray | None:
+        """The colour picture of a frame alone, RGB uint8 (v, u, 3), None where it cannot be decoded; as `frame`."""
+        return self._decoded(self.color, index, deep=False)
+
     def _work(self, ready: queue.Queue[ImageFrame | BaseException | None], unwanted: threading.Event) -> None:
         def put(item: ImageFrame | BaseException | None) -> bool:
             while not unwanted.is_set():

@@ -1,8 +1,11 @@
-"""`r2s2r estimate`: 10-record.h5 -> 20-estimate.h5, the state of the robot at every kept frame."""
+"""`r2s2r estimate`: 10-record.h5 -> 20-estimate.h5 (50 -> 51), the state of the robot at every kept frame."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from r2s2r_cli.console import Console
 from r2s2r_cli.options import (
@@ -28,7 +31,17 @@ if TYPE_CHECKING:
     from schemas.robot import Robot
 
 
+class Of(StrEnum):
+    """What `--of` takes."""
+
+    RECORD = "record"
+    EXECUTE = "execute"
+
+
 def estimate(
+    of: Annotated[
+        Of, typer.Option("--of", help="Runs of 10-record.h5, or of the executed plan: 50-execute.h5 -> 51-estimate.h5.")
+    ] = Of.RECORD,
     project: ProjectOption = None,
     iteration: IterationOption = None,
     json: JsonOption = False,
@@ -58,15 +71,17 @@ def estimate(
     if show_config:
         print_config("estimate", wanted(here, place, "estimate", overrides, {}).settings, console)
         return
-    source = place.artifact("recording")
-    require_input(source, f"r2s2r import run.csv --iteration {place.number}")
+    executed = of is Of.EXECUTE
+    source = place.artifact("recording", executed=executed)
+    first = "r2s2r execute" if executed else "r2s2r import run.csv"
+    require_input(source, f"{first} --iteration {place.number}")
     header = whole_header(source)
     for reason in reasons(here, header, wanted_again(here, place, header.provenance)):
         console.warn(f"{here.relative(source)} is stale itself: {reason}")
     run = StageRun(
         stage="estimate", kind="estimate", project=here, iteration=place,
         find_inputs=lambda: [artifact_ref(here, source, whole_header(source))],
-        report_model=EstimateReport, overrides=overrides, dry_run=dry_run, force=force,
+        report_model=EstimateReport, overrides=overrides, dry_run=dry_run, force=force, executed=executed,
     )  # fmt: skip
 
     def compute() -> tuple[ArtifactData, EstimateReport]:

@@ -13,6 +13,8 @@ class CameraCounts(Frozen):
     frames: int
     lost: int
     """Gaps in the camera's own count, and what this host could not take."""
+    repeated: int = 0
+    """Frames equal to the one before, to the last bit of depth: a frozen camera."""
     rate_hz: float | None = None
     """Frames a second that were written."""
 

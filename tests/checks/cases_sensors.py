@@ -4,10 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
+from r2s2r_cli.checks.subjects import Links
 from tests.checks.case import Case, Edge
-from tests.support.check_subjects import edited, put, recording
+from tests.support.check_subjects import edited, links, put, recording
+
+
+def _recorded(warnings: list[str]) -> Links:
+    head = links().header
+    runs = [{"run": "a", "warnings": []}, {"run": "b", "warnings": warnings}]
+    made = head.provenance.model_copy(update={"report": {"runs": runs}})
+    return links(header=head.model_copy(update={"provenance": made}))
+
 
 FAILS: tuple[Case, ...] = (
+    Case(
+        "recorded_without_warning",
+        lambda: _recorded(["3 lines were corrupt", "ended at target 2 of 5: the link broke"]),
+        (
+            ("runs/b", "record warned of this run", "no warning", "3 lines were corrupt"),
+            ("runs/b", "record warned of this run", "no warning", "ended at target 2 of 5: the link broke"),
+        ),
+    ),
     Case(
         "sensor_chip_initialised",
         lambda: edited(recording(), "sensors/capacitance", put((slice(0, 3), 4), 0.2e-12)),
@@ -136,6 +153,8 @@ FAILS: tuple[Case, ...] = (
 )
 
 EDGES: tuple[Edge, ...] = (
+    Edge("recorded_without_warning", "a run without warnings", lambda: _recorded([])),
+    Edge("recorded_without_warning", "a recording of another program has no report", links),
     Edge(
         "sensor_chip_initialised",
         "0.21 pF is a measurement",

@@ -24,7 +24,7 @@ class Pictures:
     """Frames of one run into its `camera` stream, until the context ends.
 
     feed: frames as they come. stamp: from a frame to its time in the run [s]. waits: a robot in lock-step, whose time
-    does not go on while the camera is slow. Counts: `written`, `lost` (gaps in the camera's own count).
+    does not go on while the camera is slow. Counts: `written`, `lost` (gaps in the camera's own count), `repeated`.
     """
 
     def __init__(
@@ -40,6 +40,7 @@ class Pictures:
         self._last_t = -np.inf
         self.written = 0
         self.lost = 0
+        self._repeated_before = 0
         self._thread = threading.Thread(target=self._work, name="record-camera", daemon=True)
 
     @property
@@ -60,8 +61,14 @@ class Pictures:
                 hint="r2s2r doctor camera",
             )  # fmt: skip
 
+    @property
+    def repeated(self) -> int:
+        """Frames of this run whose depth was that of the one before to the last bit: no camera has so little noise."""
+        return self._feed.statistics.repeated - self._repeated_before
+
     def __enter__(self) -> Self:
         self._feed.frames()  # what came before the run is not of it
+        self._repeated_before = self._feed.statistics.repeated
         self._thread.start()
         return self
 

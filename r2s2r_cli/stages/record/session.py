@@ -23,6 +23,8 @@ CONTROL_SHARE, CAMERA_SHARE = 0.95, 0.98
 """Of control ticks on time and of frames that were kept: below it the report warns."""
 _NAMED = 6
 """Targets that were given up which a warning names."""
+_REPEATED = 3
+"""Frames that repeat the one before which are no reason to warn."""
 _SILENT = 0.02
 """Share of the control ticks without a reading of a sensor beyond which the report warns."""
 
@@ -113,7 +115,9 @@ def _report(loop: RunLoop, pictures: Pictures | None, ended: str) -> RecordRun:
     camera = None
     if pictures is not None:
         rate = pictures.written / loop.t if loop.t > 0 else None
-        camera = CameraCounts(frames=pictures.written, lost=pictures.lost, rate_hz=rate)
+        camera = CameraCounts(
+            frames=pictures.written, lost=pictures.lost, repeated=pictures.repeated, rate_hz=rate
+        )  # fmt: skip
     done = RecordRun(
         run=loop.plan.name, policy=loop.plan.policy.name, repeat=loop.plan.repeat, ended=ended, targets=loop.targets,
         targets_done=loop.steps.index, timed_out=tuple(loop.timed_out), duration_s=loop.t, ticks=tally.ticks,
@@ -156,4 +160,6 @@ def _warnings(run: RecordRun, loop: RunLoop, *, stops_by_itself: bool) -> list[s
     camera = run.camera
     if camera is not None and camera.lost > (1 - CAMERA_SHARE) * max(camera.frames + camera.lost, 1):
         found.append(f"{camera.lost} of {camera.frames + camera.lost} camera frames were lost")
+    if camera is not None and camera.repeated > max(_REPEATED, (1 - CAMERA_SHARE) * camera.frames):
+        found.append(f"{camera.repeated} of {camera.frames} camera frames repeat the one before: a frozen camera")
     return found

@@ -139,6 +139,26 @@ def test_a_camera_that_hesitates_holds_the_motors(lock_step: bool) -> None:
     assert not np.array(link.commands[:held]).any() and np.any(link.commands[held])
 
 
+def test_a_frozen_camera_is_said() -> None:
+    """Frames that repeat the one before since the run began are counted, and warned of where they are many."""
+    robot = calibrated()
+    for repeats, said in ((2, False), (30, True)):
+        link, feed = FakeLink(robot), Still([frame(i, 100.0 + 0.02 * i) for i in range(40)])
+        feed.statistics = FeedStatistics(repeated=7)
+
+        def freeze(number: int, sample: Sample, feed: Still = feed, repeats: int = repeats) -> Sample:
+            feed.statistics = FeedStatistics(repeated=7 + repeats)
+            return sample
+
+        link.on_read = freeze
+        plan = plans([random_policy(robot, 1, 0)], repeats=1, rest=0.0)
+        session = Session(plan, robot, link, RecordSettings(), feed=feed)
+        session.record(Rows())
+        (run,) = session.runs
+        assert run.camera is not None and run.camera.repeated == repeats
+        assert any("frozen camera" in text for text in run.warnings) == said
+
+
 def test_a_silent_camera_ends_the_run() -> None:
     """No frame for longer than camera_gone_s."""
     robot = calibrated()

@@ -21,8 +21,8 @@ LEAST_M = 1e-5
 def run_data(recording: ArtifactData | None, estimate: ArtifactData, run: str, *, name: str = "") -> RunData:
     """The run of both artifacts; `name`: what it is called in the fit (default: as there).
 
-    observed: the recording's end caps at the frames that the estimate kept, moved on to its ground. Without end caps
-    in the recording (a tracker made them on the way), the smoothed ones of the estimate.
+    observed: the recording's end caps at the frames that the estimate kept, moved on to its ground. Of camera images,
+    what the tracker knew at each frame from it and those before.
 
     Raises InputError where there are no kept frames, target intervals or motor commands, where the recording is another
     one, for numbers that are not finite, and where no cap moves.
@@ -43,7 +43,9 @@ def run_data(recording: ArtifactData | None, estimate: ArtifactData, run: str, *
     found = RunData(
         name=name or run,
         t=frames["t"],
-        observed=frames["p_WE"] if caps is None else _observed(caps, frames, _group(estimate, run, "ground"), run),
+        observed=_as_known(frames, tracks)
+        if caps is None
+        else _observed(caps, frames, _group(estimate, run, "ground"), run),
         noise=tracks["noise_sd"],
         p_WE=frames["p_WE"],
         sd_p=np.sqrt(np.diagonal(frames["cov_p_WE"], axis1=-2, axis2=-1)),
@@ -91,6 +93,11 @@ def _group(data: ArtifactData, run: str, stream: str) -> Group:
             hint="r2s2r import run.csv   # a log with end caps, targets and controls",
         )  # fmt: skip
     return group
+
+
+def _as_known(frames: Group, tracks: Group) -> np.ndarray:
+    """End caps of a run of camera images; smoothed ones know later frames, and no test segment may start from them."""
+    return tracks["observed"] if "observed" in tracks else frames["p_WE"]
 
 
 def _observed(caps: Group, frames: Group, ground: Group, run: str) -> np.ndarray:

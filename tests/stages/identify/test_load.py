@@ -183,3 +183,11 @@ def test_one_interval_alone_is_bad_input_and_two_of_any_runs_are_not() -> None:
         require_two_intervals([])
     require_two_intervals([one, many])
     require_two_intervals([one, run(1)])
+
+
+def test_of_camera_images_what_was_known_at_each_frame_is_observed() -> None:
+    """A recording without end caps: the smoothed ones know later frames and would tell test segments their future."""
+    recording, estimate = artifacts()
+    known = run_data(recording, estimate, "walk").observed + 3e-4
+    filtered = changed(estimate, "tracks", observed=known)
+    assert run_data(without(recording, "caps"), filtered, "walk").observed == pytest.approx(known)

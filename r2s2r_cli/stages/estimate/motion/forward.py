@@ -10,7 +10,14 @@ from r2s2r_cli.stages.estimate.motion.body import Body
 from r2s2r_cli.stages.estimate.motion.data import MotionSettings
 from r2s2r_cli.stages.estimate.motion.equations import START_SD, start_sd
 from r2s2r_cli.stages.estimate.motion.labels import label
-from r2s2r_cli.stages.estimate.motion.measurements import Stack, floor_rows, rod_rows, sensor_rows, sighting_rows
+from r2s2r_cli.stages.estimate.motion.measurements import (
+    Stack,
+    floor_rows,
+    rod_rows,
+    sensor_rows,
+    sighting_rows,
+    standing_rows,
+)
 from schemas.robot import Robot
 
 GATE = 30.0
@@ -18,7 +25,15 @@ GATE = 30.0
 BURST = 3.0
 """[m^2/s^3] Density of the acceleration where sightings leave the prediction: 0.3 m/s within 1/30 s."""
 REFUSED = 5
-"""Frames in a row that may refuse a cap before it counts as lost."""
+"""Frames in a row that may refuse a cap, or contradict rods and sensors, before it counts as lost."""
+BLIND_S = 0.3
+"""[s] After so long without any cap, where they are is looked for afresh."""
+FRESH_S, STOPS_S = 0.1, 0.25
+"""[s] A cap not seen for the first goes on with a velocity that fades with the second as time constant."""
+TWIN_M = 0.04
+"""[m] Two caps of a rod whose distance is farther off than this are not both caps of it."""
+BENT_M, FAR_OFF_M, FAR_OFF = 0.005, 0.04, 2
+"""Rods farther off than the first [m], or so many sensors farther off than the second [m], contradict the states."""
 UNKNOWN_DELAY_S = 0.06
 """Clock offset and lag of the sensors, not known yet: a changing length is that much out of date."""
 START_SD_M = 0.005
@@ -51,6 +66,8 @@ class Forward:
         self._shown = np.full(len(self.body.sensor), np.nan)
         self._count, self._sum, self._late = (np.zeros(len(self.body.sensor)) for _ in range(3))
         self._elapsed = 0.0
+        self._unseen = np.zeros(self.body.caps)
+        self._wrong = 0
 
     @property
     def t(self) -> float:
@@ -90,7 +107,7 @@ class Forward:
         for cap in range(body.caps):
             states = body.p(cap)
             self._cov[np.ix_(states, states)] = START_SD_M**2 * np.eye(3) if cov is None else cov[cap]
-        self._refused[:] = 0
+        self._believe()
         self._correct(lambda stack, x: rod_rows(stack, x, body, self.settings))
 
     def predict(self, t: float) -> tuple[np.ndarray, np.ndarray]:
@@ -103,6 +120,7 @@ class Forward:
         """Take in sightings at time t: (cap, 3), NaN where there is none, and (cap, 3, 3). Which were used: (cap,)."""
         self._go(t)
         body = self.body
+        p_WE = self._without_twins(p_WE)
         seen = np.all(np.isfinite(p_WE), axis=1)
         used = seen & (self._squares(p_WE, cov) <= GATE)
         if np.any(seen & ~used) and self._elapsed > 0:
@@ -122,8 +140,23 @@ class Forward:
             rod_rows(stack, x, body, self.settings)
             floor_rows(stack, x, body, self.settings, self._spread())
 
+            if not np.any(used):
+                standing_rows(stack, x, body)
+
         self._correct(rows)
+        self._unseen[used] = 0.0
+        self._wrong = 0 if self._consistent() else self._wrong + 1
         return np.asarray(used)
+
+    def _without_twins(self, p_WE: np.ndarray) -> np.ndarray:
+        """Sightings without those of rods whose caps are not a rod length apart: the farther one from where it was
+        expected has found something else, often the other cap."""
+        out = p_WE.copy()
+        for (a, b), length in zip(self.body.rod, self.body.rod_length, strict=True):
+            if abs(np.linalg.norm(p_WE[b] - p_WE[a]) - length) > TWIN_M:  # False where one is NaN
+                off = [np.linalg.norm(p_WE[cap] - self._x[self.body.p(int(cap))]) for cap in (a, b)]
+                out[b if off[1] > off[0] else a] = np.nan
+        return out
 
     def _squares(self, p_WE: np.ndarray, cov: np.ndarray) -> np.ndarray:
         """Squared distance of each sighting from the prediction over its variance, (cap,); NaN: not sighted."""
@@ -164,12 +197,17 @@ class Forward:
 
     @property
     def lost(self) -> bool:
-        """Some cap is less certain than `MotionSettings.lost_sd_m`, or sightings were refused for long: look everywhere
-        (`reacquire`)."""
+        """Some cap is less certain than `MotionSettings.lost_sd_m`, or nothing was seen for long, or what is seen
+        contradicts prediction, rods or sensors for long: look everywhere (`reacquire`)."""
         if np.isnan(self._t):
             return True
         worst = np.sqrt(np.linalg.eigvalsh(self.cov_p)[:, -1])
-        return bool(np.any(worst > self.settings.lost_sd_m) or np.any(self._refused >= REFUSED))
+        return bool(
+            np.any(worst > self.settings.lost_sd_m)
+            or np.any(self._refused >= REFUSED)
+            or np.all(self._unseen > BLIND_S)
+            or self._wrong >= REFUSED
+        )
 
     def reacquire(self, t: float, candidates: Sequence[np.ndarray], cov: np.ndarray) -> bool:
         """Find the caps among blobs of each rod's colour, (blob, 3) in W with covariance (3, 3), by the labelling that
@@ -205,8 +243,22 @@ class Forward:
             floor_rows(stack, x, body, self.settings, self._spread())
 
         self._correct(rows, iterations=4 * ITERATIONS)
-        self._refused[:] = 0
+        self._believe()
         return True
+
+    def _believe(self) -> None:
+        """Nothing speaks against the states (any more)."""
+        self._refused[:] = 0
+        self._unseen[:] = 0.0
+        self._wrong = 0
+
+    def _consistent(self) -> bool:
+        """Whether rods and sensors are as long as they should be."""
+        p = self.body.positions(self._x)
+        rods = np.linalg.norm(p[self.body.rod[:, 1]] - p[self.body.rod[:, 0]], axis=-1) - self.body.rod_length
+        seen = np.linalg.norm(p[self.body.sensor[:, 1]] - p[self.body.sensor[:, 0]], axis=-1)
+        off = np.abs(self._shown - self._x[self.body.bias] - seen)
+        return bool(np.all(np.abs(rods) < BENT_M) and np.sum(off > FAR_OFF_M) < FAR_OFF)
 
     def _spread(self) -> np.ndarray:
         """Standard deviation of each cap's height, (cap,)."""
@@ -221,6 +273,9 @@ class Forward:
         rows = np.arange(half)
         f = np.eye(body.dim)
         f[rows, half + rows] = dt
+        # Robots of cables stop soon: a velocity that was seen long ago says nothing.
+        f[half + rows, half + rows] = np.repeat(np.where(self._unseen > FRESH_S, np.exp(-size / STOPS_S), 1.0), 3)
+        self._unseen += size
         cov = self._spread_by(f @ self._cov @ f.T, dt, self.settings.acceleration)
         self._elapsed += dt
         bias = np.arange(body.bias.start, body.bias.stop)

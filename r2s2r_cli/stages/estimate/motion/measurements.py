@@ -12,6 +12,8 @@ ON_FLOOR_M = 0.003
 """[m] A cap lower than this is taken to stand; it then slips slowly."""
 SURE_M = 0.01
 """[m] Heights less certain than this tell no contact."""
+STANDING_SD_M = 0.02
+"""[m] In one frame; of many frames together far less."""
 SLIP_SD_M_PER_S = 0.15
 """Of a standing cap in one frame: 0.03 m/s that lasts 0.3 s or more, as independent values a frame."""
 
@@ -101,3 +103,10 @@ def floor_rows(stack: Stack, x: np.ndarray, body: Body, settings: MotionSettings
         if height < ON_FLOOR_M and sd[cap] < SURE_M:
             for state in body.v(cap)[:2]:
                 stack.add(np.array([state]), np.array([-x[state]]), np.ones((1, 1)), np.array([[SLIP_SD_M_PER_S**2]]))
+
+
+def standing_rows(stack: Stack, x: np.ndarray, body: Body) -> None:
+    """While nothing is seen: the two lowest caps stay near the floor, the robot does not fly."""
+    height = body.positions(x)[:, 2] - body.radius
+    for cap in np.argsort(height)[:2]:
+        stack.add(body.p(int(cap))[2:], np.array([-height[cap]]), np.ones((1, 1)), np.array([[STANDING_SD_M**2]]))

@@ -88,6 +88,45 @@ class IdentifySettings(Frozen):
     """Planted robots of --self-test."""
 
 
+class PlanSettings(Frozen):
+    """Settings of `plan`. What each does: docs/guides/plan.md."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
+    step_s: Annotated[float, Field(strict=True, gt=0, le=0.01)] = 0.001
+    """Step of the engine [s]; must divide the controller's period. Where cables are stiff it is divided further."""
+    rod_contact: Annotated[bool, Field(strict=True)] = True
+    """Whether rods collide with each other."""
+    depth: Annotated[int, Field(strict=True, ge=2, le=6)] = 4
+    """Target shapes of a gait, the return to rest included."""
+    beam: Annotated[int, Field(strict=True, ge=0)] = 200
+    """Classes of like poses that go on from one level of the search to the next; 0: all."""
+    merge_m: Annotated[float, Field(strict=True, ge=0, le=0.1)] = 0.006
+    """Poses nearer than this [m] after a symmetry and a motion over the ground are one class; 0: every pose is its own."""
+    most_changed: Annotated[int, Field(strict=True, ge=1, le=24)] = 6
+    """Cables that one step may switch at most."""
+    rest_error_m: Annotated[float, Field(strict=True, gt=0, le=1)] = 0.03
+    """A gait that ends farther than this [m, root mean square of the caps] from the rest pose did not come back."""
+    draws: Annotated[int, Field(strict=True, ge=1, le=1000)] = 8
+    """Draws of the simulator's numbers that a gait is judged on; the first has the best values."""
+    starts: Annotated[int, Field(strict=True, ge=1, le=1000)] = 3
+    """Start poses for each draw: rest lengths anywhere in the tolerance of the controller."""
+    candidates: Annotated[int, Field(strict=True, ge=1, le=10_000)] = 45
+    """Gaits of each behaviour that are judged on a few draws; a third of them is judged on all."""
+    kept: Annotated[int, Field(strict=True, ge=1, le=1000)] = 10
+    """Gaits of each behaviour that are kept."""
+    spread: Annotated[float, Field(strict=True, ge=0, le=10)] = 1.0
+    """Standard deviations that are taken off the mean reward."""
+    cycles: Annotated[int, Field(strict=True, ge=1, le=100)] = 6
+    """Gaits of each long policy."""
+    smooth: Annotated[bool, Field(strict=True)] = True
+    """Whether returns to rest between gaits are left out where a shortcut leads to the same end."""
+    goal_within_m: Annotated[float, Field(strict=True, gt=0, le=10)] = 0.1
+    """How near to a goal of --to is near enough [m]."""
+    goal_within_deg: Annotated[float, Field(strict=True, gt=0, le=180)] = 20.0
+    """And its heading [deg]."""
+
+
 class RunConfig(Frozen):
     """The settings of every stage; a stage stores its own section in what it writes."""
 
@@ -97,6 +136,7 @@ class RunConfig(Frozen):
     estimate: EstimateSettings = EstimateSettings()
     simulate: SimulateSettings = SimulateSettings()
     identify: IdentifySettings = IdentifySettings()
+    plan: PlanSettings = PlanSettings()
 
 
 class ProjectFile(RunConfig):

@@ -14,13 +14,14 @@ from schemas.compare import COMPARISON
 from schemas.estimate import ESTIMATE
 from schemas.floor import FLOOR
 from schemas.identification import IDENTIFICATION
+from schemas.plan import PLAN
 from schemas.policy import POLICY
 from schemas.recording import RECORDING
 from schemas.simulation import SIMULATION
 
 KINDS: dict[str, ArtifactSpec] = {
     spec.kind: spec
-    for spec in (CALIBRATION, RECORDING, ESTIMATE, IDENTIFICATION, POLICY, SIMULATION, COMPARISON, FLOOR)
+    for spec in (CALIBRATION, RECORDING, ESTIMATE, IDENTIFICATION, PLAN, POLICY, SIMULATION, COMPARISON, FLOOR)
 }
 """The artifact kinds by name, in the order of the data."""
 
@@ -60,7 +61,8 @@ def chain(
 
 
 STAGE_VERSIONS: dict[str, int] = {
-    "import": 1, "calibrate": 1, "record": 1, "estimate": 1, "identify": 1, "simulate": 1, "floor": 1, "execute": 1,
+    "import": 1, "calibrate": 1, "record": 1, "estimate": 1, "identify": 1, "simulate": 1, "floor": 1,
+    "plan": 1, "execute": 1,
     "compare": 1,
 }  # fmt: skip
 """Raised by hand when a stage computes something else from the same input; `status` then calls its results stale."""

@@ -121,6 +121,37 @@ def policy() -> ArtifactData:
     return ArtifactData("policy", {"policies/walk": _policy(), "policies/rest": _policy(steps=1)})
 
 
+def plan() -> ArtifactData:
+    """Two gaits of one behaviour, one long policy of them, simulated: the same motion; two symmetries."""
+    number = np.array([0.1, 0.05])
+    table = dict.fromkeys(("nominal", "mean", "sd", "score", "turn", "turn_sd", "duration"), number)
+    primitives = {
+        **table, "name": np.array([b"forward-1", b"forward-2"]), "behaviour": np.array([b"forward", b"forward"]),
+        "worked": np.array([1.0, 0.75]), "shift": np.outer(number, [0.1, 1.0]), "shift_sd": np.zeros((2, 2)),
+        "element": np.array([0, 1]), "same_element": np.ones(2),
+    }  # fmt: skip
+    long = {
+        "name": np.array([b"straight"]), "gaits": np.array([b"forward-1 forward-2"]), "shortcuts": np.array([1]),
+        "saved": np.array([1]), "expected": np.array([[0.015, 0.15, 0.15]]), "mean": np.array([[0.01, 0.14, 0.1]]),
+        "sd": np.full((1, 3), 0.01), "worked": np.ones(1), "duration": np.array([4.0]), "goal": np.full((1, 3), np.nan),
+    }  # fmt: skip
+    symmetry = {
+        "caps": np.array([[0, 1, 2, 3, 4, 5], [2, 3, 4, 5, 0, 1]]), "turn": np.tile(np.eye(3), (2, 1, 1)),
+        "cables": np.array([[0, 1, 2, 3, 4, 5, 6, 7, 8], [2, 0, 1, 5, 3, 4, 8, 6, 7]]), "misfit": np.zeros(2),
+        "motors": np.array([[0, 1, 2, 3, 4, 5], [2, 0, 1, 5, 3, 4]]), "support": np.array([[0, 2, 5], [1, 2, 4]]),
+    }  # fmt: skip
+    facts: dict[str, Scalar] = {
+        "robot": "threebar", "engine": "closed form 1", "numbers": "made up", "identified": False, "seed": 0,
+        "step": 0.001, "depth": 3, "simulated": 10, "pruned": 0, "lost": 1, "found": 4,
+    }  # fmt: skip
+    runs = {path.replace("walk", "straight", 1): group for path, group in simulation().groups.items()}
+    return ArtifactData("plan", {
+        "plan": Group({}, facts), "symmetry": Group(symmetry), "primitives": Group(primitives), "long": Group(long),
+        "reference": Group({"p": np.array(robot().rest_caps_m)}),
+        **{f"policies/{name}": _policy() for name in ("forward-1", "forward-2", "straight")}, **runs,
+    })  # fmt: skip
+
+
 def calibration() -> ArtifactData:
     """Exact lines of two sensors from four points each, one dated history, two tendon curves, one weighed rod."""
     from tests.support.bench import bench_groups
@@ -180,7 +211,7 @@ def comparison() -> ArtifactData:
 
 BUILDERS: dict[str, Callable[[], ArtifactData]] = {
     "calibration": calibration, "recording": recording, "estimate": estimate, "identification": identification,
-    "policy": policy, "simulation": simulation, "comparison": comparison, "floor": floor,
+    "plan": plan, "policy": policy, "simulation": simulation, "comparison": comparison, "floor": floor,
 }  # fmt: skip
 """One builder a kind."""
 

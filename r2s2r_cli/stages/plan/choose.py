@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,10 +17,9 @@ from r2s2r_cli.stages.plan.search import Found, best_of
 
 @dataclass(frozen=True)
 class ChoiceSettings:
-    """candidates: gaits of each behaviour that are judged at all, on a few pairs; of these `finalists` on all pairs;
-    kept: how many stay. spread: standard deviations that are taken off the mean."""
+    """first_pairs: on which all of the shortlist are judged; `finalists` of them are on all pairs; kept: how many stay.
+    spread: standard deviations that are taken off the mean."""
 
-    candidates: int = 60
     first_pairs: int = 6
     finalists: int = 20
     kept: int = 10
@@ -48,14 +47,19 @@ class Judge:
         return [self._known[gait.key, count] for gait in gaits]
 
 
+def shortlist(found: Found, rewards: Mapping[str, Reward], count: int) -> dict[str, list[Gait]]:
+    """The gaits of the search with the highest rewards of every behaviour."""
+    return {name: [found.gaits[row] for row in best_of(found, reward, count)] for name, reward in rewards.items()}
+
+
 def chosen(
-    judge: Judge, found: Found, rewards: Mapping[str, Reward], settings: ChoiceSettings,
+    judge: Judge, listed: Mapping[str, list[Gait]], rewards: Mapping[str, Reward], settings: ChoiceSettings,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, tuple[Primitive, ...]]:  # fmt: skip
     """The best gaits of every behaviour, best first, by their robust score; named `forward-1`, `forward-2` ..."""
     kept: dict[str, tuple[Primitive, ...]] = {}
     for number, (behaviour, reward) in enumerate(rewards.items()):
-        gaits = [found.gaits[row] for row in best_of(found, reward, settings.candidates)]
+        gaits = listed[behaviour]
         few = min(settings.first_pairs, len(judge.pairs))
         first = [earned(reward, came, good) for came, good in judge(gaits, few)]
         order = np.argsort([-(one.mean() - settings.spread * one.std()) for one in first], kind="stable")
@@ -66,12 +70,6 @@ def chosen(
         ]
         ranked = sorted(made, key=lambda one: (-one.score, one.gait.key))[: settings.kept]
         short = behaviour.replace(":", ".").rpartition(".")[2]
-        kept[behaviour] = tuple(_named(one, f"{short}-{k}") for k, one in enumerate(ranked, 1))
+        kept[behaviour] = tuple(replace(one, name=f"{short}-{k}") for k, one in enumerate(ranked, 1))
         progress(number + 1, len(rewards))
     return kept
-
-
-def _named(one: Primitive, name: str) -> Primitive:
-    from dataclasses import replace
-
-    return replace(one, name=name)

@@ -12,7 +12,7 @@ from r2s2r_cli.stages.plan.alike import alike, carried, told_targets
 from r2s2r_cli.stages.plan.belief import assumed
 from r2s2r_cli.stages.plan.executor import Executor, Standing
 from r2s2r_cli.stages.plan.gaits import Gait, neighbours, run_gaits
-from r2s2r_cli.stages.plan.placement import Reference, reference_of
+from r2s2r_cli.stages.plan.placement import Reference, reference_of, turned
 from r2s2r_cli.stages.plan.rewards import BEHAVIOURS, Outcomes, reward_named
 from r2s2r_cli.stages.plan.robust import primitive
 from r2s2r_cli.stages.plan.search import Found, Search, SearchSettings, best_of

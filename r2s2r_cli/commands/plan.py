@@ -1,0 +1,192 @@
+"""`r2s2r plan`: gaits and long policies for the simulator's robot -> 40-plan.h5."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from r2s2r_cli.console import Console
+from r2s2r_cli.errors import Interrupted
+from r2s2r_cli.options import (
+    DrawOption,
+    DryRunOption,
+    ForceOption,
+    IterationOption,
+    JsonOption,
+    ProjectOption,
+    QuietOption,
+    SetOption,
+    ShowConfigOption,
+    parse_overrides,
+)
+from r2s2r_cli.store.project import Project
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from r2s2r_cli.artifact import ArtifactData
+    from r2s2r_cli.commands.plan_inputs import Asked
+    from r2s2r_cli.store.checkpoint import CheckpointFile
+    from schemas.config import PlanSettings
+    from schemas.results_plan import PlanReport
+    from schemas.robot import Robot
+
+
+def plan(
+    behaviour: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--behaviour",
+            metavar="NAME",
+            help="forward, backward, clockwise, counterclockwise, or package.module:function; repeatable. "
+            "Default: these four.",
+        ),
+    ] = None,
+    to: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--to",
+            metavar="X,Y,HEADING",
+            help="Also a policy that goes there: metres along the principal axis and forward, degrees; repeatable.",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of drawn numbers and start poses.")] = 0,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where the same command was interrupted.")] = False,
+    project: ProjectOption = None,
+    iteration: IterationOption = None,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+    draw: DrawOption = True,
+    dry_run: DryRunOption = False,
+    force: ForceOption = False,
+    set_: SetOption = None,
+    show_config: ShowConfigOption = False,
+) -> None:
+    """Search gaits in the simulator, judge them over what is not known, make long policies of them.
+
+    Uses 30-identify.h5 of the iteration; without one, robot.toml's numbers. Writes 40-plan.h5, a picture of every
+    behaviour and policy from above, and a page that plays them. Its policies run with `r2s2r record 40-plan.h5:NAME`.
+
+    Example: r2s2r plan --to 0.5,1,90
+    """
+    from r2s2r_cli.commands.plan_inputs import Asked
+    from r2s2r_cli.commands.stage import StageRun, print_config, show_outcome, wanted
+    from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_key, checkpoint_of
+    from schemas.results_plan import PlanReport
+
+    console = Console(json=json, quiet=quiet)
+    here = Project.find(project)
+    place = here.iteration(iteration, create=True)
+    overrides = parse_overrides(set_, "plan")
+    if show_config:
+        print_config("plan", wanted(here, place, "plan", overrides, {}).settings, console)
+        return
+    settings = here.config(place, overrides).plan
+    asked = Asked(here, place, tuple(behaviour or ()), tuple(to or ()), seed)
+    asked.check(settings)
+    unfinished = checkpoint_of(here.artifact("plan", place))
+    if resume and not unfinished.exists():
+        console.say("nothing was interrupted: there is no checkpoint to go on from")
+    run = StageRun(
+        stage="plan", kind="plan", project=here, iteration=place, find_inputs=asked.refs, report_model=PlanReport,
+        overrides=overrides, flags=asked.flags(), dry_run=dry_run, force=force or (resume and unfinished.exists()),
+    )  # fmt: skip
+    digests = [ref.sha256 for ref in run.inputs]
+    key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
+    checkpoint = CheckpointFile(unfinished, key, resume)
+    try:
+        result, report = run.run(
+            lambda: _compute(asked, settings, checkpoint, console),
+            (lambda data, said: _draw(data, here.robot(), said)) if draw else None,
+            lambda said: checkpoint.clear(),
+        )
+    except KeyboardInterrupt:
+        if not checkpoint.kept():
+            raise
+        raise Interrupted(
+            f"what was found so far is kept in {here.relative(unfinished)}, nothing else was written",
+            hint=shlex.join(["r2s2r", "plan", *_typed(behaviour, to, seed, iteration, set_, project), "--resume"]),
+        ) from None
+    show_outcome(result, console)
+    if report is not None:
+        _show(report, console)
+    if result.state == "done" and draw:
+        page = here.relative(here.artifact("plan", place).with_suffix(".html"))
+        console.say(f"open {page} in a browser to look at the policies in three dimensions")
+
+
+def _typed(
+    behaviour: list[str] | None, to: list[str] | None, seed: int, iteration: int | None, set_: list[str] | None,
+    project: Path | None,
+) -> list[str]:  # fmt: skip
+    """The options as they were given, for a command that goes on."""
+    words = []
+    for option, values in (("--behaviour", behaviour), ("--to", to), ("--set", set_)):
+        for value in values or ():
+            words += [f"{option}={value}"]
+    single = {"--seed": seed or None, "--iteration": iteration, "--project": project}
+    return words + [word for name, value in single.items() if value is not None for word in (name, str(value))]
+
+
+def _compute(
+    asked: Asked, settings: PlanSettings, checkpoint: CheckpointFile, console: Console
+) -> tuple[ArtifactData, PlanReport]:
+    from r2s2r_cli.commands.identify_run import Clock
+    from r2s2r_cli.commands.interrupts import whole_items
+
+    request, robot = asked.request(settings), asked.project.robot()
+    (stage,) = whole_items(_loaded())
+    clock = Clock()
+    with console.parts() as show:
+
+        def progress(part: str, done: int, total: int) -> None:
+            clock.enter(part)
+            show(part, done, total, "")
+
+        clock.enter("start")
+        data, report = stage.plan(
+            robot, request, settings, cache_dir=asked.project.cache, threads=_cores(), progress=progress,
+            checkpoint=checkpoint,
+        )  # fmt: skip
+    return data, report.model_copy(update={"wall_s": clock.total(), "seconds": clock.seconds()})
+
+
+def _cores() -> int:
+    """Processors that this process may use, four at most: what is found does not depend on it."""
+    import os
+
+    known = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(4, known)
+
+
+def _loaded() -> Iterator[Any]:
+    """The stage, with its libraries: compiled modules do not take an exception out of the blue while they load."""
+    import r2s2r_cli.engine  # noqa: F401 - torch, roma, llvmlite
+    import r2s2r_cli.stages.plan.stage as stage
+
+    yield stage
+
+
+def _draw(data: ArtifactData, robot: Robot, report: PlanReport) -> Iterator[tuple[str, bytes]]:
+    from r2s2r_cli.views.plan import draw_plan
+    from r2s2r_cli.views.plan_page import plan_page
+
+    pictures = []
+    for name, title, png in draw_plan(data, robot):
+        yield f"-{name}.png", png
+        pictures.append((title, png))
+    yield ".html", plan_page(report, data, robot, pictures)
+
+
+def _show(report: PlanReport, console: Console) -> None:
+    from r2s2r_cli.views.plan_page import report_tables
+
+    for table in report_tables(report):
+        console.table(table.title, table.columns, table.rows)
+    for text in report.warnings:
+        console.warn(text)
+    if report.computed_by == "torch":
+        console.warn("computed in plain torch, some hundred times slower: `r2s2r doctor` says what is missing")

@@ -1,0 +1,104 @@
+"""What `plan` was asked for: the identification, behaviours and goals; as inputs, flags and a request."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.store.project import Iteration, Project
+from schemas.header import InputRef
+
+if TYPE_CHECKING:
+    from r2s2r_cli.stages.plan.belief import Belief
+    from r2s2r_cli.stages.plan.route import Goal
+    from r2s2r_cli.stages.plan.stage import Request
+    from schemas.config import PlanSettings
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The request of one command line, its texts as typed."""
+
+    project: Project
+    iteration: Iteration
+    behaviours: tuple[str, ...]
+    to: tuple[str, ...]
+    seed: int
+
+    def flags(self) -> dict[str, Any]:
+        """What else than settings and inputs decides the result, for the provenance."""
+        return {"behaviours": list(self.behaviours), "to": list(self.to), "seed": self.seed}
+
+    @cached_property
+    def identified(self) -> Path | None:
+        """The identification of the iteration; None where there is none."""
+        path = self.iteration.artifact("identification")
+        return path if path.exists() else None
+
+    def refs(self) -> list[InputRef]:
+        """The inputs. Raises ArtifactError where one cannot be read."""
+        from r2s2r_cli.store.header import whole_header
+        from r2s2r_cli.store.staleness import artifact_ref
+
+        if self.identified is None:
+            return []
+        return [artifact_ref(self.project, self.identified, whole_header(self.identified))]
+
+    def check(self, settings: PlanSettings) -> None:
+        """Find what is wrong with the request before any work. Raises UsageError, InputError, ArtifactError."""
+        self.request(settings)
+
+    def request(self, settings: PlanSettings) -> Request:
+        """The request. Raises UsageError for behaviours and goals that cannot be read, InputError for an
+        identification of another robot."""
+        from r2s2r_cli.stages.plan.rewards import BEHAVIOURS, reward_named
+        from r2s2r_cli.stages.plan.stage import Request
+
+        names = dict.fromkeys(self.behaviours or BEHAVIOURS)
+        rewards = {name: reward_named(name) for name in names}
+        goals = {_goal_name(k, len(self.to)): self._goal(text, settings) for k, text in enumerate(self.to)}
+        return Request(self.belief(), rewards, goals, self.seed)
+
+    def belief(self) -> Belief:
+        """The simulator's numbers. Raises InputError where they are those of another robot, or of robot.toml as it was
+        before it was changed."""
+        from r2s2r_cli.commands.stage import robot_part
+        from r2s2r_cli.stages.plan.belief import assumed, identified
+        from r2s2r_cli.store.read import read_artifact
+
+        robot = self.project.robot()
+        if self.identified is None:
+            return assumed(robot)
+        header, data = read_artifact(self.identified, "identification")
+        where = self.project.relative(self.identified)
+        belief = identified(robot, data, where)
+        made, now = header.provenance.robot, robot_part("identify", robot)
+        changed = [name for name in now if made.get(name) != now[name]] if header.provenance.stage == "identify" else []
+        if changed:
+            raise InputError(
+                "the parameters were identified with another version of robot.toml", where=where,
+                expected="robot.toml as it is now", received=f"another {', '.join(changed)}",
+                hint=f"r2s2r identify --iteration {self.iteration.number}",
+            )  # fmt: skip
+        return belief
+
+    def _goal(self, text: str, settings: PlanSettings) -> Goal:
+        from r2s2r_cli.stages.plan.route import Goal
+
+        try:
+            x, y, heading = (float(part) for part in text.split(","))
+            if not all(map(math.isfinite, (x, y, heading))):
+                raise ValueError
+        except ValueError as error:
+            raise UsageError("this is no place to go to", where="--to", expected="X,Y,HEADING: metres and degrees",
+                             received=text, hint="r2s2r plan --to 0.5,1,90") from error  # fmt: skip
+        return Goal((x, y), math.radians(heading), settings.goal_within_m, math.radians(settings.goal_within_deg))
+
+
+def _goal_name(number: int, of: int) -> str:
+    """Name of the policy that goes there."""
+    return "to" if of == 1 else f"to-{number + 1}"

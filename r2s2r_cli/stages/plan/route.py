@@ -1,0 +1,221 @@
+"""Sequences of primitives on paper: where they lead when each does what it did in the simulator.
+
+The robot on the ground is (x, y, yaw, element): the reference moved to (x, y), turned by yaw, and relabelled by a
+symmetry. A primitive, relabelled for the triangle that the robot stands on, moves it as it moved the reference.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from r2s2r_cli.errors import NumericalError
+from r2s2r_cli.stages.plan.placement import Reference, turned, wrapped
+from r2s2r_cli.stages.plan.robust import Primitive
+
+
+@dataclass(frozen=True)
+class Moves:
+    """Primitives as moves of the reference. shift: (P, 2) [m]; yaw: (P,) [rad]; element: (P,); duration: (P,) [s].
+    after: (element, element), the symmetry of a robot of the first after a move of the second; axis: direction of the
+    principal axis of each symmetry against yaw, (element,) [rad]."""
+
+    shift: np.ndarray
+    yaw: np.ndarray
+    element: np.ndarray
+    duration: np.ndarray
+    after: np.ndarray
+    axis: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.yaw)
+
+
+@dataclass(frozen=True)
+class Paths:
+    """Sequences of moves, one a row. picks: (B, n); xy: (B, n + 1, 2) [m]; heading: of the principal axis, whole turns
+    counted, (B, n + 1) [rad]; yaw, element: of the last pose, (B,)."""
+
+    picks: np.ndarray
+    xy: np.ndarray
+    heading: np.ndarray
+    yaw: np.ndarray
+    element: np.ndarray
+
+    def take(self, rows: np.ndarray) -> Paths:
+        """The same for some rows."""
+        return Paths(self.picks[rows], self.xy[rows], self.heading[rows], self.yaw[rows], self.element[rows])
+
+
+def moves_of(reference: Reference, primitives: Sequence[Primitive]) -> Moves:
+    """The mean moves of primitives."""
+    group, axis = reference.group, reference.axis_angles()
+    element = np.array([one.element for one in primitives], dtype=int)
+    move = np.array([one.move for one in primitives]).reshape(-1, 3)
+    after = np.array([[group.product(b, a) for b in range(len(group))] for a in range(len(group))])
+    return Moves(
+        move[:, :2], wrapped(move[:, 2] - axis[element] + axis[0]), element,
+        np.array([one.duration for one in primitives]), after, axis,
+    )  # fmt: skip
+
+
+def start_paths() -> Paths:
+    """The empty sequence, from the reference."""
+    return Paths(
+        np.zeros((1, 0), dtype=int), np.zeros((1, 1, 2)), np.zeros((1, 1)), np.zeros(1), np.zeros(1, dtype=int)
+    )
+
+
+def extended(moves: Moves, paths: Paths) -> Paths:
+    """Every path followed by every move, (B * P)."""
+    b, p = len(paths.yaw), len(moves)
+    row, pick = np.repeat(np.arange(b), p), np.tile(np.arange(p), b)
+    before = paths.take(row)
+    xy = before.xy[:, -1] + turned(moves.shift[pick], before.yaw)
+    element = moves.after[before.element, moves.element[pick]]
+    turn = wrapped(moves.yaw[pick] + moves.axis[element] - moves.axis[before.element])
+    return Paths(
+        np.concatenate([before.picks, pick[:, None]], axis=1), np.concatenate([before.xy, xy[:, None]], axis=1),
+        np.concatenate([before.heading, before.heading[:, -1:] + turn[:, None]], axis=1),
+        before.yaw + moves.yaw[pick], element,
+    )  # fmt: skip
+
+
+def best_sequences(
+    moves: Moves, length: int, value: Callable[[Paths], np.ndarray], *, beam: int = 400, count: int = 6
+) -> Paths:
+    """The `count` sequences of `length` moves with the highest value, by beam search on `value` of their beginnings."""
+    paths = start_paths()
+    for _ in range(length):
+        paths = extended(moves, paths)
+        paths = paths.take(np.argsort(-value(paths), kind="stable")[:beam])
+    return paths.take(np.arange(min(count, len(paths.yaw))))
+
+
+def straight(paths: Paths) -> np.ndarray:
+    """Way from start to end, less what the path strays from the line between them, and the turn of the robot."""
+    way = paths.xy[:, -1] - paths.xy[:, 0]
+    length = np.linalg.norm(way, axis=-1)
+    line = way / np.maximum(length, 1e-9)[:, None]
+    arm = paths.xy - paths.xy[:, :1]
+    stray = np.abs(arm[..., 0] * line[:, None, 1] - arm[..., 1] * line[:, None, 0])
+    return np.asarray(length - 2.0 * stray.max(axis=1) - 0.3 * np.abs(paths.heading[:, -1]))
+
+
+ARC = math.radians(12.0)
+"""Turn of the direction of travel at every gait of the arching policy: a circle in thirty gaits."""
+
+
+def arching(paths: Paths) -> np.ndarray:
+    """Length of the path, less what its direction departs from turning by ARC at every gait, always to one side."""
+    step = np.diff(paths.xy, axis=1)
+    length = np.linalg.norm(step, axis=-1)
+    value = length.sum(axis=1) - np.where(length < 0.08, 0.5, 0.0).sum(axis=1)
+    if step.shape[1] > 1:
+        bend = wrapped(np.diff(np.arctan2(step[..., 1], step[..., 0]), axis=1))
+        wrong = np.minimum(np.abs(bend - ARC).sum(axis=1), np.abs(bend + ARC).sum(axis=1))
+        value = value - 2.0 * wrong
+    return np.asarray(value)
+
+
+def in_place(sign: float) -> Callable[[Paths], np.ndarray]:
+    """Turn of the principal axis, + counter-clockwise, less the way that the robot comes from its place."""
+
+    def value(paths: Paths) -> np.ndarray:
+        away = np.linalg.norm(paths.xy - paths.xy[:, :1], axis=-1)
+        return np.asarray(sign * paths.heading[:, -1] - 2.0 * away.max(axis=1))
+
+    return value
+
+
+LONG: dict[str, Callable[[Paths], np.ndarray]] = {
+    "straight": straight,
+    "arching": arching,
+    "turn-clockwise": in_place(-1.0),
+    "turn-counterclockwise": in_place(1.0),
+}
+"""The four long gaits of the paper and what each is to be good at."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """Where to go, in the frame of the start: x along the principal axis, y forward [m], heading: turn of the principal
+    axis [rad]. within_m, within_rad: near enough."""
+
+    xy: tuple[float, float]
+    heading: float
+    within_m: float = 0.1
+    within_rad: float = math.radians(20.0)
+
+
+CELL_M, CELL_RAD = 0.04, math.radians(10.0)
+"""States nearer than this count as one in the search for a way."""
+GREED = 1.5
+"""The estimate of what is left counts so much more: less search, a way at most so much longer."""
+NODES = 20_000
+
+
+def way_to(moves: Moves, goal: Goal) -> Paths:
+    """The sequence of moves that takes least time to a goal, by A* (weighted by GREED) on their displacements.
+
+    Raises NumericalError where none comes near the goal within NODES poses, with the nearest.
+    """
+    speed = float((np.linalg.norm(moves.shift, axis=1) / moves.duration).max())
+    rate = float((np.abs(wrapped(moves.yaw + moves.axis[moves.element] - moves.axis[0])) / moves.duration).max())
+    target = np.array(goal.xy)
+
+    def left(paths: Paths) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        far = np.linalg.norm(paths.xy[:, -1] - target, axis=1)
+        turn = np.abs(wrapped(paths.heading[:, -1] - goal.heading))
+        time = np.maximum(np.maximum(far - goal.within_m, 0) / speed, np.maximum(turn - goal.within_rad, 0) / rate)
+        return far, turn, time
+
+    begun = start_paths()
+    count, best = 0, (math.inf, begun)
+    far, turn, time = left(begun)
+    queue: list[tuple[float, int, float, Paths]] = [(GREED * float(time[0]), 0, 0.0, begun)]
+    done: set[tuple[int, ...]] = set()
+    while queue and len(done) < NODES:
+        _, _, spent, paths = heapq.heappop(queue)
+        far, turn, _ = left(paths)
+        if far[0] <= goal.within_m and turn[0] <= goal.within_rad:
+            return paths
+        miss = float(far[0] / goal.within_m + turn[0] / goal.within_rad)
+        best = min(best, (miss, paths), key=lambda pair: pair[0])
+        key = _cell(paths)
+        if key in done:
+            continue
+        done.add(key)
+        after = extended(moves, paths)
+        _, _, time = left(after)
+        for k in range(len(after.yaw)):
+            one = after.take(np.array([k]))
+            if _cell(one) not in done:
+                count += 1
+                cost = spent + float(moves.duration[k])
+                heapq.heappush(queue, (cost + GREED * float(time[k]), count, cost, one))
+    near = best[1]
+    raise NumericalError(
+        "no sequence of the gaits leads there", where="--to", expected=f"({goal.xy[0]:g}, {goal.xy[1]:g}) m, "
+        f"{math.degrees(goal.heading):g} deg, within {goal.within_m:g} m and {math.degrees(goal.within_rad):.0f} deg",
+        received=f"nearest ({near.xy[0, -1, 0]:.2f}, {near.xy[0, -1, 1]:.2f}) m, "
+        f"{math.degrees(near.heading[0, -1]):.0f} deg", hint="r2s2r plan --set plan.goal_within_m=0.2",
+    )  # fmt: skip
+
+
+def _cell(paths: Paths) -> tuple[int, ...]:
+    x, y = paths.xy[0, -1]
+    turn = round(float(wrapped(paths.yaw[0])) / CELL_RAD)
+    return (round(float(x) / CELL_M), round(float(y) / CELL_M), turn, int(paths.element[0]))
+
+
+def without_rare(primitives: Sequence[Primitive], least: float = 0.97) -> list[Primitive]:
+    """Primitives fit for sequences: they come back to rest, on one and the same triangle, nearly always; each gait
+    once. Where none is, all."""
+    fit = [one for one in primitives if one.worked >= least and one.same_element >= least] or list(primitives)
+    once = {one.gait.key: one for one in reversed(fit)}
+    return [replace(one) for one in fit if once[one.gait.key] is one]

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from schemas.robot import Robot
 
 State = Literal["ok", "warning", "error"]
+_CALIBRATE = "r2s2r calibrate --points points.csv"
 NO_PORTS = "serial ports"
 """The probe that says that there are none."""
 LOW_RATE = 0.8
@@ -145,8 +146,8 @@ def _sensors(robot: Robot, health: LinkHealth) -> Iterator[Probe]:
             yield Probe(name=name, state=worst, found="0.20 pF: the sensor chip is not set up",
                         hint="switch the board off and on again")  # fmt: skip
         elif not sensor.slope_f_per_m or sensor.offset_f is None:
-            yield Probe(name=name, state="warning", found=f"{value * 1e12:.2f} pF, not calibrated",
-                        hint="r2s2r calibrate" if winched else "")  # fmt: skip
+            yield Probe(name=name, state=worst, found=f"{value * 1e12:.2f} pF, not calibrated",
+                        hint=_CALIBRATE if winched else "")  # fmt: skip
         else:
             length = (value - sensor.offset_f) / sensor.slope_f_per_m
             noise = health.noise[i] / abs(sensor.slope_f_per_m)
@@ -155,5 +156,5 @@ def _sensors(robot: Robot, health: LinkHealth) -> Iterator[Probe]:
                 name=name, state="ok" if inside else worst,
                 found=f"{value * 1e12:.2f} pF, {length * 1e3:.1f} mm, noise {noise * 1e3:.1f} mm"
                 + ("" if inside else ", outside the limits of robot.toml"),
-                hint="" if inside else "r2s2r calibrate",
+                hint="" if inside else _CALIBRATE,
             )  # fmt: skip

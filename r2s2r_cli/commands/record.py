@@ -127,7 +127,7 @@ def record(
         return
     if port is None:
         raise UsageError("no robot is named", where="--port", expected="a device, socket://HOST:PORT or udp://HOST:PORT",
-                         received="nothing", hint="r2s2r doctor")  # fmt: skip
+                         received="nothing", hint="r2s2r doctor ports")  # fmt: skip
     carry_out(wish, console)
 
 

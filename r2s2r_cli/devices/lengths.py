@@ -38,7 +38,7 @@ class Lengths:
                 raise InputError(
                     f"the sensor of cable {cable} is not calibrated", where=f"robot.toml, sensors of cable {cable}",
                     expected="slope_f_per_m and offset_f", received="neither" if sensor else "no such sensor",
-                    hint="r2s2r calibrate sensors.csv",
+                    hint="r2s2r calibrate --points points.csv   # of the rig: r2s2r rig --points points.csv before it",
                 )  # fmt: skip
         nan = float("nan")
         return cls(

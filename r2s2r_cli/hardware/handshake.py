@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from r2s2r_cli.devices.link import LinkError, LinkFacts, SafetyStop
 from r2s2r_cli.hardware.codec import PROTOCOLS
-from r2s2r_cli.hardware.codec.base import Ack, Corrupt, DeviceState, Event, Greeting, LockStep, Reading, Status
+from r2s2r_cli.hardware.codec.base import Ack, Beat, Corrupt, DeviceState, Event, Greeting, LockStep, Reading, Status
 from r2s2r_cli.hardware.codec.checked import VERSION
 from r2s2r_cli.hardware.lock_step import LockStepClock
 
@@ -39,6 +39,7 @@ class _Heard:
         self.period = 0.0
         self.status = ""
         self.corrupt = b""
+        self.odd = b""
         self.lines = 0
 
     def note(self, event: Event | None, line: bytes, hello: int | None) -> None:
@@ -56,6 +57,7 @@ class _Heard:
                 self.acked = event.code
             case Status():
                 self.status = event.text
+                self.odd = self.odd or line
             case Corrupt():
                 self.corrupt = self.corrupt or line
 
@@ -125,18 +127,21 @@ def _nobody(link: Link, heard: _Heard) -> LinkError:
             "not all boards of the robot are there", where=where, expected=f"boards 0 to {link.codec.boards - 1}",
             received=f"nothing from board {', '.join(silent)} in {limit}{told}", hint=f"r2s2r doctor ports {port}",
         )  # fmt: skip
-    if heard.corrupt:
-        other = next((name for name in PROTOCOLS if name != protocol and _fits(link, name, heard.corrupt)), None)
+    strange = heard.corrupt or heard.odd  # to a protocol with status texts, lines of another one are such texts
+    other = next((name for name in PROTOCOLS if strange and name != protocol and _fits(link, name, strange)), None)
+    if heard.corrupt or other:
         return LinkError(
             f"what comes is not the protocol {protocol}", where=where, expected=f"lines of {protocol}",
-            received=repr(heard.corrupt[:40].decode("ascii", "replace")) + (f", which is {other}" if other else ""),
+            received=repr(strange[:40].decode("ascii", "replace")) + (f", which is {other}" if other else ""),
             hint=f"r2s2r doctor ports {port} --protocol {other or protocol}",
         )  # fmt: skip
     received = f"{heard.lines} lines, none of them an answer" if heard.lines else f"nothing in {limit}"
     if heard.status:
         received += f"; the last: {heard.status!r}"
+    hint = "ip -brief address   # boards must send to an address of this machine" if port.startswith("udp:") else \
+           "r2s2r doctor ports"  # fmt: skip
     return LinkError("the robot does not answer", where=where, expected=f"a robot that speaks {protocol}",
-                     received=received, hint="r2s2r doctor ports")  # fmt: skip
+                     received=received, hint=hint)  # fmt: skip
 
 
 def _fits(link: Link, protocol: str, line: bytes) -> bool:
@@ -145,7 +150,7 @@ def _fits(link: Link, protocol: str, line: bytes) -> bool:
         other = PROTOCOLS[protocol](sensors=len(link.robot.sensors), motors=len(link.robot.motors))
     except Exception:  # it cannot carry this robot
         return False
-    return isinstance(other.decode(line), Reading | Greeting | LockStep | Ack)
+    return isinstance(other.decode(line), Reading | Greeting | LockStep | Ack | Beat)
 
 
 def facts(link: Link) -> LinkFacts:

@@ -72,12 +72,16 @@ def test_a_healthy_robot(project: Path) -> None:
 
 
 def test_a_robot_that_may_not_be_driven(project: Path) -> None:
-    """A sensor of a winched cable that is not set up is an error, one of a passive cable a warning; exit code 3."""
+    """A sensor of a winched cable that is not calibrated or not set up is an error, one of a passive cable a warning;
+    exit code 3."""
     faults = [{"kind": "sensor_stuck", "sensor": i, "at_s": 0.0} for i in (2, 7)]
     with running_rig(calibrated(), World.model_validate({"faults": faults}), protocol="legacy") as rig:
         probes = states(rig.address, "--seconds", "1", "--protocol", "legacy")
         again = invoke("doctor", "ports", rig.address, "--seconds", "0.2", "--protocol", "legacy")
-    assert again.exit_code == ExitCode.GATE and "0.20 pF" in again.stderr
+    assert again.exit_code == ExitCode.GATE and "not calibrated" in again.stderr
+    assert probes["sensor 1 (cable 1)"]["state"] == "error"
+    assert probes["sensor 1 (cable 1)"]["hint"] == "r2s2r calibrate --points points.csv"
+    assert "0.20 pF" in probes["sensor 2 (cable 2)"]["found"]
     assert probes["sensor 2 (cable 2)"]["state"] == "error" and probes["sensor 7 (cable 7)"]["state"] == "warning"
     assert probes["watchdog"]["found"] == "none" and "cannot guarantee a stop" in probes["remark"]["found"]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from binascii import crc_hqx
 
 import numpy as np
 import pytest
@@ -86,6 +87,20 @@ def test_another_protocol_is_recognised() -> None:
     with pytest.raises(LinkError, match="not the protocol checked") as caught:
         link_to(robot, timeout=0.05).__enter__()
     assert "which is legacy" in caught.value.received and "--protocol legacy" in caught.value.hint
+
+
+@pytest.mark.parametrize("line", [b"5,B,1000,1,0,0*", b"**S" + b" 0x28c" * 9], ids=["checked", "legacy"])
+def test_status_texts_may_be_another_protocol(line: bytes) -> None:
+    """To `boards` whatever it does not know is a status text: where another protocol knows it, the hint has that."""
+    robot = FakeRobot()
+    robot.deaf = True
+    if line.endswith(b"*"):
+        line += b"%04X" % crc_hqx(line[:-1], 0xFFFF)
+    robot.open = lambda: robot.out.extend([line] * 3)  # type: ignore[method-assign]
+    with pytest.raises(LinkError, match="not the protocol boards") as caught:
+        link_to(robot, timeout=0.05, protocol="boards").__enter__()
+    other = "checked" if b"," in line else "legacy"
+    assert f"which is {other}" in caught.value.received and f"--protocol {other}" in caught.value.hint
 
 
 def test_another_robot_of_the_same_size_is_remarked() -> None:

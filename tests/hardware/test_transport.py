@@ -104,6 +104,18 @@ def test_a_robot_that_does_not_read_is_an_error_and_not_a_wait(ends: Ends) -> No
             ends.port.send(b"x" * 4096)
 
 
+def test_a_host_that_nobody_knows_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its name stands in the error, not the resolver's number."""
+
+    def resolve(*_: object) -> None:
+        raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+
+    monkeypatch.setattr(socket, "create_connection", resolve)
+    with pytest.raises(LinkError, match="no such host") as caught:
+        transport("socket://nohost:5").open()
+    assert caught.value.received == "nohost" and "nohost" in caught.value.hint
+
+
 def test_what_cannot_be_opened_is_told_with_its_remedy(tmp_path: Path) -> None:
     """No such port, no port at all, nobody listening, a name that is none."""
     (tmp_path / "file").write_text("")

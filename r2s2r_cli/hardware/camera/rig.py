@@ -74,7 +74,7 @@ class RigCamera(Closing):
             raise CameraError(
                 "the rig's camera does not answer", where=self._where, expected="a greeting",
                 received=error.strerror or str(error) or "nothing",
-                hint="start the rig with a camera, and take the address that it prints: r2s2r rig --world world.toml",
+                hint="start the rig with a camera, and take the address that it prints: r2s2r rig --camera-port 0",
             ) from error  # fmt: skip
         try:
             self._greeting = parse_greeting(line, self._where)
@@ -174,5 +174,5 @@ class RigCamera(Closing):
         self.close()
         return CameraError(
             "the camera is gone", where=self._where, expected="frames", received=what,
-            hint="look at the rig's own messages, then start it again: r2s2r rig --world world.toml",
+            hint="look at the rig's own messages, then start it again: r2s2r rig --camera-port 0",
         )  # fmt: skip

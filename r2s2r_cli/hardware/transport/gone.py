@@ -52,6 +52,12 @@ def not_taken(port: str, seconds: float) -> LinkError:
     )  # fmt: skip
 
 
+def no_such_host(port: str, host: str) -> LinkError:
+    """The name of an address means nothing."""
+    return LinkError("there is no such host", where=f"{port}, opening", expected="the address of the robot",
+                     received=host, hint=f"getent hosts {host}   # or give its number")  # fmt: skip
+
+
 def hung_up(port: str) -> LinkError:
     """The other side closed the connection."""
     return LinkError("the robot closed the connection", where=f"{port}, reading", expected="an open connection",

@@ -8,7 +8,7 @@ import socket
 import time
 
 from r2s2r_cli.hardware.transport.base import WRITE_TIMEOUT, Address
-from r2s2r_cli.hardware.transport.gone import hung_up, not_taken, port_errors
+from r2s2r_cli.hardware.transport.gone import hung_up, no_such_host, not_taken, port_errors
 from r2s2r_cli.hardware.transport.line_stream import LineStream
 from r2s2r_cli.hardware.transport.name import PortName
 
@@ -29,7 +29,10 @@ class TcpStream(LineStream):
         self.close()
         self.renew()
         with port_errors(self.name, "opening"):
-            self._socket = socket.create_connection(self._address, CONNECT_TIMEOUT)
+            try:
+                self._socket = socket.create_connection(self._address, CONNECT_TIMEOUT)
+            except socket.gaierror as error:
+                raise no_such_host(self.name, self._address[0]) from error
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self._socket.setblocking(False)
 

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 LOOK = 0.02
 """[s] after which the clock is looked at where nothing comes."""
+STOOD_STILL = 0.05
+"""[s] between two looks at the clock, with which a message says that this machine was busy with something else."""
 HELD_UP = 1.0
 """[s] after which a host that never gets to the end of what waits is judged by what it has read."""
 BACKLOG = 100_000
@@ -61,6 +63,7 @@ class GuardedLink:
         self._next: Sample | None = None
         self._judged = -math.inf
         self._held = ""
+        self._looked, self._paused = math.inf, (-math.inf, 0.0)
 
     @property
     def facts(self) -> LinkFacts:
@@ -107,6 +110,7 @@ class GuardedLink:
         self._wall = time.monotonic()
         self._watch.restart(self._start)
         self._next, self._judged, self._held = None, self._start, ""
+        self._looked = self._start
 
     def reconnect(self, timeout: float = 10.0) -> None:
         """Of the link; what was watched is forgotten, the time limit goes on."""
@@ -114,6 +118,7 @@ class GuardedLink:
         self._heard, self._wall = self.now(), time.monotonic()
         self._watch.restart(self._heard)
         self._next, self._judged, self._held = None, self._heard, ""
+        self._looked = self._heard
 
     def read(self, timeout: float) -> Sample | None:
         """As of the link, but looks at the clock in between while nothing comes.
@@ -167,6 +172,9 @@ class GuardedLink:
         the boards' messages in its buffer, one after the other.
         """
         now = self.now()
+        if now - self._looked > STOOD_STILL:
+            self._paused = (now, now - self._looked)
+        self._looked = now
         if now - self._start > self.time_limit:
             return f"time limit: the run has taken {self.time_limit:g} s"
         self._next = self._next or self.inner.read(0.0)
@@ -175,10 +183,18 @@ class GuardedLink:
         self._judged = now
         silent = now - self._heard
         if silent > STALE:
-            return f"stale sensors: nothing came for {silent * 1e3:.0f} ms"
+            return f"stale sensors: nothing came for {silent * 1e3:.0f} ms{self._excuse(now)}"
         if time.monotonic() - self._wall > SILENT:
             return f"stale sensors: nothing came for {SILENT:g} s"
-        return self._watch.stale(now)
+        reason = self._watch.stale(now)
+        if not reason.startswith("stale"):
+            return reason
+        return f"{reason}, the last message of any board {silent * 1e3:.0f} ms ago{self._excuse(now)}"
+
+    def _excuse(self, now: float) -> str:
+        """What this machine has to do with it: whether it did not look for a while."""
+        end, pause = self._paused
+        return f"; this machine itself stood still for {pause * 1e3:.0f} ms of it" if now - end < STALE else ""
 
     def _hold(self, sample: Sample) -> Sample:
         """The sample, with what is in doubt; where something newly is, after the motors were told to stop."""

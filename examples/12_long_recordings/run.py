@@ -22,7 +22,7 @@ import h5py
 import numpy as np
 
 COMMAND = [sys.executable, "-m", "r2s2r_cli"]
-TARGET_S = 2.2
+TARGET_S = 3.0
 """What a random target takes on the 3-bar robot, about."""
 LOOK_S = 0.5
 BEGIN = 0.1

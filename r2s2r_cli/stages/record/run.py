@@ -66,9 +66,9 @@ class RunLoop:
         self.hindered: dict[int, list[str]] = {}
         """By target that was given up: which cables were not there, and what they lacked."""
         self._lengths, self._pid, self._robot = Lengths.of(robot), WirePid.of(robot), robot
-        self._winched = list(robot.actuated)
+        self.winched = list(robot.actuated)
         self._interval = OpenInterval()
-        self._encoder = np.full(len(self._winched), np.nan)
+        self._encoder = np.full(len(self.winched), np.nan)
         self._voltage = float("nan")
         self._t0 = link.now()
         self.t = 0.0
@@ -107,7 +107,7 @@ class RunLoop:
         t = sample.t_host - self._t0
         if t < 0:  # had been on its way when the run began
             if sample.due:
-                self.link.command(np.zeros(len(self._winched)))
+                self.link.command(np.zeros(len(self.winched)))
             return
         self.t = t
         self.tally.sample(t, sample)
@@ -123,14 +123,14 @@ class RunLoop:
 
     def _control(self, t: float, sample: Sample, pictures: Pictures | None) -> None:
         if not sample.complete:  # a sensor has never been heard: nothing to act on yet
-            self.link.command(np.zeros(len(self._winched)))
+            self.link.command(np.zeros(len(self.winched)))
             return
         target = self._sequence.target[self.steps.index]
         lengths = self._lengths(sample.capacitance)
-        length = lengths[self._winched]
+        length = lengths[self.winched]
         doubt = sample.doubt or ("" if pictures is None else pictures.doubt)
         # Held: what is recorded is what the motors were told, and the controller has not seen this tick.
-        control = np.zeros(len(self._winched)) if doubt else self._pid.tick(length, target)
+        control = np.zeros(len(self.winched)) if doubt else self._pid.tick(length, target)
         self.link.command(control)
         done = self._pid.done.copy()
         self.tally.tick(t, lengths[self._lengths.cable], doubt)
@@ -138,6 +138,7 @@ class RunLoop:
             self._put(stream, row)
         self._put("commands", {"t": t, "target": target, "control": control, "done": done})
         self._encoder = np.where(np.isfinite(sample.encoder), sample.encoder, self._encoder)
+        self.tally.turned(control, self._encoder)
         self._voltage = self._voltage if sample.voltage is None else sample.voltage
         self._put("motors", {"t": t, "position": self._pid.position(length), "speed": control,
                              "encoder": self._encoder, "voltage": self._voltage})  # fmt: skip
@@ -145,7 +146,7 @@ class RunLoop:
         changed, gave_up = self.steps.advance(done)
         if gave_up:
             self.timed_out.append(number)
-            self.hindered[number] = _hindered(self._winched, self._pid.position(length) - target, done)
+            self.hindered[number] = _hindered(self.winched, self._pid.position(length) - target, done)
         if changed:
             self._pid.restart()
 
@@ -169,7 +170,7 @@ class RunLoop:
         self._writer.put(f"runs/{self.plan.name}/{stream}", row)
 
     def _now(self, t: float, sample: Sample, pictures: Pictures | None) -> Now:
-        length = self._lengths(sample.capacitance)[self._winched]
+        length = self._lengths(sample.capacitance)[self.winched]
         at = min(self.steps.index, self.targets - 1)
         return Now(
             run=self.plan.name, t=t, target=at + 1, targets=self.targets, length=length,

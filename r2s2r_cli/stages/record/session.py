@@ -23,6 +23,8 @@ CONTROL_SHARE, CAMERA_SHARE = 0.95, 0.98
 """Of control ticks on time and of frames that were kept: below it the report warns."""
 _NAMED = 6
 """Targets that were given up which a warning names."""
+_UNTURNED_S = 1.0
+"""A motor that is driven for longer without turning is dead, or held by its load."""
 _REPEATED = 3
 """Frames that repeat the one before which are no reason to warn."""
 _SILENT = 0.02
@@ -145,6 +147,9 @@ def _warnings(run: RecordRun, loop: RunLoop, *, stops_by_itself: bool) -> list[s
             + (f"; and {more} more" if more > 0 else "")
             + ". A cable that stays too short is held by the others (it is slack), one that stays too long by its load"
         )
+    for cable, seconds in zip(loop.winched, loop.tally.unturned, strict=False):
+        if seconds > _UNTURNED_S:
+            found.append(f"the motor of cable {cable} was driven for {seconds:.1f} s and its encoder did not turn")
     if run.late > (1 - CONTROL_SHARE) * max(run.ticks, 1):
         found.append(f"{run.late} of {run.ticks} control ticks came more than half a period late")
     found += [f"the motors were held for {count} control ticks: {why}" for why, count in loop.tally.doubts.items()]

@@ -19,7 +19,8 @@ LATE = 1.5
 class Tally:
     """Counts of one run, updated sample by sample; memory does not grow with the run.
 
-    period: of the control ticks [s]. before: the link's statistics when the run began.
+    period: of the control ticks [s]. before: the link's statistics when the run began. unturned: for how long at most
+    each motor was driven without any change of its encoder [s], (actuated,); empty without encoders.
     """
 
     period: float
@@ -33,11 +34,14 @@ class Tally:
     gap_max: float = 0.0
     jumps: int = 0
     silent: np.ndarray = field(init=False)
+    unturned: np.ndarray = field(default_factory=lambda: np.zeros(0))
     voltage_first: float | None = None
     voltage_last: float | None = None
     _t_sample: float | None = None
     _t_tick: float | None = None
     _first_tick: float | None = None
+    _encoder: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    _driven: np.ndarray = field(default_factory=lambda: np.zeros(0))
     _clocks: dict[int, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -73,6 +77,15 @@ class Tally:
             self.late += t - self._t_tick > LATE * self.period
         self._t_tick = t
         self.silent += ~np.isfinite(length)
+
+    def turned(self, control: np.ndarray, encoder: np.ndarray) -> None:
+        """After a tick's command: speeds and the latest encoder counts, both (actuated,); NaN: no encoder."""
+        if not len(self._driven):
+            self._encoder, self._driven, self.unturned = encoder, np.zeros(len(control)), np.zeros(len(control))
+        still = np.isfinite(encoder) & (encoder == self._encoder)
+        self._driven = np.where(still, self._driven + self.period * (control != 0), 0.0)
+        self.unturned = np.maximum(self.unturned, self._driven)
+        self._encoder = encoder
 
     @property
     def rate(self) -> float | None:

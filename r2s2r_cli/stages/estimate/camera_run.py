@@ -125,22 +125,19 @@ def _state(
 
 
 def whitened(sighted: Sighted, tracked: TrackedRun) -> np.ndarray:
-    """Sightings that were used minus smoothed caps, over the square root of the covariance of that difference.
+    """Sightings that were used minus smoothed caps, in standard deviations, along each sighting's principal axes.
 
-    Shape (frame, cap, 3); NaN where no sighting was used. The smoothed state has the sighting in it, so that the
-    covariance of the difference is that of the sighting minus that of the state; their mean square is 1 where both are
-    right.
+    Shape (frame, cap, 3), the best known axis first; NaN where no sighting was used. The smoothed state has the
+    sighting in it, so that the variance of the difference is that of the sighting (scaled as the run shows it) minus
+    that of the state; the state's part that neighbouring frames share is no part of it, so at most half is taken off.
     """
     used = np.isfinite(sighted.p_WE[..., 0]) & (tracked.quality == SEEN)
-    scale = float(np.mean(tracked.noise_scale)) ** 2
     found = np.full(sighted.p_WE.shape, np.nan)
-    cov = scale * sighted.cov[used]
-    gap = cov - tracked.cov_p[used]
-    # Other sightings may be so good that rounding, or the systematic part of cov_p, leaves nothing of the difference.
-    value, vector = np.linalg.eigh(gap)
-    floor = 0.05 * np.linalg.eigvalsh(cov)[:, :1]
-    root = np.sqrt(np.maximum(value, floor))
-    found[used] = np.einsum("kij,ki->kj", vector, (sighted.p_WE - tracked.p_WE)[used]) / root
+    value, vector = np.linalg.eigh(sighted.cov[used])
+    seen = value * np.square(tracked.noise_scale)[[0, 0, 1]]
+    state = np.einsum("kji,kjl,kli->ki", vector, tracked.cov_p[used], vector)
+    off = np.einsum("kji,kj->ki", vector, (sighted.p_WE - tracked.p_WE)[used])
+    found[used] = off / np.sqrt(np.maximum(seen - state, 0.5 * seen))
     return found
 
 

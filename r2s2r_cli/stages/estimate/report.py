@@ -24,7 +24,7 @@ def run_report(state: RunState) -> EstimateRun:
     return EstimateRun(
         run=state.run,
         frames=len(state.t),
-        rows=len(state.streams["caps" if state.camera is None else "camera"]["t"]),
+        rows=_rows(state),
         duration_s=float(state.t[-1] - state.t[0]),
         intervals=len(state.intervals) if state.intervals else 0,
         segments=len(state.segments) if state.segments else 0,
@@ -37,6 +37,11 @@ def run_report(state: RunState) -> EstimateRun:
         camera=None if state.camera is None else camera_figures(state, state.camera),
         warnings=(*_warnings(state, caps), *(() if state.camera is None else camera_warnings(state, state.camera))),
     )
+
+
+def _rows(state: RunState) -> int:
+    source = "caps" if state.camera is None else "camera"
+    return len(state.streams[source]["t"]) if source in state.streams else len(state.t)
 
 
 def _caps(state: RunState) -> tuple[CapFigures, ...]:

@@ -93,7 +93,7 @@ def _replaces(new: Option, old: Option, error: R2S2RError) -> bool:
         return False
     if name in SINGLE or name in FLAGS:
         return True
-    return _about(new[1]) == _about(value) or error.received in (value, _about(value))
+    return _about(new[1]) == _about(value) or value == error.received or _about(value) in error.received.split(", ")
 
 
 def _as_typed(new: Option, replaced: Sequence[Option]) -> Option:

@@ -20,6 +20,8 @@ def verdict(report: IdentifyReport) -> str:
     others = [report.parameters[name].trust for name in free if name not in sure]
     rest = ", ".join(f"{others.count(trust)} {trust}" for trust in dict.fromkeys(others))
     told = f"The runs determine {len(sure)} of {counted(len(free), 'free parameter')}{f' ({rest})' if rest else ''}."
+    if report.method == "paper":
+        told = f"The method gives no uncertainty: what {counted(len(free), 'number')} may be worth is not known."
     held = report.heldout
     if held is None:
         return f"{told} Nothing was held out: how well it predicts is not known."

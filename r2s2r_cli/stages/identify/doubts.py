@@ -13,6 +13,8 @@ from r2s2r_cli.stages.measures.table import Row
 
 RATE = "motor_speed"
 """Names of winding rates begin like this; their unit is the no-load speed."""
+BEYOND = 0.05
+"""Of the width of an interval: ends of ranges are quantiles of draws."""
 ON_BOUND = 1e-6
 """Relative distance from a bound that is none."""
 
@@ -51,6 +53,21 @@ def contradicted(parameters: Sequence[ParameterFound], profiles: Sequence[Profil
                 f"likelihood, {ends}: the loss is rough there. The interval reported holds both"
             )
     return tuple(found)
+
+
+def ranging(parameters: Sequence[ParameterFound]) -> tuple[str, ...]:
+    """One sentence for all numbers of which other starts or noise drawn anew lead further than their interval."""
+    names = []
+    for one in parameters:
+        low, high = one.range  # false beside NaN: nobody looked
+        slack = BEYOND * (one.upper - one.lower)
+        if one.identifiable and (low < one.lower - slack or high > one.upper + slack):
+            names.append(f"{one.free.name} ({low:.4g}..{high:.4g})")
+    if not names:
+        return ()
+    return (
+        f"other starts or noise drawn anew lead further than the 95 % interval: {', '.join(names)}; doubt these sd",
+    )
 
 
 def doubtful(parameters: Sequence[ParameterFound]) -> tuple[str, ...]:

@@ -120,7 +120,14 @@ def _control(commands: Group, run: str) -> np.ndarray:
             expected="control, +1 reels in", received="nothing logged",
             hint="r2s2r import run.csv   # with columns control0, control1, ...",
         )  # fmt: skip
-    return np.nan_to_num(commands["control"])
+    control: np.ndarray = np.nan_to_num(commands["control"])
+    if not control.any():
+        raise InputError(
+            f"no motor is commanded in run {run}, and the targets change", where=f"runs/{run}/commands/control",
+            expected="control, +1 reels in, where the robot moves", received="0 everywhere",
+            hint="r2s2r import run.csv   # with the commands in control0, control1, ...",
+        )  # fmt: skip
+    return control
 
 
 def _require_finite(data: RunData, run: str) -> None:

@@ -76,10 +76,11 @@ def find_online(task: Task) -> Found:
                 updates=[_row(one) for one in updates], known=asdict(known), rollouts=rollouts - first.rollouts
             )
     predictor.rollouts += rollouts
+    remarks = (*_remarks(learned_twice(before, task.runs, order)), *_dropped(known_of(before), task, wide))
     last = Fitted(
         made, (start_found([free.start for free in frees], made),), made.solution.z[None, : len(frees)],
         tuple(kept.steps), f"{loss_words(task)}; run after run, the cost is of the last", None, task.settings.profiles,
-        tuple(updates), _remarks(learned_twice(before, task.runs, order)),
+        tuple(updates), remarks,
     )  # fmt: skip
     return concluded(task, predictor, last)
 
@@ -92,6 +93,16 @@ def _remarks(twice: tuple[str, ...]) -> tuple[str, ...]:
         f"the earlier identification has learned from {names} already: what these runs say counts twice, and intervals"
     )
     return (f"{text} are too narrow; --online is for runs that are new",)
+
+
+def _dropped(known: Known, task: Task, frees: Sequence[Free]) -> tuple[str, ...]:
+    """What the earlier identification knew and this fit neither frees nor was given: it is at robot.toml's value."""
+    names = [name for name in known.value if name not in {free.name for free in frees} and name not in task.given]
+    if not names:
+        return ()
+    kept = " ".join(f"--fix {name}={known.value[name]:.4g}" for name in names)
+    text = f"the earlier identification knew {', '.join(names)}: not free here, so robot.toml's values hold"
+    return (f"{text}; without --free the same numbers are free as there, and {kept} keeps what was learned",)
 
 
 def first_free(task: Task) -> tuple[Free, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from r2s2r_cli.stages.identify.doubts import contradicted, doubtful, outdone
+from r2s2r_cli.stages.identify.doubts import contradicted, doubtful, outdone, ranging
 from r2s2r_cli.stages.identify.found import OURS, Found, ParameterFound, SegmentFound
 from r2s2r_cli.stages.measures.bootstrap import Interval
 from r2s2r_cli.stages.measures.table import Row
@@ -67,7 +67,7 @@ def report_of(found: Found) -> IdentifyReport:
         computed_by="torch" if found.computed_by_torch else "machine code",
         warnings=(
             *found.warnings, *outdone(found.test or {}, found.closed_loop_m), *doubtful(found.parameters),
-            *contradicted(found.parameters, found.profiles),
+            *ranging(found.parameters), *contradicted(found.parameters, found.profiles),
         ),
     )  # fmt: skip
 

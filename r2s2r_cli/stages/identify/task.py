@@ -74,8 +74,9 @@ class Task:
         known, nan = catalogue(self.robot), float("nan")
         return tuple(
             ParameterFound(
-                replace(known[name], start=value), value, nan, nan, nan, (nan, nan), None,
-                "fixed by hand" if name in self.request.fixed else "goes with the default set",
+                known[name], value, nan, nan, nan, (nan, nan), None,
+                "fixed by hand" if name in self.request.fixed
+                else f"goes with the default set; robot.toml has {known[name].start:g}",
             )
             for name, value in self.given.items()
         )  # fmt: skip
@@ -88,11 +89,11 @@ def require_combination(request: Request) -> None:
         raise UsageError(
             "CMA-ES replays recorded commands only", where="--method cma --drive closed-loop",
             expected="--drive replay, or another method", received="--drive closed-loop",
-            hint="r2s2r identify --drive closed-loop   # finite differences instead",
+            hint="r2s2r identify --drive closed-loop   # it samples with CMA-ES there already",
         )  # fmt: skip
     if request.online and (request.method != "default" or request.drive != "command replay"):
         raise UsageError(
-            "--online is there for the default fit on recorded commands only", where="--online",
+            "--online is there for the default fit on recorded commands only", where="--online, --method, --drive",
             expected="--method default --drive replay",
             received=f"--method {request.method}, {request.drive}",
             hint="r2s2r identify --online",
@@ -109,7 +110,8 @@ def require_replay(request: Request) -> None:
     """Raises UsageError for a self-test of anything but the default fit: it would test something else."""
     if request.method != "default" or request.drive != "command replay" or request.online:
         raise UsageError(
-            "the self-test plants for the default fit on recorded commands only", where="--self-test",
+            "the self-test plants for the default fit on recorded commands only",
+            where="--self-test, --method, --drive, --online",
             expected="--method default --drive replay, without --online",
             received=f"--method {request.method}, {request.drive}" + ", --online" * request.online,
             hint="r2s2r identify --self-test",

@@ -10,7 +10,7 @@ import pytest
 
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.identify.default_method import loss_words
-from r2s2r_cli.stages.identify.doubts import contradicted, doubtful, outdone, wider
+from r2s2r_cli.stages.identify.doubts import contradicted, doubtful, outdone, ranging, wider
 from r2s2r_cli.stages.identify.found import OURS, ParameterFound, ProfileFound
 from r2s2r_cli.stages.identify.free import catalogue
 from r2s2r_cli.stages.identify.free.base import Coordinate, Free
@@ -102,6 +102,14 @@ def test_a_value_outside_its_own_profile_is_told() -> None:
     assert "0.7..:" in said(0.7, math.nan)[0]
 
 
+def test_a_range_beyond_its_interval_is_told() -> None:
+    """By name, where it ends further out by a twentieth of the interval; not where nobody looked."""
+    inside, outside = one("friction", 0.6, 0.5), one("mass.1", 0.4, 0.3)
+    said = ranging((replace(inside, range=(0.495, 0.7)), replace(outside, range=(0.35, 0.52)), one("mass.2", 0.4, 0.3)))
+    assert len(said) == 1
+    assert "mass.1 (0.35..0.52)" in said[0] and "friction" not in said[0]
+
+
 @pytest.mark.parametrize(
     ("free", "below", "expected"),
     [
@@ -120,7 +128,7 @@ def test_bounds_go_further_where_the_number_does(free: Free, below: bool, expect
 
 def test_they_reach_the_report() -> None:
     """Behind what the fit itself remarked."""
-    fast = replace(found().parameters[0], value=1.2, lower=1.1)
+    fast = replace(found().parameters[0], value=1.2, lower=1.1, range=(1.15, 1.25), upper=1.3)
     warnings = report_of(found(parameters=(fast,), covariance=None, information=None, profiles=())).warnings
     assert warnings[0] == "a remark" and "motor_speed 1.2" in warnings[1] and len(warnings) == 2
 

@@ -55,7 +55,8 @@ def require_effects(effects: Sequence[str]) -> None:
 
 def unknown(name: str, known: Sequence[str], option: str = "--free") -> UsageError:
     """The error for a name that the catalogue lacks, with the names nearest to it."""
-    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5) or list(dict.fromkeys(known))[:3]
+    known = tuple(dict.fromkeys(known))
+    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5) or list(known)[:3]
     value = "=0.5" if option == "--fix" else ""
     return UsageError(
         f"unknown parameter {name!r}", where=option,

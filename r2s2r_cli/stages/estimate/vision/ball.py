@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from r2s2r_cli.stages.estimate.vision.blend import INNER, shares
 from r2s2r_cli.stages.estimate.vision.noise import DepthNoise
 from r2s2r_cli.stages.estimate.vision.patch import Patch, grown
 from r2s2r_cli.stages.estimate.vision.solids import ball_depth
@@ -167,13 +168,14 @@ class BallFitter:
         """
         start = c = self._along(patch, seen, center, radius)
         delta = self.swell_px
-        told, depths = valid, _Depths.none()
+        told, depths, share = valid, _Depths.none(), patch.colored
         for k in range(_STEPS):
             disc = _Disc.of(c, radius, patch.x, patch.y)
             if k == 1:
-                told = valid & ~self._contradicting(patch, valid, disc)
+                share = self._share(patch, valid, disc)
+                told = valid & ~self._contradicting(share, valid, disc)
                 depths = self._depths(patch, seen, c, radius, disc)
-            rim, pull = self._rim(patch, told, disc, delta, RIM_PX if k else WIDE_PX)
+            rim, pull = self._rim(share, told, disc, delta, RIM_PX if k else WIDE_PX)
             line, draw = self._lines(depths, c, radius, disc)
             A, g = rim.copy(), pull.copy()
             A[:3, :3] += line
@@ -203,7 +205,7 @@ class BallFitter:
         )  # fmt: skip
 
     def _rim(
-        self, patch: Patch, told: np.ndarray, disc: _Disc, delta: float, width: float
+        self, share: np.ndarray, told: np.ndarray, disc: _Disc, delta: float, width: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Normal matrix (4, 4) and right-hand side (4,) of the rim: metres across, across, along, px swelling."""
         rise = (disc.rim + delta / self.f - disc.rho) * self.f / width
@@ -215,16 +217,23 @@ class BallFitter:
         per_m = self.f / (width * disc.D)
         J[:, 0], J[:, 1] = disc.a[on] / rho * per_m, disc.b[on] / rho * per_m
         J[:, 2], J[:, 3] = -disc.rim * per_m, 1.0 / width
-        r = patch.colored[on] - 0.5 - rise
+        r = share[on] - 0.5 - rise
         # A wider rim has more pixels on it, each telling less: the same number of edges all the same.
         weight = RIM_PX / (width * PIXEL_SD**2) * (width / RIM_PX) ** 2
         return weight * (J.T @ J), weight * (J.T @ r)
 
-    def _contradicting(self, patch: Patch, valid: np.ndarray, disc: _Disc) -> np.ndarray:
+    def _share(self, patch: Patch, valid: np.ndarray, disc: _Disc) -> np.ndarray:
+        """How much of each pixel is the ball; by the mask alone where little of the ball is seen."""
+        inside = valid & patch.colored & (disc.rho < INNER * disc.rim)
+        found = shares(patch.color, inside, disc.a / disc.rim, disc.b / disc.rim, disc.rim * self.f)
+        return patch.colored if found is None else found
+
+    def _contradicting(self, share: np.ndarray, valid: np.ndarray, disc: _Disc) -> np.ndarray:
         """Pixels about colour well outside of the disc, and about none well inside: another thing is in the way."""
         px = 1.0 / self.f
-        outside = patch.colored & (disc.rho > disc.rim + 2.0 * px) & (disc.rho < disc.rim + 5.0 * px)
-        inside = ~patch.colored & valid & (disc.rho < disc.rim - 2.0 * px)
+        colored = share > 0.5
+        outside = colored & (disc.rho > disc.rim + 2.0 * px) & (disc.rho < disc.rim + 5.0 * px)
+        inside = ~colored & valid & (disc.rho < disc.rim - 2.0 * px)
         # A single pixel is noise.
         wrong = _in_company(outside) | _in_company(inside)
         return grown(wrong, 2) if wrong.any() else wrong

@@ -17,7 +17,7 @@ class Patch:
 
     x, y: slopes of the rays of colour. colored: of the cap's colour. known: depth is known; z: depth [m], 0 where
     not. zx, zy: slopes of the rays of depth, which may lie beside colour.
-    u0, v0: its first column and row.
+    color: RGB (v, u, 3). u0, v0: its first column and row.
     """
 
     x: np.ndarray
@@ -27,6 +27,7 @@ class Patch:
     z: np.ndarray
     zx: np.ndarray
     zy: np.ndarray
+    color: np.ndarray
     u0: int
     v0: int
 
@@ -35,7 +36,7 @@ class Patch:
         area = (rows, columns)
         if min(self.x[area].shape) < 3:
             return None
-        arrays = (self.x, self.y, self.colored, self.known, self.z, self.zx, self.zy)
+        arrays = (self.x, self.y, self.colored, self.known, self.z, self.zx, self.zy, self.color)
         return Patch(*(array[area] for array in arrays), self.u0 + columns.start, self.v0 + rows.start)
 
 

@@ -158,10 +158,11 @@ class Sighter:
             return None
         area = (slice(v0, v1), slice(u0, u1))
         z = pictures.z[area]
-        colored = mask(hsv_of(np.ascontiguousarray(pictures.color[area])), self.ranges[rod])
+        color = np.ascontiguousarray(pictures.color[area])
+        colored = mask(hsv_of(color), self.ranges[rod])
         return Patch(
             self.lens.x[area], self.lens.y[area], colored, z > 0, z, self._depth_lens.x[area],
-            self._depth_lens.y[area], u0, v0,
+            self._depth_lens.y[area], color, u0, v0,
         )  # fmt: skip
 
     def _patch_about(self, patch: Patch, center: np.ndarray, reach_px: float) -> Patch | None:

@@ -21,6 +21,7 @@ from r2s2r_cli.commands.import_ import import_
 from r2s2r_cli.commands.init import init
 from r2s2r_cli.commands.inspect import inspect
 from r2s2r_cli.commands.migrate import migrate
+from r2s2r_cli.commands.plan import plan
 from r2s2r_cli.commands.record import record
 from r2s2r_cli.commands.recover import recover
 from r2s2r_cli.commands.rig import rig
@@ -35,6 +36,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "import": import_,
     "estimate": estimate,
     "identify": identify,
+    "plan": plan,
     "compare": compare,
     "floor": floor,
     "simulate": simulate,

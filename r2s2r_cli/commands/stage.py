@@ -44,6 +44,8 @@ ROBOT_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
               "rest_caps_m": ()},
     "simulate": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),
                  "sensors": ("cable", "stiffness_n_per_m", "rest_length_m"), "rest_caps_m": ()},
+    "plan": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),
+             "sensors": ("cable", "stiffness_n_per_m", "rest_length_m"), "rest_caps_m": ()},
     "identify": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),
                  "sensors": ("cable", "stiffness_n_per_m", "rest_length_m"), "rest_caps_m": ()},
 }  # fmt: skip

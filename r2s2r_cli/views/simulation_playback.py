@@ -26,13 +26,14 @@ _SCRIPTS = ("playback_scene.js", "playback.js")
 
 
 def playback_page(page: Page, data: ArtifactData, robot: Robot) -> bytes:
-    """The page as UTF-8 HTML: a player of all runs of a simulation, and what `page` says except its pictures."""
+    """The page as UTF-8 HTML: a player of all runs of a simulation or plan, and what `page` says."""
     from jinja2 import Environment, StrictUndefined
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     packed = json.dumps(playback_data(data, robot), separators=(",", ":"), ensure_ascii=True)
     text = environment.from_string(_file("playback.html")).render(
         page=page,
+        encoded=lambda png: base64.b64encode(png).decode(),
         data=packed.replace("<", "\\u003c"),  # a name must not end the script element
         scripts="\n".join(_file(name) for name in _SCRIPTS),
     )

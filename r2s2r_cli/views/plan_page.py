@@ -1,0 +1,80 @@
+"""The report of `plan` as tables for the terminal, and its page with the player and the pictures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.views.page import Page, PageTable, Picture, counted
+from r2s2r_cli.views.plan import told
+from r2s2r_cli.views.simulation_playback import playback_page
+from schemas.results_plan import GaitFigures, PlanReport, PolicyFigures
+from schemas.robot import Robot
+
+
+def report_tables(report: PlanReport) -> Iterator[PageTable]:
+    """The gaits of every behaviour by score, the long policies, and what the search took."""
+    pairs = report.draws * report.starts
+    yield PageTable(
+        f"gaits: reward over {report.draws} draws of the numbers x {report.starts} start poses",
+        ["name", "shapes", "best numbers", "mean", "sd", "score", "came back", "x, y [mm]", "turned [deg]", "time [s]"],
+        [_gait(one, pairs) for one in report.gaits],
+    )
+    if report.policies:
+        yield PageTable(
+            "long policies",
+            ["name", "targets", "shortcuts", "on paper x, y [m]", "turn [deg]", "simulated x, y [m]", "turn [deg]",
+             "came back", "time [s]", "gaits"],
+            [_policy(one) for one in report.policies],
+        )  # fmt: skip
+    seconds = ", ".join(f"{part} {spent:.1f} s" for part, spent in report.seconds.items())
+    yield PageTable(
+        "the search",
+        ["symmetries", "targets simulated", "given up", "poses left behind", "gaits found", "time"],
+        [[str(report.symmetries), str(report.simulated), str(report.lost), str(report.pruned), str(report.found),
+          f"{report.wall_s:.1f} s: {seconds}"]],
+    )  # fmt: skip
+
+
+def plan_page(report: PlanReport, data: ArtifactData, robot: Robot, pictures: Sequence[tuple[str, bytes]]) -> bytes:
+    """The HTML page of a plan: player, tables, pictures, warnings."""
+    best = {one.behaviour: one for one in reversed(report.gaits)}
+    said = "; ".join(
+        f"{name} {told(name, best[name].mean)} +- {told(name, best[name].sd)} a gait" for name in reversed(best)
+    )
+    page = Page(
+        title=f"Plan for {robot.title}",
+        sentence=f"{counted(len(report.gaits), 'gait')} and {len(report.policies)} long policies, simulated with "
+        f"{report.numbers}: {said}.",
+        labels=list(report.warnings),
+        tables=list(report_tables(report)),
+        pictures=[Picture(title, png) for title, png in pictures],
+    )
+    return playback_page(page, data, robot)
+
+
+def _gait(one: GaitFigures, pairs: int) -> list[str]:
+    def of(value: float) -> str:
+        return told(one.behaviour, value)
+
+    x, y = one.shift_m
+    return [
+        one.name, " ".join(one.shapes), of(one.nominal), of(one.mean), of(one.sd), of(one.score),
+        f"{round(one.worked * pairs)} of {pairs}", f"{1e3 * x:+.0f}, {1e3 * y:+.0f}",
+        f"{math.degrees(one.turn_rad):+.0f}", f"{one.duration_s:.1f}",
+    ]  # fmt: skip
+
+
+def _policy(one: PolicyFigures) -> list[str]:
+    (ex, ey), (x, y), (sx, sy) = one.expected_m, one.shift_m, one.shift_sd_m
+    name = one.name
+    if one.goal is not None:
+        gx, gy, turn = one.goal
+        name += f" ({gx:g}, {gy:g}, {math.degrees(turn):.0f} deg)"
+    return [
+        name, str(one.targets), f"{one.shortcuts} (-{one.saved} targets)", f"{ex:+.2f}, {ey:+.2f}",
+        f"{math.degrees(one.expected_turn_rad):+.0f}", f"{x:+.2f} +- {sx:.2f}, {y:+.2f} +- {sy:.2f}",
+        f"{math.degrees(one.turn_rad):+.0f} +- {math.degrees(one.turn_sd_rad):.0f}", f"{one.worked:.0%}",
+        f"{one.duration_s:.0f}", " ".join(one.gaits),
+    ]  # fmt: skip

@@ -143,6 +143,7 @@ def test_a_dry_run_checks_what_is_asked_for(estimated: Path) -> None:
         "--with-effect motor_leg": "--with-effect motor_lag",
         "--train sampel:1-2 --seed 3": "--seed 3 --train sample:1-2",
         "--method cma --drive closed-loop": "--drive closed-loop   #",
+        "--method cma --online": "--online",
         "--self-test --free frictoin": "--self-test --free friction",
     }.items():
         result = invoke("identify", *typed.split(), "--dry-run")
@@ -175,6 +176,10 @@ def refusal(hint: str, where: str = "--free", received: str = "") -> R2S2RError:
         ("--method cma --drive closed-loop --seed 1",
          refusal("r2s2r identify --drive closed-loop   # so", where="--method cma --drive closed-loop"),
          "--seed 1 --drive closed-loop   # so"),
+        ("--free motor_speed --free motor_speed.2,0.2..0.9 --free mass",
+         refusal("r2s2r identify --free motor_speed.2", received="motor_speed, motor_speed.2"),
+         "--free mass --free motor_speed.2"),
+        ("--method paper --online", refusal("r2s2r identify --online", where="--online, --method"), "--online"),
         ("--method papier --online", refusal("r2s2r identify --method paper"), "--online --method paper"),
         ("--set identify.start=3", refusal("--set identify.starts=3", received="identify.start"),
          "--set identify.starts=3"),

@@ -62,8 +62,8 @@ def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:
     warnings = list(made.remarks)
     if better is not None:
         warnings.append(
-            "a profile came upon a lower loss: the fit is no minimum there. Its intervals are those of the numbers "
-            "that it has, not of the lowest loss; judge it by its held-out errors"
+            "a profile came upon a lower loss: the loss is rough, and the fit is no minimum there. Its intervals hold "
+            "what the profile found; judge it by its held-out errors"
         )
     if not fit.solution.reason.converged:
         warnings.append(

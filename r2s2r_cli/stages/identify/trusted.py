@@ -112,23 +112,22 @@ def profiled(
 
 def widened_by(fitted: Fit, sure: Sureness, profiles: Sequence[ProfileFound]) -> Sureness:
     """The same with intervals that hold those of the profiles as well: where the cost is rough or crooked, these see
-    what a covariance does not. Standard deviations grow as the longer side of the interval, correlations stay."""
+    what a covariance does not. Standard deviations grow as the intervals do, correlations stay."""
     spread, frees = sure.spread, fitted.problem.frees
     share = np.ones(len(frees))
     low, high = spread.lower.copy(), spread.upper.copy()
     for one in profiles:
         k, free = one.row, frees[one.row]
         ends = [one.value[at] if np.isnan(end) else end for at, end in zip((0, -1), one.interval, strict=True)]
-        z = float(spread.z[k])
         usual = float(spread.quantile[k] * spread.sd_z[k])
         if not (np.isfinite(usual) and usual > 0) or (low[k] <= min(ends) and max(ends) <= high[k]):
             continue
         low[k], high[k] = min(low[k], *ends), max(high[k], *ends)
-        far = max(z - free.to_z(low[k]), free.to_z(high[k]) - z) / usual
-        share[k] = far if 1.0 < far < np.inf else 1.0
-    if not (share > 1.0).any():
+        wide = 0.5 * (free.to_z(high[k]) - free.to_z(low[k])) / usual
+        share[k] = wide if 1.0 < wide < np.inf else 1.0
+    if np.array_equal(low, spread.lower) and np.array_equal(high, spread.upper):
         return sure
-    wide = replace(
+    grown = replace(
         spread, covariance=spread.covariance * np.outer(share, share), sd=spread.sd * share, lower=low, upper=high
     )
-    return replace(sure, spread=wide, parameters=_parameters(fitted, wide, sure.after, sure.reach))
+    return replace(sure, spread=grown, parameters=_parameters(fitted, grown, sure.after, sure.reach))

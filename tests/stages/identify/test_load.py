@@ -110,6 +110,7 @@ HOLE = np.where(np.arange(36)[:, None, None] == 20, np.nan, path(6))
 
 BAD: dict[str, tuple[Callable[[ArtifactData], ArtifactData], str]] = {
     "no control column": (lambda e: changed(e, "commands", control=None), "no motor commands"),
+    "no motor commanded": (lambda e: changed(e, "commands", control=np.zeros((36, 2))), "no motor is commanded"),
     "control never logged": (lambda e: changed(e, "commands", control=np.full((36, 2), np.nan)), "no motor commands"),
     "no commands": (lambda e: without(e, "commands"), "no commands"),
     "no frames": (lambda e: changed(e, "frames", source_frame=np.zeros(0, int), **NO_FRAMES), "no frame left"),

@@ -18,6 +18,7 @@ from r2s2r_cli.stages.identify.groups import identification
 from r2s2r_cli.stages.identify.online import (
     DRIFT,
     Known,
+    _dropped,
     by_run,
     drift_of,
     drifted,
@@ -26,8 +27,11 @@ from r2s2r_cli.stages.identify.online import (
     specs_of,
     update_of,
 )
+from r2s2r_cli.stages.identify.request import Request
+from r2s2r_cli.stages.identify.task import Task
 from r2s2r_cli.stages.identify.trust.identifiability import Trust
 from r2s2r_cli.stages.identify.twice import learned_twice
+from schemas.config import IdentifySettings
 from tests.stages.identify.planted import BOUNCE, SPEED, found
 from tests.stages.measures.gait import run as walk
 from tests.support.robots import subject
@@ -61,6 +65,14 @@ def test_what_an_artifact_knows() -> None:
     """The determined speed with the sd of its coordinate; nothing of the restitution, which keeps its prior."""
     known = known_of(identification(found()))
     assert known == Known({"motor_speed": 0.8}, {"motor_speed": 0.01})
+
+
+def test_knowledge_that_is_not_used_is_told() -> None:
+    """A number that was known, and now is neither free nor given, with the option that keeps it."""
+    task = Task(subject().robot, (), Request(train=()), IdentifySettings())
+    (text,) = _dropped(Known({"mass.1": 0.41}, {"mass.1": 0.1}), task, ())
+    assert "mass.1" in text and "--fix mass.1=0.41" in text
+    assert _dropped(Known({"mass.1": 0.41}, {"mass.1": 0.1}), task, select(("mass.1",), task.robot)) == ()
 
 
 def test_what_was_free_is_free_again() -> None:

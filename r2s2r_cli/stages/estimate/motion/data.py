@@ -32,9 +32,9 @@ class MotionSettings:
     """Of one sample, to start from; estimated over the run."""
     clock_range_s: float = 0.5
     """Clock offset and lag together are searched for up to that much, either way."""
-    ground_sd_m: float = 0.002
-    """Of the height of the floor under the caps against z = 0, as the tracker sees it."""
-    ground_tilt_sd_rad: float = 0.002
+    ground_sd_m: float = 5e-5
+    """Of the height of the floor under the caps against z = 0: a plane fitted to a hundred thousand points is good."""
+    ground_tilt_sd_rad: float = 5e-5
     """Of its slopes."""
     contact_sd_m: float = 3e-4
     """Of the height of a cap that carries weight: floors and caps give way a little."""

@@ -16,6 +16,9 @@ HOLE = 1.6
 MOST_KNOTS = 300
 """Frames put into one hole."""
 MIN_FRAMES = 5
+TWIN_SD, TWIN_SHARE = 6.0, 0.05
+"""Two caps of a rod are not both its caps where their distance is off by so many standard deviations and by this share
+of the length, which robot.toml may have wrong."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,7 @@ def prepare(sighted: Sighted, body: Body) -> Prepared:
             hint="r2s2r inspect 10-record.h5 shows the stamps",
         )  # fmt: skip
     seen = np.all(np.isfinite(p), axis=2) & np.all(np.isfinite(sighted.cov), axis=(2, 3))
+    seen &= ~_twins(p, sighted.cov, seen, body)
     if np.any(never := ~np.any(seen, axis=0)):
         raise InputError(
             f"end cap {int(np.argmax(never))} is never sighted", where="sightings", expected="every cap at least once",
@@ -69,6 +73,21 @@ def prepare(sighted: Sighted, body: Body) -> Prepared:
     full[given], cov[given], marks[given] = np.where(seen[..., None], p, 0.0), sighted.cov, seen
     cov[~marks] = np.eye(3)
     return Prepared(all_t, full, cov, marks, given, np.array(gap_of, dtype=int))
+
+
+def _twins(p: np.ndarray, cov: np.ndarray, seen: np.ndarray, body: Body) -> np.ndarray:
+    """Sightings of rods whose caps are not a rod length apart: one of the two is something else; (frame, cap)."""
+    bad = np.zeros_like(seen)
+    for (a, b), length in zip(body.rod, body.rod_length, strict=True):
+        both = seen[:, a] & seen[:, b]
+        bar = np.where(both[:, None], p[:, b] - p[:, a], 1.0)
+        now = np.linalg.norm(bar, axis=1)
+        u = bar / now[:, None]
+        shared = np.where(both[:, None, None], cov[:, a] + cov[:, b], 0.0)
+        sd = np.sqrt(np.einsum("ki,kij,kj->k", u, shared, u))
+        off = both & (np.abs(now - length) > TWIN_SD * sd + TWIN_SHARE * length)
+        bad[off, a] = bad[off, b] = True
+    return bad
 
 
 def first_states(prepared: Prepared, body: Body) -> np.ndarray:

@@ -21,6 +21,7 @@ from r2s2r_cli.stages.estimate.motion.data import (
 from r2s2r_cli.stages.estimate.motion.equations import SIGHTING_FREEDOM
 from r2s2r_cli.stages.estimate.motion.factors import heavy_tail
 from r2s2r_cli.stages.estimate.motion.prepare import Prepared
+from r2s2r_cli.stages.estimate.motion.shared import shared_covariance
 from r2s2r_cli.stages.estimate.motion.rounds import State, cap_covariances, distances, known
 
 USED = 0.3
@@ -41,8 +42,7 @@ def tracked_run(
     quality, score = _quality(state, prepared, p_cov, body)
     variance = np.diagonal(cov, axis1=1, axis2=2)
     heard = _heard(state.evidence.t, state.evidence.sensor_weight)
-    systematic = settings.systematic_sd_m**2 * np.eye(3)
-    shown = p_cov + systematic
+    shown = p_cov + shared_covariance(prepared, state.factor) + settings.systematic_sd_m**2 * np.eye(3)
     worst = np.sqrt(np.linalg.eigvalsh(shown)[..., -1])
     mode = (
         np.where(np.any(heard, axis=1), 0, NO_SENSORS)

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from r2s2r_cli.stages.estimate.ground import find_ground
 from r2s2r_cli.stages.estimate.motion.body import Body
 from r2s2r_cli.stages.estimate.motion.data import MotionSettings, Readings, SensorClock, Sighted, TrackedRun
-from r2s2r_cli.stages.estimate.motion.prepare import Prepared, first_evidence, first_states, prepare
+from r2s2r_cli.stages.estimate.motion.prepare import first_evidence, first_states, prepare
 from r2s2r_cli.stages.estimate.motion.result import tracked_run
 from r2s2r_cli.stages.estimate.motion.rounds import State, distances, known, learn, sensor_weights, settle, touch
 from r2s2r_cli.stages.estimate.motion.sensor_clock import find_clock
@@ -54,7 +53,7 @@ def smooth_run(
         state = learn(settle(state, body, settings, steps=FEW), prepared, body)
     state = settle(state, body, settings, steps=FEW)
     state, clock = _with_sensors(state, readings, body, settings)
-    state = touch(_with_floor(state, prepared, body, settings), prepared, body, hidden=False)
+    state = touch(state, prepared, body, hidden=False)
     state = settle(state, body, settings)
     state = replace(state, evidence=replace(state.evidence, sensor_freedom=SENSOR_FREEDOM))
     for left in reversed(range(TOGETHER)):
@@ -85,12 +84,3 @@ def _with_sensors(
         sensor_weight=sensor_weights(binned.samples, state.noise),
     )  # fmt: skip
     return replace(state, x=x, evidence=evidence), clock
-
-
-def _with_floor(state: State, prepared: Prepared, body: Body, settings: MotionSettings) -> State:
-    """The floor where the lowest caps are, as far as the settings let it be off."""
-    found = find_ground(body.positions(state.x), prepared.sighted, body.radius)
-    most = 3 * settings.ground_sd_m
-    x = state.x.copy()
-    x[:, body.floor.start] = np.clip(-found.shift, -most, most)
-    return replace(state, x=x)

@@ -88,7 +88,9 @@ def swapped(frame: ImageFrame) -> ImageFrame:
     assert frame.color is not None
     assert frame.depth is not None
     grey = (frame.depth >> 5).astype(np.uint8)
-    return replace(frame, color=np.repeat(grey[:, :, None], 3, axis=2), depth=frame.color.mean(axis=2).astype(np.uint16))
+    return replace(
+        frame, color=np.repeat(grey[:, :, None], 3, axis=2), depth=frame.color.mean(axis=2).astype(np.uint16)
+    )
 
 
 def bgr(frame: ImageFrame) -> ImageFrame:

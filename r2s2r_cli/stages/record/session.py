@@ -23,6 +23,9 @@ CONTROL_SHARE, CAMERA_SHARE = 0.95, 0.98
 """Of control ticks on time and of frames that were kept: below it the report warns."""
 _NAMED = 6
 """Targets that were given up which a warning names."""
+_HELD = 0.01
+"""Share of the control ticks in which the motors were held beyond which the report warns: a healthy sensor whose cable
+cannot follow is in doubt now and then."""
 _UNTURNED_S = 1.0
 """A motor that is driven for longer without turning is dead, or held by its load."""
 _REPEATED = 3
@@ -149,10 +152,14 @@ def _warnings(run: RecordRun, loop: RunLoop, *, stops_by_itself: bool) -> list[s
         )
     for cable, seconds in zip(loop.winched, loop.tally.unturned, strict=False):
         if seconds > _UNTURNED_S:
-            found.append(f"the motor of cable {cable} was driven for {seconds:.1f} s and its encoder did not turn")
+            found.append(
+                f"the motor of cable {cable} was driven for {seconds:.1f} s and its encoder did not turn: dead, or held"
+            )
     if run.late > (1 - CONTROL_SHARE) * max(run.ticks, 1):
         found.append(f"{run.late} of {run.ticks} control ticks came more than half a period late")
-    found += [f"the motors were held for {count} control ticks: {why}" for why, count in loop.tally.doubts.items()]
+    if run.held > _HELD * run.ticks:
+        why = "; ".join(loop.tally.doubts)
+        found.append(f"the motors were held for {run.held} of {run.ticks} control ticks: {why}")
     if run.lost:
         found.append(f"{run.lost} of {run.lost + run.samples} samples were lost on the way")
     if run.corrupt:

@@ -30,7 +30,7 @@ class Tally:
     ticks: int = 0
     late: int = 0
     held: int = 0
-    doubts: dict[str, int] = field(default_factory=dict)
+    doubts: dict[str, None] = field(default_factory=dict)
     gap_max: float = 0.0
     jumps: int = 0
     silent: np.ndarray = field(init=False)
@@ -71,7 +71,7 @@ class Tally:
         self.ticks += 1
         if doubt:
             self.held += 1
-            self.doubts[doubt] = self.doubts.get(doubt, 0) + 1
+            self.doubts[doubt] = None
         self._first_tick = t if self._first_tick is None else self._first_tick
         if self._t_tick is not None:
             self.late += t - self._t_tick > LATE * self.period

@@ -86,7 +86,7 @@ def test_held_motors_are_written_as_held() -> None:
     assert np.array_equal(control, np.array(link.commands)[-len(control) :])
     (run,) = session.runs
     assert run.held == 10 and run.ended == "complete"
-    assert run.warnings == (f"the motors were held for 10 control ticks: {doubt}",)
+    assert run.warnings == (f"the motors were held for 10 of {run.ticks} control ticks: {doubt}",)
 
 
 def test_unsynchronised_boards_leave_gaps_in_their_rows() -> None:

@@ -6,6 +6,7 @@ import contextlib
 import fcntl
 import io
 import json
+import math
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -131,6 +132,18 @@ def read_field(file: BinaryIO, offset: int, stream: Stream, name: str) -> np.nda
             data = file.read(size)
             return data if field.dtype == "blobs" else np.frombuffer(data, field.dtype).reshape(field.shape)
         offset += size
+    raise KeyError(name)
+
+
+def fixed_place(stream: Stream, name: str) -> tuple[int, int] | None:
+    """Where a field lies in every row of its stream: offset in the payload and length [byte]; None where rows differ,
+    since it is encoded or lies behind what is. KeyError: no such field."""
+    offset = 0
+    for field in stream.fields:
+        size = 0 if field.dtype == "blobs" else np.dtype(field.dtype).itemsize * math.prod(field.shape)
+        if field.name == name:
+            return None if field.dtype == "blobs" or offset < 0 else (offset, size)
+        offset = -1 if field.dtype == "blobs" or offset < 0 else offset + size
     raise KeyError(name)
 
 

@@ -11,7 +11,8 @@ import pytest
 
 from r2s2r_cli.errors import ArtifactError
 from r2s2r_cli.store import seal as module
-from r2s2r_cli.store.journal import Journal
+from r2s2r_cli.store.journal import Field, Journal, Stream
+from r2s2r_cli.store.journal_read import fixed_place, read_field, read_head, records
 from r2s2r_cli.store.read import read_artifact
 from r2s2r_cli.store.seal import Late, seal
 from r2s2r_cli.store.write import write_artifact
@@ -206,3 +207,29 @@ def test_a_journal_of_an_older_version_is_migrated(tmp_path: Path, monkeypatch: 
 
 def _killed(*_: object, **__: object) -> None:
     raise KeyboardInterrupt
+
+
+def test_a_field_lies_where_the_journal_has_it(tmp_path: Path) -> None:
+    """The place of every field of a fixed size gives the bytes that reading it row by row gives; behind an encoded one
+    no field has a place."""
+    write(tmp_path / "a.journal", 40)
+    found, _ = read_head(tmp_path / "a.journal")
+    data = (tmp_path / "a.journal").read_bytes()
+    seen = set()
+    with (tmp_path / "a.journal").open("rb") as file:
+        for place in records(tmp_path / "a.journal"):
+            stream = found.streams[place.stream]
+            for field in stream.fields:
+                there = fixed_place(stream, field.name)
+                value = read_field(file, place.offset, stream, field.name)
+                if there is None:
+                    assert field.dtype == "blobs"
+                    continue
+                first = place.offset + there[0]
+                assert data[first : first + there[1]] == np.asarray(value).tobytes()
+                seen.add((place.stream, field.name))
+    assert len(seen) == 4
+    behind = Stream("a", (Field("x", "blobs"), Field("t", "float64")), {})
+    assert fixed_place(behind, "t") is None and fixed_place(behind, "x") is None
+    with pytest.raises(KeyError):
+        fixed_place(behind, "y")

@@ -139,8 +139,8 @@ class BallFitter:
             return np.asarray(cv2.copyMakeBorder(picture.astype(np.float32), pad, pad, pad, pad, cv2.BORDER_CONSTANT))
 
         # sum told (colored - model)^2 for every place, but for what does not depend on it
-        cost = cv2.matchTemplate(padded(told), template**2, cv2.TM_CCORR)
-        cost -= 2 * cv2.matchTemplate(padded(told & patch.colored), template, cv2.TM_CCORR)
+        cost = np.asarray(cv2.matchTemplate(padded(told), template**2, cv2.TM_CCORR), dtype=float)
+        cost = cost - 2 * np.asarray(cv2.matchTemplate(padded(told & patch.colored), template, cv2.TM_CCORR))
         dv = np.arange(cost.shape[0]) - pad - v0
         du = np.arange(cost.shape[1]) - pad - u0
         far = dv[:, None] ** 2 + du[None, :] ** 2

@@ -32,8 +32,8 @@ def shares(color: np.ndarray, inside: np.ndarray, a: np.ndarray, b: np.ndarray, 
     color: RGB (v, u, 3). inside: pixels of the cap's colour within INNER of its disc, bool (v, u). a, b: place of the
     pixels on the disc, in its radii, along u and v, (v, u). rim_px: radius of the disc.
 
-    Chroma is the part of a colour across grey, along that of the cap. Its shade over the ball is that of a dull surface,
-    linear in the normal (a, b, -sqrt(1 - a^2 - b^2)), and never below what is turned away from the light.
+    Chroma is the part of a colour across grey, along that of the cap. Its shade over the ball is that of a dull
+    surface, linear in the normal (a, b, -sqrt(1 - a^2 - b^2)), and never below what is turned away from the light.
     """
     rgb = color[inside].astype(float)
     if len(rgb) < LEAST:

@@ -9,6 +9,7 @@ import numpy as np
 LAGS_PX = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20)
 _LENGTHS_PX = np.geomspace(1.0, 24.0, 40)
 _SD_LEAST = 1e-5
+_MOSTLY = 0.6
 _SIDEWAYS_PX = 0.6
 
 
@@ -59,6 +60,9 @@ def measured(error: np.ndarray) -> DepthNoise:
         share = float(np.clip(shape @ covariance / (shape @ shape), 0.0, total))
         best = min(best, (float(((covariance - share * shape) ** 2).sum()), share, float(length)))
     _, shared, length = best
+    alone = total - shared
+    if covariance[1] > _MOSTLY * total:  # next to a large shared part, a small white one is seen at the first lags only
+        alone = total - float(covariance[0] * (covariance[0] / covariance[1]) ** (1 / 3))
     return DepthNoise(
-        white=max(float(np.sqrt(max(total - shared, 0.0))), _SD_LEAST), shared=float(np.sqrt(shared)), length_px=length
+        white=max(float(np.sqrt(max(alone, 0.0))), _SD_LEAST), shared=float(np.sqrt(shared)), length_px=length
     )

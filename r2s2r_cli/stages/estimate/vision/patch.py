@@ -36,8 +36,10 @@ class Patch:
         area = (rows, columns)
         if min(self.x[area].shape) < 3:
             return None
-        arrays = (self.x, self.y, self.colored, self.known, self.z, self.zx, self.zy, self.color)
-        return Patch(*(array[area] for array in arrays), self.u0 + columns.start, self.v0 + rows.start)
+        return Patch(
+            self.x[area], self.y[area], self.colored[area], self.known[area], self.z[area], self.zx[area],
+            self.zy[area], self.color[area], self.u0 + columns.start, self.v0 + rows.start,
+        )  # fmt: skip
 
 
 def in_front(patch: Patch, z_cap: np.ndarray, sd: np.ndarray) -> np.ndarray:

@@ -20,7 +20,8 @@ _WIDTH = 3.0
 """Half width of the plane in standard deviations of depth."""
 _HYPOTHESES = 200
 _SAMPLE = 8000
-_REFITS = 3
+_REFITS, _FITTED = 3, 80_000
+"""More points than these would say nothing new: neighbours share half of their noise."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ def find_ground(p_C: np.ndarray, *, seed: int = 0, method: Method = "numpy") -> 
     """The largest plane through points (v, u, 3) [m], NaN where unknown; None where there are too few or none fits.
 
     method: which library proposes the plane; both are seeded and refitted by the same weighted least squares, so that
-    they differ by less than the noise (tests/stages/estimate/test_vision_plane.py).
+    they differ by less than the noise (tests/stages/estimate/test_vision_survey.py).
     """
     known = np.isfinite(p_C[..., 2])
     points = p_C[known]
@@ -81,9 +82,10 @@ def find_ground(p_C: np.ndarray, *, seed: int = 0, method: Method = "numpy") -> 
     best = _by_open3d(points, seed) if method == "open3d" else _by_numpy(points, seed)
     if best is None:
         return None
+    some = points[:: max(len(points) // _FITTED, 1)]
     for _ in range(_REFITS):
-        on = points[_near(points, *best)]
-        if len(on) < MIN_POINTS:
+        on = some[_near(some, *best)]
+        if len(on) < min(MIN_POINTS, len(some) // 2):
             return None
         best = _fitted(on)
     normal, distance = best
@@ -132,7 +134,7 @@ def _through(three: np.ndarray) -> tuple[np.ndarray, float] | None:
 
 def _fitted(points: np.ndarray) -> tuple[np.ndarray, float]:
     # Noise grows with z^2: far points count less.
-    weight = points[:, 2:] ** -4
+    weight = 1.0 / np.square(np.square(points[:, 2:]))
     middle = (weight * points).sum(axis=0) / weight.sum()
     centred = (points - middle) * np.sqrt(weight)
     return _towards_camera(np.linalg.eigh(centred.T @ centred)[1][:, 0], middle)

@@ -45,19 +45,18 @@ def check_lengths(lengths: Sequence[float]) -> str | None:
     if len(lengths) < _LEAST:
         return None
     off = float(np.median(lengths)) - 1.0
+    way = "longer" if off > 0 else "shorter"
     spread = 1.4826 * float(np.median(np.abs(np.array(lengths) - 1.0 - off))) / np.sqrt(len(lengths))
     if abs(off) > LENGTH_FAILS + 3 * spread:
         raise InputError(
-            f"the rods look {100 * off:+.1f} % longer than they are",
+            f"the rods look {100 * abs(off):.1f} % {way} than they are",
             where=f"{len(lengths)} pairs of caps",
             expected=f"the lengths of robot.toml, to {100 * LENGTH_FAILS:.0f} %",
             received=f"{1 + off:.3f} of them: focal length, depth unit or robot.toml are wrong",
             hint="r2s2r doctor camera --camera realsense",
         )
     if abs(off) > LENGTH_WARNS + 3 * spread:
-        return (
-            f"the rods look {100 * off:+.1f} % longer than in robot.toml: focal length or depth unit are a little wrong"
-        )
+        return f"the rods look {100 * abs(off):.1f} % {way} than in robot.toml: focal length or depth unit are a little off"
     return None
 
 

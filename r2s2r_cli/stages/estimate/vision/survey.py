@@ -58,9 +58,7 @@ def survey(
     Raises InputError where there is no frame with colour and depth, no ground, no cap of any rod in any of the frames
     looked at, or where lengths show that depth unit or focal length cannot be right.
     """
-    index = (
-        np.unique(np.linspace(0, len(source) - 1, min(frames, len(source))).round().astype(int)) if len(source) else []
-    )
+    index = np.unique(np.linspace(0, max(len(source) - 1, 0), min(frames, len(source))).round().astype(int))
     lens, scale = source.lens, source.depth_scale
     warnings: list[str] = []
     if method is None:

@@ -8,13 +8,14 @@ import numpy as np
 
 from schemas.robot import Robot
 
-GROUND = 3
-"""States of the floor: height at the origin and two slopes."""
+ACROSS = 2
+"""Parts of the error that neighbouring sightings of a cap share: across the line of sight."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """Index arrays and lengths. A state is p (cap x 3), v (cap x 3), sensor offsets, floor."""
+    """Index arrays and lengths. A state is p (cap x 3), v (cap x 3), sensor offsets and, where `sharing`, ACROSS shared
+    errors of the sightings of each cap."""
 
     rod: np.ndarray
     """Caps of each rod, shape (rod, 2)."""
@@ -26,9 +27,10 @@ class Body:
     """Caps of each cable, shape (cable, 2)."""
     sensor: np.ndarray
     """Caps whose distance each sensor shows, shape (sensor, 2)."""
+    sharing: bool
 
     @classmethod
-    def of(cls, robot: Robot, cable_of_sensor: np.ndarray | None = None) -> Body:
+    def of(cls, robot: Robot, cable_of_sensor: np.ndarray | None = None, *, sharing: bool = False) -> Body:
         """Of a robot; cable_of_sensor: cable of each sensor, default those of robot.toml."""
         cable = np.array([one.caps for one in robot.cables], dtype=int)
         if cable_of_sensor is None:
@@ -40,6 +42,7 @@ class Body:
             radius=np.repeat([rod.cap_radius_m for rod in robot.rods], 2),
             cable=cable,
             sensor=cable[np.asarray(cable_of_sensor, dtype=int)].reshape(-1, 2),
+            sharing=sharing,
         )
 
     @property
@@ -55,17 +58,12 @@ class Body:
     @property
     def dim(self) -> int:
         """States of one frame."""
-        return self.moving + len(self.sensor) + GROUND
+        return self.moving + len(self.sensor) + (ACROSS * self.caps if self.sharing else 0)
 
     @property
     def bias(self) -> slice:
         """Offsets of the sensors [m]."""
         return slice(self.moving, self.moving + len(self.sensor))
-
-    @property
-    def floor(self) -> slice:
-        """Height and slopes of the floor."""
-        return slice(self.dim - GROUND, self.dim)
 
     def p(self, cap: int) -> np.ndarray:
         """States of a cap's position."""
@@ -74,6 +72,10 @@ class Body:
     def v(self, cap: int) -> np.ndarray:
         """States of a cap's velocity."""
         return 3 * (self.caps + cap) + np.arange(3)
+
+    def shared(self, cap: int) -> np.ndarray:
+        """States of the shared errors of a cap's sightings, in standard deviations; none where not `sharing`."""
+        return self.bias.stop + ACROSS * cap + np.arange(ACROSS if self.sharing else 0)
 
     def positions(self, x: np.ndarray) -> np.ndarray:
         """Caps of states, shape (..., dim) to (..., cap, 3)."""

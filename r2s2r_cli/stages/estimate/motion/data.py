@@ -32,9 +32,10 @@ class MotionSettings:
     """Of one sample, to start from; estimated over the run."""
     clock_range_s: float = 0.5
     """Clock offset and lag together are searched for up to that much, either way."""
-    ground_sd_m: float = 5e-5
-    """Of the height of the floor under the caps against z = 0: a plane fitted to a hundred thousand points is good."""
-    ground_tilt_sd_rad: float = 5e-5
+    ground_sd_m: float = 0.0005
+    """Of the plane z = 0 against the floor under the caps; it is not estimated again from the contacts, because a plane
+    through a hundred thousand points is better known than the heights of a few caps."""
+    ground_tilt_sd_rad: float = 0.001
     """Of its slopes."""
     contact_sd_m: float = 3e-4
     """Of the height of a cap that carries weight: floors and caps give way a little."""
@@ -108,7 +109,7 @@ class TrackedRun:
     """Sensors that contradict everything else, or never speak, shape (sensor,)."""
     clock: SensorClock
     ground: np.ndarray
-    """Height at x = y = 0 [m] and slopes dz/dx, dz/dy of the floor as the contacts show it, shape (3,)."""
+    """Height at x = y = 0 [m] and slopes dz/dx, dz/dy of the floor that the states stand on, shape (3,): 0."""
     ground_sd: np.ndarray
     contact: np.ndarray
     """Caps that carry weight, bool, shape (frame, cap)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from r2s2r_cli.stages.estimate.motion.body import GROUND, Body
+from r2s2r_cli.stages.estimate.motion.body import Body
 from r2s2r_cli.stages.estimate.motion.chain import Normal
 from r2s2r_cli.stages.estimate.motion.crossing import add_crossings
 from r2s2r_cli.stages.estimate.motion.data import MotionSettings
@@ -15,8 +15,8 @@ SIGHTING_FREEDOM = 8.0
 """Of Student's t: few sightings are wild (another thing of the same colour)."""
 START_SD = (3.0, 1.0)
 """Of position [m] and velocity [m/s] at the first frame: wide."""
-FLOOR_WALK_M = 2e-5
-"""[m] Of the floor under the caps over 1 s: it stays, the walk only keeps the equations well-conditioned."""
+SHARED_S = 1.0
+"""[s] How long the errors that neighbouring sightings share stay alike."""
 BELOW_SD_M = 1e-3
 """[m] Of how far a cap that is not known to touch may be below the floor."""
 LIFTED_M = 0.03
@@ -48,9 +48,16 @@ def apart(x: np.ndarray, body: Body, ends: np.ndarray) -> tuple[np.ndarray, np.n
 
 def _sightings(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body) -> None:
     for cap in range(body.caps):
-        states = body.p(cap)
-        residual = x[:, states] - evidence.seen[:, cap]
-        frames.vector(states, residual, evidence.information[:, cap], SIGHTING_FREEDOM)
+        states = np.concatenate([body.p(cap), body.shared(cap)])
+        slope = sighting_slope(evidence, body, cap)
+        residual = (slope @ x[:, states, None])[:, :, 0] - evidence.seen[:, cap]
+        frames.vector(states, slope, residual, evidence.information[:, cap], SIGHTING_FREEDOM)
+
+
+def sighting_slope(evidence: Evidence, body: Body, cap: int) -> np.ndarray:
+    """Derivative of a sighting by the cap's position and its shared errors, (frame, 3, 3 or 5)."""
+    eye = np.broadcast_to(np.eye(3), (evidence.frames, 3, 3))
+    return np.concatenate([eye, evidence.across[:, cap]], axis=2) if body.sharing else eye
 
 
 def _rods(frames: Frames, x: np.ndarray, body: Body, settings: MotionSettings) -> None:
@@ -84,14 +91,11 @@ def _floor(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body, settin
     slip = slip_weight(evidence.t, settings)
     for cap in range(body.caps):
         p = x[:, body.p(cap)]
-        floor = x[:, body.floor]
-        height = p[:, 2] - body.radius[cap] - floor[:, 0] - floor[:, 1] * p[:, 0] - floor[:, 2] * p[:, 1]
-        states = np.concatenate([body.p(cap), np.arange(body.floor.start, body.floor.stop)])
-        slope = np.column_stack([-floor[:, 1], -floor[:, 2], one, -one, -p[:, 0], -p[:, 1]])
+        height = p[:, 2] - body.radius[cap]
         touching = evidence.touching[:, cap]
         below = np.where(height < 0, 1 - touching, 0.0) / BELOW_SD_M**2
         stands = touching / (settings.contact_sd_m**2 + (1 - touching) * LIFTED_M**2)
-        frames.scalar(states, slope, height, stands + below)
+        frames.scalar(body.p(cap)[2:], one[:, None], height, stands + below)
         if np.any(touching):
             for axis in range(2):
                 v = x[:, body.v(cap)[axis]]
@@ -140,18 +144,30 @@ def _motion(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body, setti
             frames.matrix[1:, rows[i], rows[j]] += w[:, :, i, j]
             frames.matrix[:-1, rows[i], rows[j]] += fwf[:, :, i, j]
             upper[:, rows[i], rows[j]] -= fw[:, :, i, j]
-    slow = np.arange(body.moving, body.dim)
-    walk = np.full(len(slow), settings.sensor_walk_m)
-    walk[-GROUND:] = FLOOR_WALK_M
-    weight = 1.0 / (walk**2 * dt[:, None])
-    step = np.diff(x[:, slow], axis=0)
-    frames.cost += 0.5 * float(np.sum(weight * step**2))
-    frames.gradient[1:, slow] += weight * step
-    frames.gradient[:-1, slow] -= weight * step
-    frames.matrix[1:, slow, slow] += weight
-    frames.matrix[:-1, slow, slow] += weight
-    upper[:, slow, slow] -= weight
+    _slow(frames, x, dt, upper, np.arange(body.bias.start, body.bias.stop), 1.0, settings.sensor_walk_m**2 * dt)
+    fade = np.exp(-dt / SHARED_S)
+    _slow(frames, x, dt, upper, np.arange(body.bias.stop, body.dim), fade, 1.0 - fade**2)
     return upper
+
+
+def _slow(
+    frames: Frames,
+    x: np.ndarray,
+    dt: np.ndarray,
+    upper: np.ndarray,
+    states: np.ndarray,
+    fade: np.ndarray | float,
+    variance: np.ndarray,
+) -> None:
+    """States that go on by themselves: times `fade`, plus noise of that `variance`, (gap,)."""
+    weight, keep = 1.0 / variance[:, None], np.broadcast_to(fade, dt.shape)[:, None]
+    step = x[1:, states] - keep * x[:-1, states]
+    frames.cost += 0.5 * float(np.sum(weight * step**2))
+    frames.gradient[1:, states] += weight * step
+    frames.gradient[:-1, states] -= keep * weight * step
+    frames.matrix[1:, states, states] += weight
+    frames.matrix[:-1, states, states] += keep**2 * weight
+    upper[:, states, states] -= keep * weight
 
 
 def _start(frames: Frames, x: np.ndarray, body: Body, settings: MotionSettings) -> None:
@@ -168,5 +184,5 @@ def start_sd(body: Body, settings: MotionSettings) -> np.ndarray:
     sd = np.empty(body.dim)
     sd[: 3 * body.caps], sd[3 * body.caps : body.moving] = START_SD
     sd[body.bias] = settings.sensor_bias_sd_m
-    sd[body.floor] = [settings.ground_sd_m, settings.ground_tilt_sd_rad, settings.ground_tilt_sd_rad]
+    sd[body.bias.stop :] = 1.0
     return sd

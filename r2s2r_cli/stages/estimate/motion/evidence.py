@@ -17,6 +17,8 @@ class Evidence:
     """Sighted caps [m], (frame, cap, 3); 0 where there is none."""
     information: np.ndarray
     """Of the sightings [1/m^2], (frame, cap, 3, 3); 0 where there is none."""
+    across: np.ndarray
+    """Shared errors of one standard deviation [m], (frame, cap, 3, ACROSS)."""
     density: np.ndarray
     """Of the white acceleration [m^2/s^3], (frame - 1, cap)."""
     kick: np.ndarray

@@ -41,14 +41,20 @@ class Frames:
         self.matrix[:, states[:, None], states] += weighted[:, :, None] * slope[:, None, :]
 
     def vector(
-        self, states: np.ndarray, residual: np.ndarray, information: np.ndarray, freedom: float | None = None
+        self,
+        states: np.ndarray,
+        slope: np.ndarray,
+        residual: np.ndarray,
+        information: np.ndarray,
+        freedom: float | None = None,
     ) -> None:
-        """Add r' I r / 2, r three states minus something: states (3,), residual (frame, 3), information (frame, 3, 3)."""
+        """Add r' I r / 2: states (m,), slope (frame, 3, m), residual r (frame, 3), information I (frame, 3, 3)."""
         pull = np.einsum("kij,kj->ki", information, residual)
         value, used = _robust(np.sum(pull * residual, axis=1), 3, freedom)
         self.cost += value
-        self.gradient[:, states] += used[:, None] * pull
-        self.matrix[:, states[:, None], states] += used[:, None, None] * information
+        turned = np.swapaxes(slope, 1, 2)
+        self.gradient[:, states] += used[:, None] * (turned @ pull[:, :, None])[:, :, 0]
+        self.matrix[:, states[:, None], states] += used[:, None, None] * (turned @ information @ slope)
 
 
 def heavy_tail(square: np.ndarray, count: int, freedom: float) -> np.ndarray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.estimate.motion.body import Body
+from r2s2r_cli.stages.estimate.motion.body import ACROSS, Body
 from r2s2r_cli.stages.estimate.motion.data import MotionSettings, Sighted
 from r2s2r_cli.stages.estimate.motion.evidence import Evidence
 
@@ -116,6 +116,7 @@ def first_evidence(prepared: Prepared, body: Body, settings: MotionSettings, swi
     none = np.zeros((len(prepared.t), sensors))
     return Evidence(
         t=prepared.t, seen=prepared.seen, information=information(prepared, np.ones(2)),
+        across=np.zeros((len(prepared.t), body.caps, 3, ACROSS)),
         density=np.full((gaps, body.caps), settings.acceleration), kick=kick,
         shown=none, later=none, samples=none, sensor_weight=none,
         sensor_freedom=None, touching=np.zeros((len(prepared.t), body.caps)),

@@ -21,8 +21,7 @@ from r2s2r_cli.stages.estimate.motion.data import (
 from r2s2r_cli.stages.estimate.motion.equations import SIGHTING_FREEDOM
 from r2s2r_cli.stages.estimate.motion.factors import heavy_tail
 from r2s2r_cli.stages.estimate.motion.prepare import Prepared
-from r2s2r_cli.stages.estimate.motion.shared import shared_covariance
-from r2s2r_cli.stages.estimate.motion.rounds import State, cap_covariances, distances, known
+from r2s2r_cli.stages.estimate.motion.rounds import State, cap_covariances, distances, known, sighting_residual
 
 USED = 0.3
 """A sighting whose weight fell below this share contradicts the rest: nearly 5 standard deviations off."""
@@ -39,10 +38,10 @@ def tracked_run(
     speed = 3 * body.caps
     v_cov = np.stack([cov[:, (b := body.p(c) + speed)[:, None], b] for c in range(body.caps)], axis=1)
     length, _, length_sd = distances(x, cov, body, body.cable)
-    quality, score = _quality(state, prepared, p_cov, body)
+    quality, score = _quality(state, prepared, body)
     variance = np.diagonal(cov, axis1=1, axis2=2)
     heard = _heard(state.evidence.t, state.evidence.sensor_weight)
-    shown = p_cov + shared_covariance(prepared, state.factor) + settings.systematic_sd_m**2 * np.eye(3)
+    shown = p_cov + settings.systematic_sd_m**2 * np.eye(3)
     worst = np.sqrt(np.linalg.eigvalsh(shown)[..., -1])
     mode = (
         np.where(np.any(heard, axis=1), 0, NO_SENSORS)
@@ -56,7 +55,7 @@ def tracked_run(
         cov_v=v_cov[rows], length=length[rows], length_sd=length_sd[rows], sensor_bias=x[rows, body.bias],
         sensor_bias_sd=np.sqrt(variance[rows, body.bias]), sensor_noise_sd=state.noise,
         sensor_dead=~np.any(state.evidence.sensor_weight > 0, axis=0), clock=clock,
-        ground=np.median(x[:, body.floor], axis=0), ground_sd=np.sqrt(np.median(variance[:, body.floor], axis=0)),
+        ground=np.zeros(3), ground_sd=np.array([settings.ground_sd_m, *2 * [settings.ground_tilt_sd_rad]]),
         contact=contacts(state.evidence.touching)[rows], contact_probability=state.evidence.touching[rows],
         quality=quality[rows], mode=mode[rows], score=score[rows], noise_scale=np.sqrt(state.factor),
         acceleration=np.array([state.evidence.density[first == k].mean(axis=0) for k in range(len(rows) - 1)]),
@@ -64,8 +63,8 @@ def tracked_run(
     )  # fmt: skip
 
 
-def _quality(state: State, prepared: Prepared, p_cov: np.ndarray, body: Body) -> tuple[np.ndarray, np.ndarray]:
-    off = prepared.seen - body.positions(state.x)
+def _quality(state: State, prepared: Prepared, body: Body) -> tuple[np.ndarray, np.ndarray]:
+    off, spread = sighting_residual(state.x, known(state).cov, state.evidence, body)
     information = state.evidence.information
     square = np.einsum("kci,kcij,kcj->kc", off, information, off)
     used = prepared.sighted & (heavy_tail(square, 3, SIGHTING_FREEDOM) > USED)
@@ -74,8 +73,8 @@ def _quality(state: State, prepared: Prepared, p_cov: np.ndarray, body: Body) ->
     rows = np.nonzero(prepared.sighted)
     seen = np.linalg.inv(information[rows])
     # A used sighting took part in the state, so that the difference has the difference of both variances.
-    spread = np.where(used[rows][:, None, None], seen - p_cov[rows], seen + p_cov[rows])
-    values, axes = np.linalg.eigh(spread)
+    total = np.where(used[rows][:, None, None], seen - spread[rows], seen + spread[rows])
+    values, axes = np.linalg.eigh(total)
     part = np.einsum("nai,na->ni", axes, off[rows])
     score[rows] = np.sqrt(np.mean(part**2 / np.maximum(values, 0.02 * np.linalg.eigvalsh(seen)[:, :1]), axis=1))
     return quality, score

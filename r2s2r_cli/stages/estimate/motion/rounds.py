@@ -9,9 +9,11 @@ import numpy as np
 from r2s2r_cli.stages.estimate.motion.body import Body
 from r2s2r_cli.stages.estimate.motion.chain import Marginals, marginals
 from r2s2r_cli.stages.estimate.motion.data import MotionSettings
+from r2s2r_cli.stages.estimate.motion.equations import sighting_slope
 from r2s2r_cli.stages.estimate.motion.evidence import Evidence
 from r2s2r_cli.stages.estimate.motion.noise import gap_density, next_density, sensor_variance, sighting_scale
 from r2s2r_cli.stages.estimate.motion.prepare import Prepared, information, principal
+from r2s2r_cli.stages.estimate.motion.shared import shared_errors
 from r2s2r_cli.stages.estimate.motion.solve import Solved, solve
 from r2s2r_cli.stages.estimate.motion.touching import touching_probability
 
@@ -45,14 +47,13 @@ def settle(state: State, body: Body, settings: MotionSettings, *, steps: int = S
 def learn(state: State, prepared: Prepared, body: Body) -> State:
     """Noise of sightings, sensors and motion from the present states."""
     evidence, cov = state.evidence, known(state).cov
-    p_cov = cap_covariances(cov, body)
     rows = np.nonzero(prepared.sighted)
-    p = body.positions(state.x)
+    residual, spread = sighting_residual(state.x, cov, evidence, body)
     values, axes = principal(prepared.cov[rows])
     scaled = values * np.array([state.factor[0], state.factor[0], state.factor[1]])
     seen = np.einsum("ni,nia,nib->nab", scaled, axes, axes)
-    step = sighting_scale(prepared.seen[rows] - p[rows], seen, axes, p_cov[rows])
-    factor = np.clip(state.factor * step, 0.1, 30.0)
+    step = sighting_scale(residual[rows], seen, axes, spread[rows])
+    factor = np.clip(state.factor * step, 0.05, 30.0)
     noise = state.noise.copy()
     for s in range(len(noise)):
         used = evidence.sensor_weight[:, s] > 0
@@ -67,7 +68,13 @@ def learn(state: State, prepared: Prepared, body: Body) -> State:
     believed = prepared.sighted[1:] & prepared.sighted[:-1]
     density = next_density(each, evidence.kick, np.diff(evidence.t), believed)
     weight = sensor_weights(evidence.samples, noise)
-    evidence = replace(evidence, information=information(prepared, factor), density=density, sensor_weight=weight)
+    evidence = replace(
+        evidence,
+        information=information(prepared, factor),
+        across=shared_errors(prepared, factor),
+        density=density,
+        sensor_weight=weight,
+    )
     return replace(state, evidence=evidence, factor=factor, noise=noise)
 
 
@@ -103,17 +110,21 @@ def cap_covariances(cov: np.ndarray, body: Body) -> np.ndarray:
 
 
 def heights(x: np.ndarray, cov: np.ndarray, body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Of the caps' lowest points above the floor as it stands in the states, and their standard deviation, (frame, cap)."""
-    height, sd = np.empty((len(x), body.caps)), np.empty((len(x), body.caps))
+    """Of the caps' lowest points above the floor, and their standard deviation [m], (frame, cap)."""
+    states = 2 + 3 * np.arange(body.caps)
+    return x[:, states] - body.radius, np.sqrt(np.maximum(cov[:, states, states], 1e-14))
+
+
+def sighting_residual(x: np.ndarray, cov: np.ndarray, evidence: Evidence, body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Sighted minus predicted, shared errors included [m], (frame, cap, 3), and the covariance of the prediction."""
+    off = np.empty((len(x), body.caps, 3))
+    spread = np.empty((len(x), body.caps, 3, 3))
     for cap in range(body.caps):
-        p, floor = x[:, body.p(cap)], x[:, body.floor]
-        height[:, cap] = p[:, 2] - body.radius[cap] - floor[:, 0] - np.sum(floor[:, 1:] * p[:, :2], axis=1)
-        states = np.concatenate([body.p(cap), np.arange(body.floor.start, body.floor.stop)])
-        one = np.ones(len(x))
-        slope = np.column_stack([-floor[:, 1], -floor[:, 2], one, -one, -p[:, 0], -p[:, 1]])
-        part = cov[:, states[:, None], states]
-        sd[:, cap] = np.sqrt(np.maximum(np.einsum("ki,kij,kj->k", slope, part, slope), 1e-14))
-    return height, sd
+        states = np.concatenate([body.p(cap), body.shared(cap)])
+        slope = sighting_slope(evidence, body, cap)
+        off[:, cap] = evidence.seen[:, cap] - (slope @ x[:, states, None])[:, :, 0]
+        spread[:, cap] = slope @ cov[:, states[:, None], states] @ np.swapaxes(slope, 1, 2)
+    return off, spread
 
 
 def distances(

@@ -22,7 +22,7 @@ FEW = 2
 SENSOR_FREEDOM = 5.0
 """Of Student's t: more sensor samples are wild than sightings (dropouts). A first guess of a hidden cap may be far off,
 where Student's t would take the sensors for wild: they come in as Gaussian, once."""
-ALONE, TOGETHER = 2, 4
+ALONE, TOGETHER = 2, 3
 """Rounds of states and noise: with sightings alone, and with everything."""
 
 
@@ -43,7 +43,7 @@ def smooth_run(
     fails.
     """
     settings = settings or MotionSettings()
-    body = Body.of(robot, None if readings is None else readings.cable)
+    body = Body.of(robot, None if readings is None else readings.cable, sharing=True)
     prepared = prepare(sighted, body)
     state = State(
         x=first_states(prepared, body), evidence=first_evidence(prepared, body, settings, switches), factor=np.ones(2),
@@ -54,7 +54,7 @@ def smooth_run(
     state = settle(state, body, settings, steps=FEW)
     state, clock = _with_sensors(state, readings, body, settings)
     state = touch(state, prepared, body, hidden=False)
-    state = settle(state, body, settings)
+    state = settle(state, body, settings, steps=2 * FEW)
     state = replace(state, evidence=replace(state.evidence, sensor_freedom=SENSOR_FREEDOM))
     for left in reversed(range(TOGETHER)):
         state = learn(settle(state, body, settings, steps=FEW), prepared, body)

@@ -26,8 +26,8 @@ _NAMED = 6
 _HELD = 0.01
 """Share of the control ticks in which the motors were held beyond which the report warns: a healthy sensor whose cable
 cannot follow is in doubt now and then."""
-_UNTURNED_S = 1.0
-"""A motor that is driven for longer without turning is dead, or held by its load."""
+_UNTURNED_S = 0.5
+"""A motor that is driven for longer both ways without turning is dead, or its encoder is."""
 _REPEATED = 3
 """Frames that repeat the one before which are no reason to warn."""
 _SILENT = 0.02
@@ -152,9 +152,7 @@ def _warnings(run: RecordRun, loop: RunLoop, *, stops_by_itself: bool) -> list[s
         )
     for cable, seconds in zip(loop.winched, loop.tally.unturned, strict=False):
         if seconds > _UNTURNED_S:
-            found.append(
-                f"the motor of cable {cable} was driven for {seconds:.1f} s and its encoder did not turn: dead, or held"
-            )
+            found.append(f"the motor of cable {cable} was driven both ways and its encoder did not turn")
     if run.late > (1 - CONTROL_SHARE) * max(run.ticks, 1):
         found.append(f"{run.late} of {run.ticks} control ticks came more than half a period late")
     if run.held > _HELD * run.ticks:

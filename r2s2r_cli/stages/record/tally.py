@@ -20,7 +20,8 @@ class Tally:
     """Counts of one run, updated sample by sample; memory does not grow with the run.
 
     period: of the control ticks [s]. before: the link's statistics when the run began. unturned: for how long at most
-    each motor was driven without any change of its encoder [s], (actuated,); empty without encoders.
+    each motor was driven both ways without any change of its encoder [s], the shorter of both, (actuated,): one that is
+    held by its load, or at the end of its travel, turns the other way.
     """
 
     period: float
@@ -80,11 +81,11 @@ class Tally:
 
     def turned(self, control: np.ndarray, encoder: np.ndarray) -> None:
         """After a tick's command: speeds and the latest encoder counts, both (actuated,); NaN: no encoder."""
-        if not len(self._driven):
-            self._encoder, self._driven, self.unturned = encoder, np.zeros(len(control)), np.zeros(len(control))
+        if not len(self.unturned):
+            self._encoder, self._driven, self.unturned = encoder, np.zeros((2, len(control))), np.zeros(len(control))
         still = np.isfinite(encoder) & (encoder == self._encoder)
-        self._driven = np.where(still, self._driven + self.period * (control != 0), 0.0)
-        self.unturned = np.maximum(self.unturned, self._driven)
+        self._driven = np.where(still, self._driven + self.period * np.array([control > 0, control < 0]), 0.0)
+        self.unturned = np.maximum(self.unturned, self._driven.min(axis=0))
         self._encoder = encoder
 
     @property

@@ -231,18 +231,21 @@ def test_a_sensor_at_0_20_pf_moves_no_motor() -> None:
 
 
 def test_a_motor_that_does_not_turn_is_named() -> None:
-    """Its encoder stands still while it is driven for over a second: a warning with its cable, none of the others."""
+    """Its encoder stands still while it is driven both ways for over half a second each: a warning with its cable, none
+    of the others; driven one way alone it may be at the end of its travel."""
     robot = calibrated()
     stuck = np.arange(len(robot.actuated)) == 2
 
     def hold(number: int, sample: Sample) -> Sample:
         return dataclasses.replace(sample, encoder=np.where(stuck, 17.0, sample.encoder))
 
-    for still in (False, True):
+    for still, targets in ((False, (0.0,)), (True, (0.0,)), (True, ())):
         link = FakeLink(robot, on_read=hold if still else None)
-        session, _ = recorded(link, policy(robot, 0.0))
+        session, _ = recorded(link, policy(robot, *(targets or (0.9,))))
         said = [text for text in session.runs[0].warnings if "encoder" in text]
-        assert len(said) == still and all(f"cable {robot.actuated[2]} was driven" in text for text in said)
+        assert len(said) == (still and bool(targets)) and all(
+            f"cable {robot.actuated[2]} was driven" in text for text in said
+        )
 
 
 def test_a_board_whose_clock_is_set_is_counted() -> None:

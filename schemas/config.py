@@ -109,8 +109,8 @@ class PlanSettings(Frozen):
     """A gait that ends farther than this [m, root mean square of the caps] from the rest pose did not come back."""
     draws: Annotated[int, Field(strict=True, ge=1, le=1000)] = 8
     """Draws of the simulator's numbers that a gait is judged on; the first has the best values."""
-    starts: Annotated[int, Field(strict=True, ge=1, le=1000)] = 3
-    """Start poses for each draw: rest lengths anywhere in the tolerance of the controller."""
+    starts: Annotated[int, Field(strict=True, ge=1, le=1000)] = 2
+    """Start poses for each draw, rest lengths anywhere in the tolerance of the controller; as many again after a gait."""
     candidates: Annotated[int, Field(strict=True, ge=1, le=10_000)] = 45
     """Gaits of each behaviour that are judged on a few draws; a third of them is judged on all."""
     kept: Annotated[int, Field(strict=True, ge=1, le=1000)] = 10

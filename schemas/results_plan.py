@@ -63,7 +63,9 @@ class PlanReport(Frozen):
     pruned: int
     lost: int
     draws: int
-    starts: int
+    """Drawn numbers of the simulator."""
+    pairs: int
+    """Of drawn numbers and start poses, on which every gait was judged."""
     gaits: tuple[GaitFigures, ...]
     policies: tuple[PolicyFigures, ...]
     computed_by: Literal["machine code", "torch"]

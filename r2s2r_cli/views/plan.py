@@ -76,7 +76,7 @@ def _path(axes: Axes, data: ArtifactData, name: str, robot: Robot) -> None:
         axis = (p_WE[frame, 1::2] - p_WE[frame, 0::2]).mean(axis=0)[:2]
         axis = 0.12 * axis / max(float(np.linalg.norm(axis)), 1e-9)
         start = com[frame, :2]
-        axes.annotate("", start + axis, start, arrowprops={"arrowstyle": "-|>", "color": _AXIS, "lw": 2.2,
+        axes.annotate("", tuple(start + axis), tuple(start), arrowprops={"arrowstyle": "-|>", "color": _AXIS, "lw": 2.2,
                                                            "alpha": alpha})  # fmt: skip
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="x [m]", ylabel="y [m]")

@@ -15,9 +15,9 @@ from schemas.robot import Robot
 
 def report_tables(report: PlanReport) -> Iterator[PageTable]:
     """The gaits of every behaviour by score, the long policies, and what the search took."""
-    pairs = report.draws * report.starts
+    pairs = report.pairs
     yield PageTable(
-        f"gaits: reward over {report.draws} draws of the numbers x {report.starts} start poses",
+        f"gaits: reward over {pairs} pairs of drawn numbers ({report.draws} draws) and start poses",
         ["name", "shapes", "best numbers", "mean", "sd", "score", "came back", "x, y [mm]", "turned [deg]", "time [s]"],
         [_gait(one, pairs) for one in report.gaits],
     )

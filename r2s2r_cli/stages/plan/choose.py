@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from r2s2r_cli.stages.plan.executor import Executor, Standing
+from r2s2r_cli.stages.plan.executor import Executor, Standing, stacked
 from r2s2r_cli.stages.plan.gaits import Gait
 from r2s2r_cli.stages.plan.placement import Reference
 from r2s2r_cli.stages.plan.rewards import Outcomes, Reward
-from r2s2r_cli.stages.plan.robust import Primitive, earned, judged, primitive
+from r2s2r_cli.stages.plan.robust import Primitive, arrived, earned, judged, primitive
 from r2s2r_cli.stages.plan.search import Found, best_of
 
 
@@ -33,6 +33,11 @@ class Judge:
         self.executor, self.reference, self.pairs, self.rest_error_m = executor, reference, pairs, rest_error_m
         self._known: dict[tuple[tuple[str, ...], int], tuple[Outcomes, np.ndarray]] = {}
         self.simulated = 0
+
+    def also_from(self, more: Standing) -> None:
+        """Judge gaits from these robots as well from now on."""
+        self.pairs = stacked([self.pairs, more])
+        self._known.clear()
 
     def __call__(self, gaits: list[Gait], count: int) -> list[tuple[Outcomes, np.ndarray]]:
         """Outcomes and whether the gait came back to rest, over `count` pairs spread evenly, the first included."""
@@ -57,19 +62,26 @@ def chosen(
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, tuple[Primitive, ...]]:  # fmt: skip
     """The best gaits of every behaviour, best first, by their robust score; named `forward-1`, `forward-2` ..."""
-    kept: dict[str, tuple[Primitive, ...]] = {}
+    few = min(settings.first_pairs, len(judge.pairs))
+    finalists: dict[str, list[Gait]] = {}
     for number, (behaviour, reward) in enumerate(rewards.items()):
         gaits = listed[behaviour]
-        few = min(settings.first_pairs, len(judge.pairs))
         first = [earned(reward, came, good) for came, good in judge(gaits, few)]
         order = np.argsort([-(one.mean() - settings.spread * one.std()) for one in first], kind="stable")
-        finalists = [gaits[k] for k in order[: settings.finalists]]
+        finalists[behaviour] = [gaits[k] for k in order[: settings.finalists]]
+        progress(number + 1, 2 * len(rewards))
+    # Within a sequence a gait starts where another ended: from there as well it has to work.
+    leading = [gaits[0] for gaits in finalists.values() if gaits]
+    judge.also_from(arrived(judge.executor, judge.reference, judge.pairs, leading, judge.rest_error_m))
+    kept: dict[str, tuple[Primitive, ...]] = {}
+    for number, (behaviour, reward) in enumerate(rewards.items()):
+        gaits = finalists[behaviour]
         made = [
             primitive("", behaviour, reward, gait, came, good, spread=settings.spread)
-            for gait, (came, good) in zip(finalists, judge(finalists, len(judge.pairs)), strict=True)
+            for gait, (came, good) in zip(gaits, judge(gaits, len(judge.pairs)), strict=True)
         ]
         ranked = sorted(made, key=lambda one: (-one.score, one.gait.key))[: settings.kept]
         short = behaviour.replace(":", ".").rpartition(".")[2]
         kept[behaviour] = tuple(replace(one, name=f"{short}-{k}") for k, one in enumerate(ranked, 1))
-        progress(number + 1, len(rewards))
+        progress(len(rewards) + number + 1, 2 * len(rewards))
     return kept

@@ -6,7 +6,7 @@ environments that end at different times. This is the same loop, tick by tick; f
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 CHUNK = 4096
 """Environments that are simulated together: more is not faster, and takes memory."""
+STALL_S, STALL_M = 0.2, 2e-4
+"""A target whose cables move less than this [m] in that time [s] is not reached any more: a winch is at its end."""
 RESTLESS = 0.01
 """[m/s] a start whose caps still move so fast after settling is none."""
 
@@ -49,6 +51,13 @@ class Standing:
 
         index = torch.as_tensor(np.asarray(rows, dtype=np.int64))
         return Standing(self.s[index], self.line[index], self.draw[index])
+
+
+def stacked(parts: Sequence[Standing]) -> Standing:
+    """Robots of several, one after the other."""
+    import torch
+
+    return Standing(*(torch.cat([getattr(part, name) for part in parts]) for name in ("s", "line", "draw")))
 
 
 @dataclass(frozen=True)
@@ -102,12 +111,13 @@ class Executed:
 class Executor:
     """A robot whose numbers are drawn from a belief. Holds the compiled step.
 
-    draws: values (K, n) of the belief's parameters. timeout_s: a target that takes longer is given up.
+    draws: values (K, n) of the belief's parameters. timeout_s: a target that takes longer is given up. hurried: one
+    that stalls is given up at once, and what comes after it is not simulated; else the timeout of the robot passes.
     """
 
     def __init__(
         self, robot: Robot, belief: Belief, draws: np.ndarray, *, step: float, timeout_s: float | None = None,
-        rod_contact: bool = True, cache_dir: Path | None = None, threads: int = 1,
+        rod_contact: bool = True, hurried: bool = False, cache_dir: Path | None = None, threads: int = 1,
     ) -> None:  # fmt: skip
         import torch
 
@@ -116,7 +126,7 @@ class Executor:
         from r2s2r_cli.engine.rollout import Simulator
         from r2s2r_cli.stages.identify.free import Mapping
 
-        self.robot, self.step = robot, step
+        self.robot, self.step, self.hurried = robot, step, hurried
         structure = replace(structure_of(robot), rod_contact=rod_contact)
         self.mapping = Mapping(robot, belief.frees, belief.effects, fixed=belief.fixed, structure=structure)
         self.structure = self.mapping.structure
@@ -211,11 +221,7 @@ class Executor:
             parts.append(self._run(at.take(rows), goals, counts[rows], record))
         if len(parts) == 1:
             return parts[0]
-        ends = tuple(
-            Standing(torch.cat([p.ends[k].s for p in parts]), torch.cat([p.ends[k].line for p in parts]),
-                     torch.cat([p.ends[k].draw for p in parts]))
-            for k in range(targets.shape[1])
-        )  # fmt: skip
+        ends = tuple(stacked([p.ends[k] for p in parts]) for k in range(targets.shape[1]))
         named = {
             name: np.concatenate([getattr(p, name) for p in parts])
             for name in ("ticks", "given_up", "failed", "counts")
@@ -246,6 +252,7 @@ class Executor:
         theta, p, pid = self._numbers(draw)
         memory, where = pid.start(s.new_zeros(batch, self.structure.n_cables)), start_progress(batch)
         line = self._line(draw, s_line) if delayed else None
+        stall, length_then = max(1, round(STALL_S / self.period)), s.new_zeros(batch, self.structure.n_actuated)
         with torch.no_grad():
             for tick in range(1, steps * (self.timeout + 1) + 1):
                 state = unpack_state(self.structure, s)
@@ -276,13 +283,21 @@ class Executor:
                 if record:
                     kept.append((live[running], s[running], u[running], before[running], done[running]))
                 over = (where.index >= asked) | ~sane
+                if self.hurried and tick % stall == 0:
+                    now = length[:, list(self.structure.actuated)]
+                    still = (torch.where(memory.done, 0.0, now - length_then).abs() < STALL_M).all(dim=1)
+                    stalled = still & (where.elapsed > stall) & ~over
+                    given_up[live[stalled].numpy(), where.index[stalled].numpy()] = True
+                    over, length_then = over | stalled, now
+                if self.hurried:
+                    over = over | moved.timed_out
                 failed[live[~sane].numpy()] = True
                 if bool(over.all()):
                     break
                 if int(over.sum()) * 8 >= len(over):
                     keep = ~over
                     live, s, s_line, draw = live[keep], s[keep], s_line[keep], draw[keep]
-                    goal, asked = goal[keep], asked[keep]
+                    goal, asked, length_then = goal[keep], asked[keep], length_then[keep]
                     theta, p, pid = self._numbers(draw)
                     memory = replace(memory, total=memory.total[keep], previous=memory.previous[keep],
                                      done=memory.done[keep])  # fmt: skip

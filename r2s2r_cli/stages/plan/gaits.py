@@ -94,10 +94,13 @@ def run_gaits(
 ) -> tuple[Outcomes, np.ndarray]:
     """Gait k from robot rows[k] of `at`, all in one call; outcomes, and whether every target was reached, (B,).
 
-    at: robots at rest on the triangle of the reference.
+    at: robots at rest; the gait is relabelled for the triangle that each stands on.
     """
     begun = at.take(rows)
-    run = executor.run(begun, *padded([gait.targets for gait in gaits]))
+    first = seen(executor, begun)
+    element = reference.place(first.caps).element
+    relabelled = [reference.group.elements[k].relabelled(one.targets) for k, one in zip(element, gaits, strict=True)]
+    run = executor.run(begun, *padded(relabelled))
     switched = np.array([gait.switched for gait in gaits])
-    first, last = seen(executor, begun), seen(executor, run.last)
-    return outcomes(reference, first, last, run.total, executor.period, switched), run.sound
+    came = outcomes(reference, first, seen(executor, run.last), run.total, executor.period, switched)
+    return came, run.sound

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from r2s2r_cli.stages.plan.executor import Executor, Standing
+from r2s2r_cli.stages.plan.executor import Executor, Standing, stacked
 from r2s2r_cli.stages.plan.gaits import Seen, padded, seen
 from r2s2r_cli.stages.plan.placement import Reference, wrapped
 from r2s2r_cli.stages.plan.robust import Primitive
@@ -34,7 +34,7 @@ class Walk:
     gaits: names so far; targets: shapes so far, without the last return to rest. bent: the robots before that return,
     last_shape what they have then; rested: after it, com [m] (B, 3) and heading of the principal axis [rad] (B,) there.
     elements: symmetry of the first robot before each gait. saved: targets that smoothing left out; shortcuts: taken.
-    lost: robots that gave a target up.
+    lost: robots that gave a target up. way: x, y [m] and heading [rad] of every robot at the start and after each gait.
     """
 
     bent: Standing
@@ -48,6 +48,7 @@ class Walk:
     elements: list[int] = field(default_factory=list)
     saved: int = 0
     shortcuts: int = 0
+    way: list[np.ndarray] = field(default_factory=list)
 
     @property
     def policy(self) -> np.ndarray:
@@ -74,6 +75,8 @@ def walks(
     pose = seen(executor, start)
     turned_to, none = _heading(pose.caps), np.zeros(len(start), dtype=bool)
     made = [Walk(start, start, pose.com, turned_to, np.ones(motors), none) for _ in sequences]
+    for walk in made:
+        walk.way.append(np.column_stack([pose.com[:, :2], turned_to]))
     for k in range(max(map(len, sequences))):
         going = [(walk, seq[k]) for walk, seq in zip(made, sequences, strict=True) if k < len(seq)]
         _stepped(executor, reference, [walk for walk, _ in going], [one for _, one in going], smooth)
@@ -95,7 +98,7 @@ def _stepped(executor: Executor, reference: Reference, going: list[Walk], gaits:
         for way in ways:
             begun.append(walk.rested if way.whole else walk.bent)
             goals += [way.targets] * len(walk.rested)
-    at = _stacked(begun)
+    at = stacked(begun)
     run = executor.run(at, *padded(goals))
     ended, bent = run.last, run.before_last(1)
     pose = seen(executor, ended)
@@ -117,6 +120,7 @@ def _stepped(executor: Executor, reference: Reference, going: list[Walk], gaits:
         walk.last_shape = way.targets[-2] if len(way.targets) > 1 else walk.last_shape
         walk.bent, walk.rested, walk.com = bent.take(block), ended.take(block), pose.com[block]
         walk.heading = _heading(pose.caps[block])
+        walk.way.append(np.column_stack([walk.com[:, :2], walk.heading]))
         walk.lost = walk.lost | ~run.sound[block]
 
 
@@ -157,9 +161,3 @@ def _heading(p_WE: np.ndarray) -> np.ndarray:
     """Direction of the principal axis over the ground [rad] of poses (B, cap, 3)."""
     axis = principal_axis(p_WE)
     return np.asarray(np.arctan2(axis[:, 1], axis[:, 0]))
-
-
-def _stacked(parts: list[Standing]) -> Standing:
-    import torch
-
-    return Standing(*(torch.cat([getattr(part, name) for part in parts]) for name in ("s", "line", "draw")))

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from r2s2r_cli.stages.plan.executor import Executor, Standing
-from r2s2r_cli.stages.plan.gaits import Gait, run_gaits
+from r2s2r_cli.stages.plan.executor import Executor, Standing, stacked
+from r2s2r_cli.stages.plan.gaits import Gait, padded, run_gaits
 from r2s2r_cli.stages.plan.placement import Reference
 from r2s2r_cli.stages.plan.rewards import Outcomes, Reward
 from schemas.robot import Robot
@@ -57,6 +57,19 @@ def start_poses(executor: Executor, robot: Robot, starts: int, generator: np.ran
         np.repeat(p_WE[None], pairs, axis=0), np.repeat(np.arange(len(executor)), starts),
         np.tile(lengths, (len(executor), 1)),
     )  # fmt: skip
+
+
+def arrived(
+    executor: Executor, reference: Reference, pairs: Standing, gaits: list[Gait], rest_error_m: float
+) -> Standing:
+    """The robots of `pairs` after a gait each, in turn: where a gait within a sequence starts. Those that did not come
+    back to rest stay where they were."""
+    every = [gaits[k % len(gaits)] for k in range(len(pairs))]
+    first = reference.place(executor.caps(pairs)).element
+    targets = [reference.group.elements[k].relabelled(gait.targets) for k, gait in zip(first, every, strict=True)]
+    run = executor.run(pairs, *padded(targets))
+    good = run.sound & (reference.place(executor.caps(run.last)).error < rest_error_m)
+    return stacked([pairs, run.last]).take(np.where(good, len(pairs), 0) + np.arange(len(pairs)))
 
 
 def judged(

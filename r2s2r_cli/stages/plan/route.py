@@ -34,6 +34,10 @@ class Moves:
     def __len__(self) -> int:
         return len(self.yaw)
 
+    def take(self, rows: np.ndarray) -> Moves:
+        """Some of the moves."""
+        return Moves(self.shift[rows], self.yaw[rows], self.element[rows], self.duration[rows], self.after, self.axis)
+
 
 @dataclass(frozen=True)
 class Paths:
@@ -96,6 +100,30 @@ def best_sequences(
     return paths.take(np.arange(min(count, len(paths.yaw))))
 
 
+def different_sequences(moves: Moves, best: Callable[[Moves], Paths | None], most: int) -> list[Paths]:
+    """Up to `most` sequences: the best one, then each time the best without the gait that those before used most."""
+    found: list[Paths] = []
+    allowed = np.arange(len(moves))
+    for _ in range(most):
+        path = best(moves.take(allowed)) if len(allowed) else None
+        if path is None or not path.picks.shape[1]:
+            break
+        picks = allowed[path.picks]
+        found.append(replace(path, picks=picks))
+        allowed = allowed[allowed != np.bincount(picks[0]).argmax()]
+    return found
+
+
+def walked(way: Sequence[np.ndarray]) -> Paths:
+    """What robots did, as paths: x, y [m] and heading [rad] (B, 3) at the start and after each gait."""
+    pose = np.stack(way, axis=1)
+    heading = np.unwrap(pose[..., 2], axis=1)
+    none = np.zeros(len(pose), dtype=int)
+    start = heading[:, :1]
+    flat = turned(pose[..., :2] - pose[:, :1, :2], -start)
+    return Paths(np.zeros((len(pose), len(way) - 1), dtype=int), flat, heading - start, heading[:, -1], none)
+
+
 def straight(paths: Paths) -> np.ndarray:
     """Way from start to end, less what the path strays from the line between them, and the turn of the robot."""
     way = paths.xy[:, -1] - paths.xy[:, 0]
@@ -151,6 +179,12 @@ class Goal:
     within_m: float = 0.1
     within_rad: float = math.radians(20.0)
 
+    def miss(self, paths: Paths) -> np.ndarray:
+        """How far paths end from it, 1 each at the edge of what is near enough in place and in heading, (B,)."""
+        far = np.linalg.norm(paths.xy[:, -1] - np.array(self.xy), axis=1)
+        turn = np.abs(wrapped(paths.heading[:, -1] - self.heading))
+        return np.asarray(far / self.within_m + turn / self.within_rad)
+
 
 CELL_M, CELL_RAD = 0.04, math.radians(10.0)
 """States nearer than this count as one in the search for a way."""
@@ -176,28 +210,27 @@ def way_to(moves: Moves, goal: Goal) -> Paths:
 
     begun = start_paths()
     count, best = 0, (math.inf, begun)
-    far, turn, time = left(begun)
-    queue: list[tuple[float, int, float, Paths]] = [(GREED * float(time[0]), 0, 0.0, begun)]
+    _, _, time = left(begun)
+    queue: list[tuple[float, int, float, Paths, int]] = [(GREED * float(time[0]), 0, 0.0, begun, 0)]
     done: set[tuple[int, ...]] = set()
     while queue and len(done) < NODES:
-        _, _, spent, paths = heapq.heappop(queue)
-        far, turn, _ = left(paths)
-        if far[0] <= goal.within_m and turn[0] <= goal.within_rad:
-            return paths
-        miss = float(far[0] / goal.within_m + turn[0] / goal.within_rad)
-        best = min(best, (miss, paths), key=lambda pair: pair[0])
-        key = _cell(paths)
+        _, _, spent, batch, row = heapq.heappop(queue)
+        paths = batch.take(np.array([row]))
+        (key,) = _cells(paths)
         if key in done:
             continue
         done.add(key)
+        far, turn, _ = left(paths)
+        if far[0] <= goal.within_m and turn[0] <= goal.within_rad:
+            return paths
+        best = min(best, (float(goal.miss(paths)[0]), paths), key=lambda pair: pair[0])
         after = extended(moves, paths)
         _, _, time = left(after)
-        for k in range(len(after.yaw)):
-            one = after.take(np.array([k]))
-            if _cell(one) not in done:
+        for k, cell in enumerate(_cells(after)):
+            if cell not in done:
                 count += 1
                 cost = spent + float(moves.duration[k])
-                heapq.heappush(queue, (cost + GREED * float(time[k]), count, cost, one))
+                heapq.heappush(queue, (cost + GREED * float(time[k]), count, cost, after, k))
     near = best[1]
     raise NumericalError(
         "no sequence of the gaits leads there", where="--to", expected=f"({goal.xy[0]:g}, {goal.xy[1]:g}) m, "
@@ -207,10 +240,10 @@ def way_to(moves: Moves, goal: Goal) -> Paths:
     )  # fmt: skip
 
 
-def _cell(paths: Paths) -> tuple[int, ...]:
-    x, y = paths.xy[0, -1]
-    turn = round(float(wrapped(paths.yaw[0])) / CELL_RAD)
-    return (round(float(x) / CELL_M), round(float(y) / CELL_M), turn, int(paths.element[0]))
+def _cells(paths: Paths) -> list[tuple[int, ...]]:
+    """The cells of the last poses."""
+    place = np.column_stack([paths.xy[:, -1] / CELL_M, wrapped(paths.yaw) / CELL_RAD, paths.element])
+    return [tuple(row) for row in np.round(place).astype(int).tolist()]
 
 
 def without_rare(primitives: Sequence[Primitive], least: float = 0.97) -> list[Primitive]:

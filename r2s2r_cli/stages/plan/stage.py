@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -28,7 +29,18 @@ from r2s2r_cli.stages.plan.long import Walk, walks
 from r2s2r_cli.stages.plan.placement import Reference, reference_of
 from r2s2r_cli.stages.plan.rewards import Reward
 from r2s2r_cli.stages.plan.robust import Primitive, start_poses
-from r2s2r_cli.stages.plan.route import LONG, Goal, Paths, best_sequences, moves_of, way_to, without_rare
+from r2s2r_cli.stages.plan.route import (
+    LONG,
+    Goal,
+    Moves,
+    Paths,
+    best_sequences,
+    different_sequences,
+    moves_of,
+    walked,
+    way_to,
+    without_rare,
+)
 from r2s2r_cli.stages.plan.runs import played, policy_file, run_groups
 from r2s2r_cli.stages.plan.search import Search, SearchSettings
 from r2s2r_cli.stages.plan.symmetry import symmetry_group
@@ -39,6 +51,10 @@ from schemas.robot import Robot
 
 SLOW = 1.5
 """Times the time that the slowest winch takes for its whole range, after which the search gives a target up."""
+SEQUENCES = 4
+"""Sequences of gaits that are tried for each long policy."""
+LOST = -10.0
+"""Worth of a sequence in which the robot gives a target up: less than any other."""
 FEW = 8
 """Pairs of numbers and start poses that long policies are made and judged on."""
 
@@ -101,7 +117,7 @@ def plan(
             finalists=max(settings.kept, settings.candidates // 3), kept=settings.kept, spread=settings.spread
         )
         best = chosen(judge, listed, request.rewards, choice, lambda done, total: progress("judge", done, total))
-        keep(primitives=[_as_json(one) for gaits in best.values() for one in gaits])
+        keep(primitives=[_as_json(one) for gaits in best.values() for one in gaits], pairs=len(judge.pairs))
     primitives = [_from_json(one) for one in saved["primitives"]]
     ways = _ways(world, request, settings, primitives, progress)
     return _concluded(world, request, settings, saved, primitives, ways)
@@ -124,7 +140,9 @@ class _World:
         self.executor = Executor(robot, request.belief, draws, **shared)
         slowest = float(self.executor.theta.speed_in[0].min())
         limit = SLOW * robot.pid.range_m / slowest + float(self.executor.delay[0])
-        self.best = Executor(robot, request.belief, draws[:1], timeout_s=min(limit, robot.pid.step_timeout_s), **shared)
+        self.best = Executor(
+            robot, request.belief, draws[:1], timeout_s=min(limit, robot.pid.step_timeout_s), hurried=True, **shared
+        )
         self.best.simulator = self.executor.simulator
         self.start: Standing = self.best.standing(np.array(robot.rest_caps_m)[None], np.zeros(1, dtype=int))
         self.reference: Reference = reference_of(self.best.caps(self.start)[0], group)
@@ -159,20 +177,48 @@ class _Way:
 def _ways(
     world: _World, request: Request, settings: PlanSettings, primitives: Sequence[Primitive], progress: Progress
 ) -> list[_Way]:
-    """The paper's long gaits and the ways to the goals, made of gaits that can be relied on."""
+    """The paper's long gaits and the ways to the goals, made of gaits that can be relied on.
+
+    Of several sequences for each the one is taken that does best in the simulator, over drawn numbers.
+    """
     fit = without_rare(primitives)
     moves = moves_of(world.reference, fit)
-    paths: dict[str, Paths] = {
-        name: best_sequences(moves, settings.cycles, value, count=1) for name, value in LONG.items()
-    }
-    paths |= {name: way_to(moves, goal) for name, goal in request.goals.items()}
-    paths = {name: path for name, path in paths.items() if path.picks.shape[1]}
-    longest = max((path.picks.shape[1] for path in paths.values()), default=0)
-    made = walks(
-        world.executor, world.reference, world.few, [[fit[k] for k in path.picks[0]] for path in paths.values()],
-        smooth=settings.smooth, progress=lambda done: progress("long policies", done, longest),
-    )  # fmt: skip
-    return [_Way(name, path, walk) for (name, path), walk in zip(paths.items(), made, strict=True)]
+    values: dict[str, Callable[[Paths], np.ndarray]] = dict(LONG)
+    tried: list[tuple[str, Paths]] = []
+    for name, value in LONG.items():
+        best = partial(best_sequences, length=settings.cycles, value=value, count=1)
+        tried += [(name, path) for path in different_sequences(moves, best, SEQUENCES)]
+    for name, goal in request.goals.items():
+        way_to(moves, goal)  # raises where there is none at all
+        values[name] = partial(_near, goal)
+        tried += [(name, path) for path in different_sequences(moves, partial(_way_or_none, goal), SEQUENCES)]
+    longest = max((path.picks.shape[1] for _, path in tried), default=0)
+
+    def walked_along(paths: list[tuple[str, Paths]], *, smooth: bool, part: str) -> list[Walk]:
+        sequences = [[fit[k] for k in path.picks[0]] for _, path in paths]
+        return walks(world.executor, world.reference, world.few, sequences, smooth=smooth,
+                     progress=lambda done: progress(part, done, longest))  # fmt: skip
+
+    score: dict[str, tuple[float, Paths]] = {}
+    for (name, path), walk in zip(tried, walked_along(tried, smooth=False, part="sequences"), strict=True):
+        worth = np.where(walk.lost, LOST, values[name](walked(walk.way)))
+        one = float(worth.mean() - settings.spread * worth.std())
+        if name not in score or one > score[name][0]:
+            score[name] = one, path
+    chosen_paths = [(name, path) for name, (_, path) in score.items()]
+    made = walked_along(chosen_paths, smooth=settings.smooth, part="long policies")
+    return [_Way(name, path, walk) for (name, path), walk in zip(chosen_paths, made, strict=True)]
+
+
+def _near(goal: Goal, paths: Paths) -> np.ndarray:
+    return -goal.miss(paths)
+
+
+def _way_or_none(goal: Goal, moves: Moves) -> Paths | None:
+    try:
+        return way_to(moves, goal)
+    except NumericalError:
+        return None
 
 
 def _concluded(
@@ -206,7 +252,7 @@ def _concluded(
     }  # fmt: skip
     report = PlanReport(
         numbers=request.belief.words, identified=request.belief.identified,
-        symmetries=len(world.reference.group), draws=settings.draws, starts=settings.starts,
+        symmetries=len(world.reference.group), draws=settings.draws, pairs=int(saved["pairs"]),
         gaits=tuple(map(gait_figures, primitives)), policies=tuple(map(policy_figures, policies)),
         computed_by="torch" if world.best.computed_by_torch else "machine code",
         warnings=tuple(_warnings(world, request, settings, primitives, policies)),

@@ -26,7 +26,7 @@ def verdict(report: IdentifyReport) -> str:
     if held is None:
         return f"{told} Nothing was held out: how well it predicts is not known."
     known = {name: b.keyframe_cap_rmse_m for name, b in held.baselines.items() if b.keyframe_cap_rmse_m is not None}
-    rivals = ", ".join(f"{name} {millimetres(error)}" for name, error in known.items())
+    rivals = ", ".join(f"{name} {millimetres(error)}{_of_them(name, report)}" for name, error in known.items())
     count = sum(segment.role == "test" for segment in report.segments)
     floor = "not known" if held.floor_m is None else f"{millimetres(held.floor_m)} mm"
     error = f"{millimetres(held.keyframe_cap_rmse_m)} mm{spread(held.intervals.keyframe_cap_rmse_m)}"
@@ -105,7 +105,7 @@ def _errors(report: IdentifyReport) -> PageTable:
         rows.append(["identified, held out", key, "-", *free])
         for name, one in held.baselines.items():
             key, *free = _three(one)
-            rows.append([f"{name}, held out", key, _against(name, one, report), *free])
+            rows.append([f"{name}, held out{_of_them(name, report)}", key, _against(name, one, report), *free])
         rows.append(["floor", millimetres(held.floor_m), "-", "-", "-"])
     return PageTable("errors of the end caps (95 % interval by bootstrap over segments)", columns, rows)
 
@@ -126,6 +126,13 @@ def _against(name: str, one: Baseline, report: IdentifyReport) -> str:
     better = sum(ours < theirs for ours, theirs in known)
     undecided = " (undecided)" if _open(one) else ""
     return f"{millimetres(ends[0])} .. {millimetres(ends[1])}{undecided}, better in {better} of {len(known)}"
+
+
+def _of_them(name: str, report: IdentifyReport) -> str:
+    """` (1 of 2 segments)` where a rival predicts fewer than were held out; else nothing."""
+    held = [segment for segment in report.segments if segment.role == "test"]
+    count = sum(segment.baselines.get(name) is not None for segment in held)
+    return f" ({count} of {len(held)} segments)" if 0 < count < len(held) else ""
 
 
 def _open(one: Baseline) -> bool:

@@ -122,6 +122,23 @@ def test_an_interval_that_holds_zero_is_undecided() -> None:
     assert verdict(said).endswith(" Not decided against: nominal.")
 
 
+def test_a_rival_of_fewer_segments_says_so() -> None:
+    """A rival that one of two held-out segments knows: with its count in the table and in the verdict."""
+    said = report(builders.identification())
+    test = next(one for one in said.segments if one.role == "test")
+    other = test.model_copy(update={"interval": test.interval + 1, "baselines": {}})
+    said = said.model_copy(update={"segments": (*said.segments, other)})
+    rows = next(table for table in report_tables(said) if table.title.startswith("errors")).rows
+    assert any(row[0] == "nothing moves, held out (1 of 2 segments)" for row in rows)
+    assert "nothing moves 48.0 (1 of 2 segments)" in verdict(said)
+
+
+def test_the_paper_method_speaks_of_no_determination() -> None:
+    """It is the method that gives no uncertainty; the runs say nothing either way."""
+    said = report(builders.identification()).model_copy(update={"method": "paper"})
+    assert verdict(said).startswith("The method gives no uncertainty")
+
+
 def test_an_endless_interval_does_not_hide_the_others() -> None:
     """A parameter that is off by a factor of a million leaves the picture drawable."""
     data = changed("parameters", "upper", np.array([0.82, 1e6, np.nan, np.nan]))

@@ -102,26 +102,31 @@ def _with(free: Free, spec: Spec, text: str) -> Free:
     range_of = f"{made.lower:g} to {made.upper:g}{unit}"
     possible = f"{free.lower:g} to {free.upper:g}{unit}"
     if not all(math.isfinite(value) for value in (made.start, made.lower, made.upper)):
-        raise _contradiction(free, "a start or bound is no finite number", text, expected="finite numbers")
+        raise _contradiction(free, made, "a start or bound is no finite number", text, expected="finite numbers")
     if not made.lower < made.upper:
-        raise _contradiction(free, "the lower bound is not below the upper", text, expected="LOWER below UPPER")
+        raise _contradiction(free, made, "the lower bound is not below the upper", text, expected="LOWER below UPPER")
     lowest = 0.0 if free.coordinate is not Coordinate.LINEAR or free.lower >= 0 else -math.inf
     highest = 1.0 if free.coordinate is Coordinate.LOGIT else math.inf
     if made.lower < lowest or made.upper > highest:
-        raise _contradiction(free, "a bound is beyond what the number can be", text, expected=possible)
+        raise _contradiction(free, made, "a bound is beyond what the number can be", text, expected=possible)
     if made.start in (made.lower, made.upper):
-        raise _contradiction(free, "the start lies on a bound", text, expected=f"strictly inside {range_of}")
+        raise _contradiction(free, made, "the start lies on a bound", text, expected=f"strictly inside {range_of}")
     if not made.lower < made.start < made.upper:
-        raise _contradiction(free, "the start is outside the bounds", text, expected=f"inside {range_of}")
+        raise _contradiction(free, made, "the start is outside the bounds", text, expected=f"inside {range_of}")
     if not made.prior_sd > 0:
-        raise _contradiction(free, "a prior needs a width", text, expected="~SD above 0, or ~inf for none")
+        raise _contradiction(free, made, "a prior needs a width", text, expected="~SD above 0, or ~inf for none")
     return made
 
 
-def _contradiction(free: Free, what: str, text: str, *, expected: str) -> InputError:
+def _contradiction(free: Free, made: Free, what: str, text: str, *, expected: str) -> InputError:
+    """made: what was asked for; of that stays in the hint what can."""
+    low, high = (end if free.lower <= end <= free.upper else own
+                 for end, own in ((made.lower, free.lower), (made.upper, free.upper)))  # fmt: skip
+    low, high = (low, high) if low < high else (high, low) if high < low else (free.lower, free.upper)
+    start = next((one for one in (made.start, free.start) if low < one < high), 0.5 * (low + high))
     return InputError(
         f"{free.name}: {what}", where=f"--free {text}", expected=expected, received=text,
-        hint=f"r2s2r identify --free {free.name}={free.start:g},{free.lower:g}..{free.upper:g}",
+        hint=f"r2s2r identify --free {free.name}={start:g},{low:g}..{high:g}",
     )  # fmt: skip
 
 

@@ -114,24 +114,27 @@ class BallFitter:
         self.swell_px, self.swell_sd_px = swell_px, swell_sd_px
 
     def place(
-        self, patch: Patch, told: np.ndarray, hidden: np.ndarray, center: np.ndarray, radius: float, reach_px: float
+        self,
+        patch: Patch,
+        told: np.ndarray,
+        about: Patch,
+        hidden: np.ndarray,
+        center: np.ndarray,
+        radius: float,
+        reach_px: float,
     ) -> np.ndarray:
         """A start within a pixel [m] (3,): `center`, moved to where the colour fits what should be seen.
 
-        told: pixels whose colour tells something. hidden: pixels where something is before the ball if it is at
-        `center`; it moves with the ball, as the rod behind it does. Both bool (v, u). reach_px: three standard
-        deviations of the prediction; it moves no farther, and of two places that fit equally well to the nearer. The
-        distance stays.
+        told: pixels of the patch whose colour tells something. about: the part of the patch that a ball at `center`
+        covers; hidden: its pixels where something is before that ball; it moves with the ball, as the rod behind it
+        does. Both bool (v, u). reach_px: three standard deviations of the prediction; the start is no farther off, and
+        of two places that fit equally well it is the nearer. The distance stays.
         """
         import cv2
 
-        disc = _Disc.of(center, radius, patch.x, patch.y)
+        disc = _Disc.of(center, radius, about.x, about.y)
         model = np.clip(0.5 + (disc.rim + self.swell_px / self.f - disc.rho) * self.f, 0.0, 1.0) * ~hidden
-        rows, columns = (np.nonzero((disc.rho * self.f < disc.rim * self.f + 2.0).any(axis=axis))[0] for axis in (1, 0))
-        if not len(rows):
-            return center
-        v0, v1, u0, u1 = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
-        template = model[v0:v1, u0:u1].astype(np.float32)
+        template, v0, u0 = model.astype(np.float32), about.v0 - patch.v0, about.u0 - patch.u0
         # A border of nothing: a ball may lie half outside of the patch.
         pad = max(template.shape) // 2
 

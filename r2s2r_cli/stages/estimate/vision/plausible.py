@@ -56,7 +56,7 @@ def check_lengths(lengths: Sequence[float]) -> str | None:
             hint="r2s2r doctor camera --camera realsense",
         )
     if abs(off) > LENGTH_WARNS + 3 * spread:
-        return f"the rods look {100 * abs(off):.1f} % {way} than in robot.toml: focal length or depth unit are a little off"
+        return f"rods look {100 * abs(off):.1f} % {way} than in robot.toml: focal length or depth unit are a little off"
     return None
 
 

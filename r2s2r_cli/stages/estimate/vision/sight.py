@@ -45,7 +45,7 @@ STRAY_PX = 2.0
 """A fit that ends farther outside of where it was looked for has gone to something else."""
 EDGE_PX = 0.7
 """What hides a cap is taken for larger by this: pixels on its edge may be of either."""
-MOVED_PX = 1.0
+MOVED_PX = 2.0
 """A prediction that was wrong by more: what hides what is worked out again from what was seen."""
 LOW_M = 0.015
 """A cap's centre is its radius above the ground; lower than that by this and its uncertainty, it is no cap."""
@@ -192,10 +192,7 @@ class Sighter:
         margin = np.minimum(sd / np.sqrt(3.0), 0.01) + EDGE_PX * center[2] / self._f
         margin[cap] = EDGE_PX * center[2] / self._f
         far = max(GATE_SD * float(sd[cap]), REACH_M) + FAR_SD * float(self._noise_sd(center[2])) + radius
-        hidden = self._hidden(patch, p_C, cap, 0.0 * margin)
-        told = ~in_front(patch, np.full_like(patch.z, center[2] - radius), self._noise_sd(center[2]))
-        told &= ~self._twin(patch, p_C, cap, margin)
-        start = self._fitter.place(patch, told, hidden, center, radius, spare)
+        start = self._start(patch, p_C, cap, margin, spare)
         start = start * (self._distance(patch, start, radius, far) / start[2])
         close = self._patch_about(patch, start, 1.2 * disc_px + 6.0)
         if close is None:
@@ -203,15 +200,16 @@ class Sighter:
         patch = close
         moved = p_C.copy()
         moved[cap] = start
-        model = self._hidden(patch, moved, cap, margin)
         own = ball_depth(patch.x, patch.y, start, radius)
         z_cap = np.where(np.isfinite(own), own, start[2])
+        model = self._body.nearest(patch.x, patch.y, moved, cap, margin) < z_cap
         valid = ~(model | in_front(patch, z_cap, self._noise_sd(z_cap)))
         seen = moved_by(patch.colored & valid, self.survey.shift_px)
         seen &= np.abs(patch.z - center[2]) < far
         twin = self._twin(patch, moved, cap, margin)
-        patch = replace(patch, colored=patch.colored & ~twin)
-        fit = self._fitter.fit(patch, valid & ~twin, seen, start, radius,
+        if twin is not None:
+            patch, valid = replace(patch, colored=patch.colored & ~twin), valid & ~twin
+        fit = self._fitter.fit(patch, valid, seen, start, radius,
                                far=float(np.linalg.norm(center)), far_sd=max(float(sd[cap]), FAR_SD_M))  # fmt: skip
         if self._px(fit.center - center, center) > spare + STRAY_PX:
             return Seen(DOUBTFUL)
@@ -221,18 +219,31 @@ class Sighter:
         """Of depths z [m]."""
         return np.asarray(np.square(z) * self.survey.noise.sd)
 
-    def _hidden(self, patch: Patch, p_C: np.ndarray, cap: int, margin: np.ndarray) -> np.ndarray:
-        """Pixels where a part of the robot is before a cap, or before the plane of its rim beside it, bool (v, u)."""
-        z = self._body.nearest(patch.x, patch.y, p_C, cap, margin)
-        own = ball_depth(patch.x, patch.y, p_C[cap], float(self.cap_radius[cap]))
-        return np.asarray(z < np.where(np.isfinite(own), own, p_C[cap, 2]))
+    def _start(self, patch: Patch, p_C: np.ndarray, cap: int, margin: np.ndarray, reach_px: float) -> np.ndarray:
+        """Where the colour fits best what should be seen of a cap, at the predicted distance [m] (3,)."""
+        center, radius = p_C[cap], float(self.cap_radius[cap])
+        about = self._patch_about(patch, center, 1.1 * self._f * radius / center[2] + 2.0)
+        if about is None:
+            return center
+        own = ball_depth(about.x, about.y, center, radius)
+        hidden = self._body.nearest(about.x, about.y, p_C, cap, 0.0 * margin) < np.where(
+            np.isfinite(own), own, center[2]
+        )
+        told = ~in_front(patch, np.full_like(patch.z, center[2] - radius), self._noise_sd(center[2]))
+        twin = self._twin(patch, p_C, cap, margin)
+        return self._fitter.place(
+            patch, told if twin is None else told & ~twin, about, hidden, center, radius, reach_px
+        )
 
-    def _twin(self, patch: Patch, p_C: np.ndarray, cap: int, margin: np.ndarray) -> np.ndarray:
-        """Pixels beside a cap, or before it, that may show its rod's other cap, which has its colour. Bool (v, u)."""
-        twin = cap ^ 1
-        center, radius = p_C[twin], float(self.cap_radius[twin] + margin[twin])
+    def _twin(self, patch: Patch, p_C: np.ndarray, cap: int, margin: np.ndarray) -> np.ndarray | None:
+        """Pixels beside a cap, or before it, that may show its rod's other cap, which has its colour; None: none."""
+        center, radius = p_C[cap ^ 1], float(self.cap_radius[cap ^ 1] + margin[cap ^ 1])
         if not center[2] > 2 * radius:
-            return np.zeros(patch.x.shape, dtype=bool)
+            return None
+        u, v = self.lens.project(center) - (patch.u0, patch.v0)
+        reach, (high, wide) = 1.3 * self._f * radius / center[2], patch.x.shape
+        if not (-reach < u < wide + reach and -reach < v < high + reach):
+            return None
         z = ball_depth(patch.x, patch.y, center, radius)
         own = ball_depth(patch.x, patch.y, p_C[cap], float(self.cap_radius[cap]))
         return np.asarray(np.isfinite(z) & ~(own < z))

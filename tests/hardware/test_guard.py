@@ -247,7 +247,7 @@ def test_a_host_that_was_held_up_is_not_a_robot_that_fell_silent() -> None:
                     link.read(TICK)
                 link.command(np.zeros(6))
             else:
-                with pytest.raises(SafetyStop, match="cable 3, 4, 5 .* any board .*; this machine itself"):
+                with pytest.raises(SafetyStop, match=r"cable 3, 4, 5 .* any board .*; this machine itself"):
                     drive(link, 2.0, 0.0)
     inner = Clockwork()
     with GuardedLink(inner, calibrated()) as link, pytest.raises(SafetyStop, match="no good reading"):

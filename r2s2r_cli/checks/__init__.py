@@ -45,7 +45,7 @@ CHECKS: tuple[Check, ...] = (
     motion.contacts_near_ground, motion.lengths_match_caps,
     estimates.covariances_are_valid, estimates.deviations_are_positive, estimates.probabilities_in_range,
     estimates.ground_normal_is_unit, estimates.roll_is_not_invented, estimates.caps_well_observed,
-    estimates.noise_as_assumed,
+    estimates.noise_as_assumed, estimates.seldom_lost, estimates.sensors_agree_with_camera,
     identifications.identification_tables_fit, identifications.identification_rows_unique,
     identifications.identified_values_inside, identifications.identified_deviations_honest,
     identifications.identified_covariance_valid, identifications.identified_within_bounds,

@@ -17,6 +17,10 @@ UNIT_TOLERANCE = 1e-6
 ALONG_ROD_RAD_PER_S = 1e-6
 UNUSED_SHARE = 0.2
 """A cap that was not used in every fifth frame was hardly seen: its track is largely the smoother's guess."""
+LOST_SHARE = 0.05
+"""Lost for one moment is what a tumble does; for longer, the run is a guess there."""
+_LOST = 8
+"""Bit of `frames/mode`."""
 _USED = (0, 3)
 """Codes of `quality` for observations that were used."""
 _KINDS = ("estimate",)
@@ -166,3 +170,40 @@ def noise_as_assumed(run: Run) -> Iterator[Found]:
         if (off > 0).any():
             yield Found(run.at("tracks", "innovation_variance"), "the noise is not as large as was assumed", "0.5 .. 2",
                         worst(ratio, off, ("cap",)))  # fmt: skip
+
+
+@check(
+    "warning",
+    Run,
+    kinds=_KINDS,
+    what="the robot is lost in at most one frame of twenty",
+    why="where some cap is less certain than 30 mm the state is what cables and rods allow, no observation",
+    fix="look at frames/mode and the overlay: what hides the robot, its light, the view of the camera",
+)
+def seldom_lost(run: Run) -> Iterator[Found]:
+    """Camera runs that were mostly guessed."""
+    mode = run.array("frames", "mode")
+    if mode is None or not len(mode):
+        return
+    lost = float(np.mean((mode & _LOST) > 0))
+    if lost > LOST_SHARE:
+        yield Found(run.at("frames", "mode"), "the robot was lost for a time",
+                    f"at most {100 * LOST_SHARE:g} % of the frames", f"{100 * lost:.3g} %")  # fmt: skip
+
+
+@check(
+    "advice",
+    Run,
+    kinds=_KINDS,
+    what="no cable sensor contradicts the camera",
+    why="a sensor that is not used does not help where caps are hidden; the controller of the robot used it all the same",
+    fix="r2s2r calibrate with a new table of that sensor, or look at its cable and its chip",
+)
+def sensors_agree_with_camera(run: Run) -> Iterator[Found]:
+    """Sensors that the tracker left out."""
+    dead, cable = run.array("sensor_fit", "dead"), run.array("frames", "sensor_cable")
+    if dead is None or not dead.any():
+        return
+    named = np.flatnonzero(dead) if cable is None or len(cable) != len(dead) else cable[dead]
+    yield Found(run.at("sensor_fit", "dead"), "cable sensors were not used: they contradict what was seen, or are silent",
+                "every sensor used", "not that of cable " + ", ".join(map(str, named.tolist())))  # fmt: skip

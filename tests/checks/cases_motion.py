@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from r2s2r_cli.artifact import Group
@@ -12,6 +14,13 @@ from tests.support.check_subjects import edited, estimate, put, recording, simul
 
 def _scaled(run: Run, path: str, factor: float) -> Run:
     return edited(run, path, lambda array: array.__imul__(factor))
+
+
+def _with(run: Run, stream: str, **datasets: np.ndarray) -> Run:
+    """The run with more datasets, of camera images."""
+    group = run.streams.get(stream, Group())
+    made = Group({**group.datasets, **datasets}, group.attributes)
+    return dataclasses.replace(run, streams={**run.streams, stream: made})
 
 
 def _swapped_order(run: Run) -> Run:
@@ -239,6 +248,23 @@ FAILS: tuple[Case, ...] = (
         ),
     ),
     Case(
+        "seldom_lost",
+        lambda: _with(estimate(), "frames", mode=np.array([8, 0, 0, 10, 2, 0], np.uint8)),
+        (("runs/a/frames/mode", "the robot was lost for a time", "at most 5 % of the frames", "33.3 %"),),
+    ),
+    Case(
+        "sensors_agree_with_camera",
+        lambda: _with(estimate(), "sensor_fit", dead=np.array([False, True, False, True])),
+        (
+            (
+                "runs/a/sensor_fit/dead",
+                "cable sensors were not used: they contradict what was seen, or are silent",
+                "every sensor used",
+                "not that of cable 1, 3",
+            ),
+        ),
+    ),
+    Case(
         "cables_never_push",
         lambda: edited(simulation(), "frames/tension", put((3, 7), -2.5)),
         (("runs/a/frames/tension", "a cable pushes", "a tension of 0 N or more", "-2.5 N at frame 3, cable 7"),),
@@ -267,6 +293,9 @@ EDGES: tuple[Edge, ...] = (
     ),
     Edge("caps_well_observed", "a jump was used", lambda: edited(estimate(), "frames/quality", put(slice(None), 3))),
     Edge("caps_well_observed", "no frames", lambda: edited(estimate(), "frames/quality", np.zeros((0, 6), np.uint8))),
+    Edge("seldom_lost", "hidden is not lost", lambda: _with(estimate(), "frames", mode=np.full(6, 7, np.uint8))),
+    Edge("seldom_lost", "no frames", lambda: _with(estimate(), "frames", mode=np.zeros(0, np.uint8))),
+    Edge("sensors_agree_with_camera", "all used", lambda: _with(estimate(), "sensor_fit", dead=np.zeros(9, bool))),
     Edge("cables_never_push", "rounding", lambda: edited(simulation(), "frames/tension", put((3, 7), -1e-12))),
     Edge("step_fits_frames", "one step a frame", lambda: edited(simulation(), "@step", 0.1)),
     Edge("rods_are_rigid", "no caps", lambda: Run("estimate", "a", {"frames": Group()})),

@@ -196,7 +196,7 @@ def seldom_lost(run: Run) -> Iterator[Found]:
     Run,
     kinds=_KINDS,
     what="no cable sensor contradicts the camera",
-    why="a sensor that is not used does not help where caps are hidden; the controller of the robot used it all the same",
+    why="a sensor that is not used does not help where caps are hidden; the robot's controller used it all the same",
     fix="r2s2r calibrate with a new table of that sensor, or look at its cable and its chip",
 )
 def sensors_agree_with_camera(run: Run) -> Iterator[Found]:
@@ -205,5 +205,6 @@ def sensors_agree_with_camera(run: Run) -> Iterator[Found]:
     if dead is None or not dead.any():
         return
     named = np.flatnonzero(dead) if cable is None or len(cable) != len(dead) else cable[dead]
-    yield Found(run.at("sensor_fit", "dead"), "cable sensors were not used: they contradict what was seen, or are silent",
-                "every sensor used", "not that of cable " + ", ".join(map(str, named.tolist())))  # fmt: skip
+    what = "cable sensors were not used: they contradict what was seen, or are silent"
+    yield Found(run.at("sensor_fit", "dead"), what, "every sensor used",
+                "not that of cable " + ", ".join(map(str, named.tolist())))  # fmt: skip

@@ -198,8 +198,10 @@ def way_to(moves: Moves, goal: Goal) -> Paths:
 
     Raises NumericalError where none comes near the goal within NODES poses, with the nearest.
     """
-    speed = float((np.linalg.norm(moves.shift, axis=1) / moves.duration).max())
-    rate = float((np.abs(wrapped(moves.yaw + moves.axis[moves.element] - moves.axis[0])) / moves.duration).max())
+    turn_by = np.abs(wrapped(moves.yaw + moves.axis[moves.element] - moves.axis[0]))
+    # Of a robot that cannot turn, or cannot travel, no time is foretold for that.
+    speed = float((np.linalg.norm(moves.shift, axis=1) / moves.duration).max()) or math.inf
+    rate = float((turn_by / moves.duration).max()) or math.inf
     target = np.array(goal.xy)
 
     def left(paths: Paths) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -250,5 +252,7 @@ def without_rare(primitives: Sequence[Primitive], least: float = 0.97) -> list[P
     """Primitives fit for sequences: they come back to rest, on one and the same triangle, nearly always; each gait
     once. Where none is, all."""
     fit = [one for one in primitives if one.worked >= least and one.same_element >= least] or list(primitives)
-    once = {one.gait.key: one for one in reversed(fit)}
-    return [replace(one) for one in fit if once[one.gait.key] is one]
+    once: dict[tuple[str, ...], Primitive] = {}
+    for one in fit:
+        once.setdefault(one.gait.key, one)
+    return list(once.values())

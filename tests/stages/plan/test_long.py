@@ -1,0 +1,62 @@
+"""Long policies in the engine: gaits relabelled for where the robot has come to, and shortcuts that keep the end."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from r2s2r_cli.stages.plan.gaits import Gait, run_gaits, seen
+from r2s2r_cli.stages.plan.long import walks
+from r2s2r_cli.stages.plan.robust import Primitive
+from r2s2r_cli.stages.plan.route import walked
+from r2s2r_cli.stages.plan.runs import played, policy_file, run_groups
+from tests.stages.plan.test_search import bench
+from tests.support.robots import subject
+
+FORWARD = ("101011", "001010", "111111")
+"""A gait of the paper's robot that rolls it a third about its principal axis."""
+
+
+def forward() -> Primitive:
+    """That gait as a primitive."""
+    targets = np.array([[float(digit) for digit in shape] for shape in FORWARD])
+    zero = np.zeros(3)
+    return Primitive("forward-1", "forward", Gait(targets), 0, 0, 0, 0, 1.0, zero, zero, 4, 1.0, 4.2)
+
+
+def test_a_gait_relabelled_for_another_triangle_does_the_same() -> None:
+    """From where the gait has brought it the robot does it again, relabelled: the same way forward, another third of
+    a turn about its axis."""
+    executor, reference, at = bench()
+    gait = forward().gait
+    first, sound = run_gaits(executor, reference, at, [gait], np.zeros(1, dtype=int))
+    moved = executor.run(at, gait.targets[None]).last
+    again, sound_too = run_gaits(executor, reference, moved, [gait], np.zeros(1, dtype=int))
+    assert sound.all() and sound_too.all() and first.element[0] == again.element[0] != 0
+    assert first.com[0, 1] > 0.2 and np.allclose(first.com[0], again.com[0], atol=0.03)
+
+
+def test_long_policies_go_on_where_the_robot_is() -> None:
+    """Three gaits without smoothing are the gait, relabelled by the powers of its symmetry, returns to rest included;
+    smoothed the policy is shorter, ends on the same triangle and comes as far. What was walked is what the policy does
+    when it is run whole, and what the stored run of it shows."""
+    executor, reference, at = bench()
+    gait = forward()
+    (plain,) = walks(executor, reference, at, [[gait] * 3], smooth=False)
+    (short,) = walks(executor, reference, at, [[gait] * 3])
+    group, power, expected = reference.group, 0, []
+    for _ in range(3):
+        expected.append(group.elements[power].relabelled(gait.gait.targets))
+        power = group.product(gait.element, power)
+    assert np.array_equal(plain.policy, np.concatenate(expected)) and plain.elements == [0, 4, 2]
+    assert (plain.shortcuts, short.shortcuts) == (0, 2) and len(short.policy) == len(plain.policy) - short.saved
+    far = [walked(walk.way).xy[0, -1] for walk in (plain, short)]
+    assert np.linalg.norm(far[0]) > 0.6 and np.linalg.norm(far[1]) > 0.75 * np.linalg.norm(far[0])
+    files = [policy_file(subject().robot, name, "", walk.policy) for name, walk in (("a", plain), ("b", short))]
+    runs = played(executor, reference, at, files)
+    groups = run_groups(executor, subject().robot, at, runs)
+    for walk, run, name in zip((plain, short), runs, "ab", strict=True):
+        assert run.sound.all() and run.came.element[0] == power
+        p_WE = groups[f"runs/{name}/frames"]["p_WE"]
+        assert np.allclose(p_WE[-1], executor.caps(walk.rested)[0], atol=1e-9)
+        assert np.allclose(p_WE[0], seen(executor, at).caps[0])
+        assert np.array_equal(groups[f"runs/{name}/intervals"]["target"], walk.policy)

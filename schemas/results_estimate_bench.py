@@ -39,6 +39,9 @@ class TrackScore(Frozen):
     recovery_s: float | None
     """Time from the end of blindness until no cap is more than 2 cm off any more. None: never blind."""
     frames_per_s: float
+    """By the clock on the wall: of a machine that does other things as well, less."""
+    cpu_ms: float
+    """Processor time a frame, all threads together, reading and decoding included."""
     memory_mb: float
     """By which the process grew while it tracked."""
 

@@ -110,15 +110,15 @@ def _tracked(case: Case) -> Errors | str:
         del part, done, total, word
         most = max(most, _resident_mb())
 
-    clock = time.perf_counter()
+    clock, busy = time.perf_counter(), time.process_time()
     try:
         state = tracked_run("case", case.streams, case.frames, case.robot, EstimateSettings(), show=watch)
     except R2S2RError as error:
         return str(error).splitlines()[0]
-    wall = time.perf_counter() - clock
+    wall, busy = time.perf_counter() - clock, time.process_time() - busy
     root = "runs/case"
     groups = {path[len(root) + 1 :]: group for path, group in run_groups(state).items()}
-    return errors_of(case, groups, wall_s=wall, memory_mb=most - before)
+    return errors_of(case, groups, wall_s=wall, cpu_s=busy, memory_mb=most - before)
 
 
 def _resident_mb() -> float:
@@ -133,7 +133,7 @@ def _print(result: EstimateBenchResult, console: Console) -> None:
     console.table(
         f"{result.robot}, runs of {result.run_s:g} s, seeds {', '.join(map(str, result.seeds))} ({result.machine})",
         ["case", "cap mean / p95 / max mm", "rod mm", "axis deg (p95)", "2 cm 5 deg", "CoM mm", "in 95 %", "lost",
-         "contact F1", "delay ms", "sensor mm", "back s", "frames/s", "MB"],
+         "contact F1", "delay ms", "sensor mm", "back s", "frames/s", "CPU ms", "MB"],
         [[name, *_row(case.all_)] for name, case in result.cases.items()],
     )  # fmt: skip
     for name, case in result.cases.items():
@@ -145,13 +145,14 @@ def _print(result: EstimateBenchResult, console: Console) -> None:
 
 def _row(score: TrackScore | None) -> list[str]:
     if score is None:
-        return ["failed", *[""] * 12]
+        return ["failed", *[""] * 13]
     return [
         f"{score.cap_mean_mm:.2f} / {score.cap_p95_mm:.1f} / {score.cap_max_mm:.0f}", f"{score.rod_mean_mm:.2f}",
         f"{score.axis_mean_deg:.2f} ({score.axis_p95_deg:.2f})", f"{100 * score.within:.2f} %",
         f"{score.com_mean_mm:.2f}", f"{100 * score.covered:.1f} %", f"{100 * score.lost:.1f} %",
         _number(score.contact_f1, 3), _number(score.delay_error_ms, 1), _number(score.sensor_error_mm, 2),
-        _number(score.recovery_s, 2), f"{score.frames_per_s:.1f}", f"{score.memory_mb:.0f}",
+        _number(score.recovery_s, 2), f"{score.frames_per_s:.1f}", f"{score.cpu_ms:.0f}",
+        f"{score.memory_mb:.0f}",
     ]  # fmt: skip
 
 

@@ -41,10 +41,11 @@ class Errors:
     sensor_m: float | None
     recovery_s: float | None
     wall_s: float
+    cpu_s: float
     memory_mb: float
 
 
-def errors_of(case: Case, groups: Mapping[str, Group], *, wall_s: float, memory_mb: float) -> Errors:
+def errors_of(case: Case, groups: Mapping[str, Group], *, wall_s: float, cpu_s: float, memory_mb: float) -> Errors:
     """groups: of the estimate, by stream. Estimates are taken to the camera by their own X_WC, and from there to the
     rig's world by the true one, because where x and y of an estimate's world lie is a choice."""
     frames, truth = groups["frames"], case.truth
@@ -64,7 +65,8 @@ def errors_of(case: Case, groups: Mapping[str, Group], *, wall_s: float, memory_
         com=np.linalg.norm(_centre(p_WE, case.robot) - _centre(true, case.robot), axis=-1), squared=squared,
         contact=frames["contact"], touching=force, counted=force | ~near, delay_s=_delay(groups, truth),
         sensor_m=_sensor(frames, groups, truth, rows),
-        recovery_s=_recovery(frames["t"], cap, truth.blind[rows]), wall_s=wall_s, memory_mb=memory_mb,
+        recovery_s=_recovery(frames["t"], cap, truth.blind[rows]), wall_s=wall_s, cpu_s=cpu_s,
+        memory_mb=memory_mb,
     )  # fmt: skip
 
 
@@ -89,7 +91,8 @@ def summed_up(runs: Sequence[Errors]) -> TrackScore:
         delay_error_ms=1e3 * max(delays) if delays else None,
         sensor_error_mm=1e3 * float(np.mean(sensors)) if sensors else None,
         recovery_s=max(recoveries) if recoveries else None,
-        frames_per_s=len(cap) / sum(run.wall_s for run in runs), memory_mb=max(run.memory_mb for run in runs),
+        frames_per_s=len(cap) / sum(run.wall_s for run in runs),
+        cpu_ms=1e3 * sum(run.cpu_s for run in runs) / len(cap), memory_mb=max(run.memory_mb for run in runs),
     )  # fmt: skip
 
 

@@ -43,7 +43,7 @@ def scored(true: SimpleNamespace, p_WE: np.ndarray, cov: np.ndarray, world: np.n
         "contact": true.force > 0.5,
     })  # fmt: skip
     groups = {"frames": frames, "camera": Group({"X_WC": world @ true.X_WC})}
-    return errors_of(SimpleNamespace(truth=true, robot=ROBOT), groups, wall_s=1.0, memory_mb=0.0)
+    return errors_of(SimpleNamespace(truth=true, robot=ROBOT), groups, wall_s=1.0, cpu_s=1.0, memory_mb=0.0)
 
 
 def cov_of(sd: float) -> np.ndarray:

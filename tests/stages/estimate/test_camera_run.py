@@ -65,7 +65,7 @@ def tracked(case: Case, **changes: Any) -> RunState:
 def score(case: Case, state: RunState) -> TrackScore:
     """How far they are from the truth."""
     groups = {path.removeprefix("runs/case/"): group for path, group in run_groups(state).items()}
-    return summed_up([errors_of(case, groups, wall_s=1.0, memory_mb=0.0)])
+    return summed_up([errors_of(case, groups, wall_s=1.0, cpu_s=1.0, memory_mb=0.0)])
 
 
 def artifact(state: RunState) -> ArtifactData:

@@ -13,19 +13,17 @@ run = load("12_long_recordings", "run")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("camera", [False, True])
-def test_memory_and_clocks_stay(tmp_path: Path, camera: bool) -> None:
-    """Half a minute: neither process grows by more than a few MB after its first tenth, the recording's clock stays
-    with the rig's within what lengths can tell, and the boards' gain no more than that."""
-    found = run.main(tmp_path, lambda line: None, seconds=30.0, camera=camera)
+def test_memory_and_clocks_stay(tmp_path: Path) -> None:
+    """Half a minute in lock-step (in real time, as with the camera, a busy machine would be what is tested): neither
+    process grows by more than a few MB after its first tenth, the recording's clock stays with the rig's within what
+    lengths can tell, and the boards' gain no more than that."""
+    found = run.main(tmp_path, lambda line: None, seconds=30.0, camera=False)
     assert 20.0 < found["duration_s"] < 90.0
     for who in ("recorder", "rig"):
         begin, end = found[f"{who}_begin_mb"], found[f"{who}_end_mb"]
-        assert begin > 20.0 and end - begin < 0.1 * begin + (60.0 if camera else 2.0)
+        assert begin > 20.0 and end - begin < 0.1 * begin + 2.0
     assert abs(found["drift_recording_s"]) < 0.02
     assert all(abs(found[f"drift_board {i}_s"]) < 0.025 for i in range(3))
-    if camera:
-        assert found["frames"] > 100
 
 
 def test_the_shift_between_two_clocks_is_found() -> None:

@@ -12,7 +12,7 @@ from r2s2r_cli.stages.estimate.vision.blend import shares
 from r2s2r_cli.stages.estimate.vision.colors import mask, ranges_of
 from r2s2r_cli.stages.estimate.vision.lens import Lens
 from r2s2r_cli.stages.estimate.vision.noise import DepthNoise, measured
-from r2s2r_cli.stages.estimate.vision.plane import Ground
+from r2s2r_cli.stages.estimate.vision.plane import Ground, find_ground, noise_per_m
 from r2s2r_cli.stages.estimate.vision.solids import Body, ball_depth
 from r2s2r_cli.stages.estimate.vision.world import camera_pose, disagreement, from_world, to_world
 from schemas.robot import HsvRange
@@ -139,6 +139,20 @@ def test_half_of_a_pixel_on_the_rim_is_cap_whatever_lies_beside(beside: tuple[in
     for along in (a, b):  # no shift either way: a third of what moves the mask
         slope = float((off * along[on]).sum() / (along[on] ** 2).sum())
         assert abs(slope) < 0.12
+
+
+@pytest.mark.parametrize("noise", [0.0047, 0.0013])
+def test_a_noisy_camera_widens_what_counts_as_ground(noise: float) -> None:
+    """With four times the usual noise a tilted floor keeps its inliers, and its normal is good to 0.1 degrees."""
+    rng, lens = np.random.default_rng(4), Lens(Intrinsics(320, 240, 300.0, 300.0, 160.0, 120.0))
+    n = np.array([0.1, -0.2, -0.97]) / np.linalg.norm([0.1, -0.2, -0.97])
+    inverse = -(n[0] * lens.x + n[1] * lens.y + n[2]) / 1.5 + noise * rng.standard_normal(lens.x.shape)
+    p_C = np.stack([lens.x, lens.y, np.ones_like(lens.x)], axis=-1) / inverse[..., None]
+    assert noise_per_m(p_C[..., 2]) == pytest.approx(noise, rel=0.03)
+    ground = find_ground(p_C)
+    assert ground is not None and ground.share > 0.99
+    assert np.degrees(np.arccos(min(ground.normal_C @ n, 1.0))) < 0.1
+    assert ground.distance == pytest.approx(1.5, abs=1e-3)
 
 
 def test_red_wraps_round() -> None:

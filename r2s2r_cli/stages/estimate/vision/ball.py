@@ -26,6 +26,8 @@ RIM_SD_PX = 0.10
 """Common error of the disc across the line of sight: uneven light, a rim that the range cuts on one side."""
 CORE, FRAY_PX = 0.85, 1.5
 """Depths beyond this share of the disc's radius, or so close to its rim, are left out: edges fray."""
+EDGES_PX, DEPTHS_ENOUGH = 2.2, 12
+"""So close to the rim a depth may be one between ball and background. Where that leaves enough, it is left out too."""
 DEPTHS = 64
 """Depths that are used at most; neighbours share most of their error, so more would tell nothing more."""
 DEPTHS_LEAST = 5
@@ -243,7 +245,10 @@ class BallFitter:
 
     def _depths(self, patch: Patch, seen: np.ndarray, c: np.ndarray, radius: float, disc: _Disc) -> _Depths:
         """The depths on the ball, those that differ from the rest left out."""
-        on = seen & patch.known & (_Disc.of(c, radius, patch.zx, patch.zy).rho < self._core(disc))
+        rho = _Disc.of(c, radius, patch.zx, patch.zy).rho
+        on = seen & patch.known & (rho < self._core(disc, FRAY_PX))
+        if (inner := on & (rho < self._core(disc, EDGES_PX))).sum() >= DEPTHS_ENOUGH:
+            on = inner
         rows, columns = np.nonzero(on)
         if len(rows) < DEPTHS_LEAST:
             return _Depths.none()
@@ -263,9 +268,9 @@ class BallFitter:
         C = self.noise.covariance(columns[pick].astype(float), rows[pick].astype(float), sideways**2)
         return _Depths(x, y, z, np.linalg.inv(C))
 
-    def _core(self, disc: _Disc) -> float:
+    def _core(self, disc: _Disc, fray_px: float) -> float:
         """Radius of the part of the disc whose depths are used, as a slope."""
-        return min(CORE * disc.rim, max(disc.rim - FRAY_PX / self.f, 0.5 * disc.rim))
+        return min(CORE * disc.rim, max(disc.rim - fray_px / self.f, 0.45 * disc.rim))
 
     def _along(self, patch: Patch, seen: np.ndarray, c: np.ndarray, radius: float) -> np.ndarray:
         """The centre moved along its line of sight to where the depths have it."""

@@ -15,7 +15,13 @@ MIN_POINTS = 500
 MIN_SHARE = 0.3
 """A plane with a smaller share of the pixels need not be the ground."""
 SD_PER_M, SD_LEAST_M = 0.0013, 0.001
-"""Noise taken for granted: sd = 0.0013 z^2 (Kinect family, measured on real frames), 1 mm at least."""
+"""Noise taken for granted: sd = 0.0013 z^2 (Kinect family, measured on real frames), 1 mm at least; more where the
+picture shows more."""
+_SD_MOST_PER_M = 0.008
+_CLEARLY = 1.5
+"""Measured noise counts from this times the usual on: clutter passes for a little of it."""
+_LAG_PX = 12
+"""Between the pixels that are compared for noise; neighbours share some of theirs."""
 _WIDTH = 3.0
 """Half width of the plane in standard deviations of depth."""
 _HYPOTHESES = 200
@@ -69,6 +75,19 @@ def open3d_there() -> bool:
     return True
 
 
+def noise_per_m(z: np.ndarray) -> float:
+    """Noise of a depth picture z [m] (v, u), NaN where unknown: sd / z^2 [1/m], the usual SD_PER_M or clearly more.
+
+    1 / z is linear along a row on every plane, so its second difference is noise alone, six times its variance; the
+    median passes over edges and curved things.
+    """
+    inverse = 1.0 / z[::4]
+    second = np.abs(inverse[:, 2 * _LAG_PX :] - 2 * inverse[:, _LAG_PX:-_LAG_PX] + inverse[:, : -2 * _LAG_PX])
+    second = second[np.isfinite(second)]
+    found = 1.4826 * float(np.median(second)) / np.sqrt(6.0) if len(second) else 0.0
+    return min(found, _SD_MOST_PER_M) if found > _CLEARLY * SD_PER_M else SD_PER_M
+
+
 def find_ground(p_C: np.ndarray, *, seed: int = 0, method: Method = "numpy") -> Ground | None:
     """The largest plane through points (v, u, 3) [m], NaN where unknown; None where there are too few or none fits.
 
@@ -79,17 +98,18 @@ def find_ground(p_C: np.ndarray, *, seed: int = 0, method: Method = "numpy") -> 
     points = p_C[known]
     if len(points) < MIN_POINTS:
         return None
-    best = _by_open3d(points, seed) if method == "open3d" else _by_numpy(points, seed)
+    sd_per_m = noise_per_m(p_C[..., 2])
+    best = _by_open3d(points, seed, sd_per_m) if method == "open3d" else _by_numpy(points, seed, sd_per_m)
     if best is None:
         return None
     some = points[:: max(len(points) // _FITTED, 1)]
     for _ in range(_REFITS):
-        on = some[_near(some, *best)]
+        on = some[_near(some, *best, sd_per_m)]
         if len(on) < min(MIN_POINTS, len(some) // 2):
             return None
         best = _fitted(on)
     normal, distance = best
-    near = _near(points, normal, distance)
+    near = _near(points, normal, distance, sd_per_m)
     inlier = np.zeros(known.shape, dtype=bool)
     inlier[known] = near
     # Along the ray: what the camera measures is z, and the plane is where the ray meets it.
@@ -98,25 +118,25 @@ def find_ground(p_C: np.ndarray, *, seed: int = 0, method: Method = "numpy") -> 
     return Ground(normal, distance, inlier, float(near.mean()), float(np.std(on[:, 2] - z_plane)))
 
 
-def _by_numpy(points: np.ndarray, seed: int) -> tuple[np.ndarray, float] | None:
+def _by_numpy(points: np.ndarray, seed: int, sd_per_m: float) -> tuple[np.ndarray, float] | None:
     rng = np.random.default_rng(seed)
     sample = points[rng.choice(len(points), size=min(_SAMPLE, len(points)), replace=False)]
     best, score = None, 0
     for three in rng.integers(0, len(sample), size=(_HYPOTHESES, 3)):
         plane = _through(sample[three])
-        if plane is not None and (count := int(_near(sample, *plane).sum())) > score:
+        if plane is not None and (count := int(_near(sample, *plane, sd_per_m).sum())) > score:
             best, score = plane, count
     return best
 
 
-def _by_open3d(points: np.ndarray, seed: int) -> tuple[np.ndarray, float] | None:
+def _by_open3d(points: np.ndarray, seed: int, sd_per_m: float) -> tuple[np.ndarray, float] | None:
     import open3d as o3d
 
     rng = np.random.default_rng(seed)
     sample = points[rng.choice(len(points), size=min(_SAMPLE, len(points)), replace=False)]
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(sample))
     o3d.utility.random.seed(seed)
-    width = _WIDTH * max(SD_PER_M * float(np.median(sample[:, 2])) ** 2, SD_LEAST_M)
+    width = _WIDTH * max(sd_per_m * float(np.median(sample[:, 2])) ** 2, SD_LEAST_M)
     plane, _ = cloud.segment_plane(width, ransac_n=3, num_iterations=_HYPOTHESES)
     normal = np.asarray(plane[:3], dtype=float)
     size = float(np.linalg.norm(normal))
@@ -145,6 +165,6 @@ def _towards_camera(normal: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, 
     return (normal, -d) if d < 0 else (-normal, d)
 
 
-def _near(points: np.ndarray, normal: np.ndarray, distance: float) -> np.ndarray:
-    sd = np.maximum(SD_PER_M * points[:, 2] ** 2, SD_LEAST_M)
+def _near(points: np.ndarray, normal: np.ndarray, distance: float, sd_per_m: float) -> np.ndarray:
+    sd = np.maximum(sd_per_m * points[:, 2] ** 2, SD_LEAST_M)
     return np.asarray(np.abs(points @ normal + distance) < _WIDTH * sd)

@@ -54,7 +54,7 @@ class ArtifactState(Frozen):
     stage: str
     iteration: int | None
     artifact: str
-    state: Literal["fresh", "stale", "damaged", "unsealed"]
+    state: Literal["fresh", "stale", "damaged", "unsealed", "recording"]
     reasons: tuple[str, ...]
     overrides: dict[str, Any] = Field(default_factory=dict)
     """Settings that came from `--set` when it was made: the same command without them makes it again."""

@@ -14,6 +14,7 @@ from r2s2r_cli.commands.calibrate import calibrate
 from r2s2r_cli.commands.compare import compare
 from r2s2r_cli.commands.doctor import doctor_app
 from r2s2r_cli.commands.estimate import estimate
+from r2s2r_cli.commands.execute import execute
 from r2s2r_cli.commands.export import export
 from r2s2r_cli.commands.floor import floor
 from r2s2r_cli.commands.identify import identify
@@ -37,6 +38,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "estimate": estimate,
     "identify": identify,
     "plan": plan,
+    "execute": execute,
     "compare": compare,
     "floor": floor,
     "simulate": simulate,

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.errors import UsageError
+from r2s2r_cli.store.lock import writer
 from r2s2r_cli.store.project import Iteration, Project, journal_of
 from schemas.versions import KINDS, STAGE_VERSIONS
 
@@ -47,9 +48,13 @@ class Recording:
     def require_room(self, *, force: bool) -> None:
         """Raises UsageError where a recording is there: raw runs cannot be made again. force: it keeps another name."""
         journal = journal_of(self.target)
+        busy = writer(self.project.root) if journal.exists() else None
+        if busy is not None:
+            raise UsageError("a recording is running in this iteration", where=self.project.relative(journal),
+                             expected="one at a time", received=busy, hint="r2s2r status")  # fmt: skip
         if journal.exists():
             raise UsageError(
-                "a recording that was cut off is in the way, or is running", where=self.project.relative(journal),
+                "a recording that was cut off is in the way", where=self.project.relative(journal),
                 expected="no journal", received="one", hint=f"r2s2r recover '{journal}'",
             )  # fmt: skip
         if self.target.exists() and not force:

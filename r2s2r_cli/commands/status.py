@@ -13,7 +13,8 @@ from r2s2r_cli.errors import ArtifactError, GateError
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from r2s2r_cli.store.again import command_again
 from r2s2r_cli.store.header import read_header, sealed_header, whole_header
-from r2s2r_cli.store.project import Iteration, Project
+from r2s2r_cli.store.lock import writer
+from r2s2r_cli.store.project import Iteration, Project, journal_of
 from r2s2r_cli.store.staleness import reasons
 from schemas.header import Header
 from schemas.results import ArtifactState, StatusResult
@@ -71,8 +72,10 @@ def survey(project: Project, *, thorough: bool = False) -> StatusResult:
         state, command = _state(project, iterations.get(path.parent), path, stale, thorough)
         states.append(state)
         again += [command] if command else []
-    states += [_unsealed(project, iterations.get(path.parent), path) for path in journals]
-    again = [f"r2s2r recover {shlex.quote(project.relative(path))}" for path in journals] + again
+    busy = writer(project.root) if journals else None
+    states += [_unsealed(project, iterations.get(path.parent), path, busy) for path in journals]
+    if busy is None:
+        again = [f"r2s2r recover {shlex.quote(project.relative(path))}" for path in journals] + again
     return StatusResult(
         project=project.file.name,
         robot=project.robot().name,
@@ -120,11 +123,14 @@ def _remarks(state: ArtifactState) -> str:
     return "; ".join([*state.reasons, *made])
 
 
-def _unsealed(project: Project, iteration: Iteration | None, path: Path) -> ArtifactState:
+def _unsealed(project: Project, iteration: Iteration | None, path: Path, busy: str | None) -> ArtifactState:
+    """A journal: of a recording that runs, or of one that was cut off. busy: who writes in the project now."""
+    executed = iteration is not None and path == journal_of(iteration.artifact("recording", executed=True))
+    why = "the recording was cut off before it was sealed" if busy is None else f"{busy} is writing it"
     return ArtifactState(
-        stage="record", iteration=iteration.number if iteration else None, artifact=project.relative(path),
-        state="unsealed", reasons=("the recording was cut off before it was sealed",), bytes=path.stat().st_size,
-        content_sha256=None,
+        stage="execute" if executed else "record", iteration=iteration.number if iteration else None,
+        artifact=project.relative(path), state="unsealed" if busy is None else "recording", reasons=(why,),
+        bytes=path.stat().st_size, content_sha256=None,
     )  # fmt: skip
 
 
@@ -133,11 +139,20 @@ def _forward(project: Project) -> str:
     latest = project.iterations()[-1:]
     if not latest or not latest[0].artifact("recording").exists():
         return "r2s2r import run.csv"
-    if not any(name.endswith("/caps/p_WE") for name in read_header(latest[0].artifact("recording")).datasets):
-        return "" if project.artifact("floor", None).exists() else "r2s2r floor"  # nothing to estimate states from yet
-    for kind, command in (("estimate", "estimate"), ("identification", "identify")):
-        if not latest[0].artifact(kind).exists():
-            return f"r2s2r {command} --iteration {latest[0].number}"
+    place = latest[0]
+    held = list(read_header(place.artifact("recording")).datasets)
+    if not any(name.endswith("/caps/p_WE") or "/camera/depth" in name for name in held):
+        # Nothing to estimate states from yet; sensors alone tell how far the robot repeats itself.
+        repeats = len({name.split("/")[1] for name in held if name.startswith("runs/")}) > 1
+        return "r2s2r floor" if repeats and not project.artifact("floor", None).exists() else ""
+    for kind, command in (("estimate", "estimate"), ("identification", "identify"), ("plan", "plan")):
+        if not place.artifact(kind).exists():
+            return f"r2s2r {command} --iteration {place.number}"
+    if place.artifact("recording", executed=True).exists():
+        if not place.artifact("estimate", executed=True).exists():
+            return f"r2s2r estimate --of execute --iteration {place.number}"
+        if not place.artifact("comparison").exists():
+            return f"r2s2r compare --iteration {place.number}"
     return ""
 
 

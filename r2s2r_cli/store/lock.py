@@ -53,6 +53,24 @@ def writing(root: Path, command: str) -> Iterator[None]:
         lock.release()
 
 
+def writer(root: Path) -> str | None:
+    """Who writes in the project at this moment, in words; None: nobody, or nobody can tell."""
+    from filelock import FileLock, Timeout
+
+    directory = root / STATE_DIR
+    if not (directory / "write.lock").exists():
+        return None
+    lock = FileLock(directory / "write.lock")
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        return _describe(directory / "writer.json")
+    except (NotImplementedError, OSError):
+        return None
+    lock.release()
+    return None
+
+
 @contextlib.contextmanager
 def writing_at(path: Path, command: str) -> Iterator[None]:
     """Hold the write lock of the project that `path` lies in; outside of any project there is nothing to lock."""

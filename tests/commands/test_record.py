@@ -104,7 +104,7 @@ def test_a_recording_does_not_go_stale(robot_project: Path, link: Maker) -> None
     status = document("status")
     (state,) = status["artifacts"]
     assert state["state"] == "fresh" and state["stage"] == "record"
-    assert status["next"] == "r2s2r floor"
+    assert status["next"] == ""  # a single run repeats nothing, and holds no camera to estimate states from
 
 
 def test_nothing_is_overwritten(robot_project: Path, link: Maker) -> None:

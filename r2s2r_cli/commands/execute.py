@@ -1,0 +1,198 @@
+"""`r2s2r execute`: policies of the plan on the robot, their simulated outcome first -> 50-execute.h5."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from r2s2r_cli.commands.record import Protocol
+from r2s2r_cli.console import Console
+from r2s2r_cli.errors import UsageError
+from r2s2r_cli.options import (
+    DrawOption,
+    DryRunOption,
+    IterationOption,
+    JsonOption,
+    ProjectOption,
+    QuietOption,
+    SetOption,
+    parse_overrides,
+)
+from r2s2r_cli.store.project import Iteration, Project
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from schemas.header import InputRef
+    from schemas.policy import PolicyFile
+    from schemas.results_simulate import SimulateReport
+
+
+def execute(
+    policies: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Names of policies of 40-plan.h5, policy files or ARTIFACT.h5:NAME. Default: all of the plan.",
+            show_default=False,
+        ),
+    ] = None,
+    port: Annotated[
+        str | None,
+        typer.Option("--port", metavar="PORT", help="The robot: /dev/ttyUSB0, socket://HOST:PORT or udp://HOST:PORT."),
+    ] = None,
+    protocol: Annotated[
+        Protocol, typer.Option("--protocol", help="How it talks; only `checked` stops by itself.")
+    ] = Protocol.CHECKED,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            "--camera", metavar="CAMERA", help="realsense[:SERIAL], open3d, rig://HOST:PORT or replay:FOLDER."
+        ),
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            "--model",
+            metavar="FILE",
+            help="Show the outcome with the numbers of this 30-identify.h5. Default: the iteration's own.",
+        ),
+    ] = None,
+    repeats: Annotated[int, typer.Option("--repeats", metavar="N", help="Every policy N times, taking turns.")] = 1,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before the robot moves: for scripts.")] = False,
+    simulated: Annotated[
+        bool, typer.Option("--simulated", help="It is a rig: mark the runs so. A rig in lock-step says it by itself.")
+    ] = False,
+    project: ProjectOption = None,
+    iteration: IterationOption = None,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+    draw: DrawOption = True,
+    dry_run: DryRunOption = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Although there are executed runs: they are kept as 50-execute.h5.replaced.")
+    ] = False,
+    set_: SetOption = None,
+) -> None:
+    """Show what the policies of the plan do in the simulator, ask, then run them on the robot and keep all that comes.
+
+    The same recorder, guard and emergency stop (the space bar) as `record`; put the robot to another place between
+    repeats. --dry-run ends after the simulated outcome.
+
+    Example: r2s2r execute straight --repeats 3 --port /dev/ttyUSB0 --camera realsense
+    """  # fmt: skip
+    from r2s2r_cli.commands.record_run import Wish, carry_out, look
+    from r2s2r_cli.commands.stage import require_input
+    from r2s2r_cli.stages.record import plans
+    from r2s2r_cli.store.header import whole_header
+    from r2s2r_cli.store.staleness import artifact_ref
+
+    console = Console(json=json, quiet=quiet)
+    here = Project.find(project)
+    place = here.iteration(iteration)
+    overrides = parse_overrides(set_, "record")
+    robot = here.robot()
+    chosen, inputs = _chosen(here, place, policies or [])
+    settings = here.config(place, overrides).record
+    runs = plans(chosen, repeats=repeats, rest=settings.rest_s)
+    own = place.artifact("identification")
+    numbers = model if model is not None else own if own.exists() else None
+    if numbers is not None:
+        require_input(numbers, "r2s2r identify")
+        inputs = [*inputs, artifact_ref(here, numbers, whole_header(numbers))]
+    wish = Wish(
+        project=here, iteration=place, robot=robot, runs=runs, settings=settings, port=port or "",
+        protocol=protocol.value, camera=camera, simulated=simulated, overrides=overrides,
+        flags={
+            "policies": policies or [], "port": port, "protocol": protocol.value, "camera": camera, "repeats": repeats,
+            "simulated": simulated, "model": None if numbers is None else here.relative(numbers),
+        },
+        seed=None, draw=draw, force=force, stage="execute", inputs=inputs,
+    )  # fmt: skip
+    wish.recording().require_room(force=force)
+    _expect(here, place, chosen, numbers, console)
+    if dry_run:
+        look(wish, console)
+        return
+    if port is None:
+        raise UsageError("no robot is named", where="--port", expected="a device, socket://HOST:PORT or udp://HOST:PORT",
+                         received="nothing", hint="r2s2r doctor")  # fmt: skip
+    if not yes:
+        _ask(console)
+    carry_out(wish, console)
+
+
+def _chosen(project: Project, place: Iteration, names: Sequence[str]) -> tuple[list[PolicyFile], list[InputRef]]:
+    """The policies, each for this robot, and the plan where they are of it. Raises InputError, UsageError."""
+    from r2s2r_cli.commands.simulate_inputs import Asked, read_policies
+    from r2s2r_cli.commands.stage import require_input
+    from r2s2r_cli.stages.simulate.policies import sequence
+
+    plan = place.artifact("plan")
+    files = [text for text in names if Path(text).suffix in (".toml", ".h5") or ".h5:" in text]
+    if not names or len(files) < len(names):
+        require_input(plan, f"r2s2r plan --iteration {place.number}")
+    texts = [text if text in files else f"{plan}:{text}" for text in names] or [str(plan)]
+    found = [policy for text in texts for policy in read_policies(text)]
+    for policy in found:
+        sequence(policy, project.robot())
+    return found, Asked(project, place, tuple(texts), None, 0, (), None).refs()
+
+
+def _expect(
+    project: Project, place: Iteration, policies: Sequence[PolicyFile], numbers: Path | None, console: Console
+) -> None:
+    """What the simulator says that the policies will do."""
+    from r2s2r_cli.views.simulation_page import report_tables
+
+    report = _simulated(project, place, policies, numbers, console)
+    words = "robot.toml: nothing was identified yet" if numbers is None else project.relative(numbers)
+    console.say(f"what the simulator expects (numbers of {words})")
+    for table in report_tables(report):
+        console.table(table.title, table.columns, table.rows)
+    for run in report.runs:
+        for text in run.warnings:
+            console.warn(f"{run.run}: {text}")
+
+
+def _simulated(
+    project: Project, place: Iteration, policies: Sequence[PolicyFile], numbers: Path | None, console: Console
+) -> SimulateReport:
+    from r2s2r_cli.commands.interrupts import whole_items
+    from r2s2r_cli.commands.simulate import loaded
+    from r2s2r_cli.stages.identified import identified
+    from r2s2r_cli.store.read import read_artifact
+
+    (stage,) = whole_items(loaded())
+    robot, model = project.robot(), None
+    if numbers is not None:
+        _, found = read_artifact(numbers, "identification")
+        model = identified(found, robot, words=project.relative(numbers))
+    requests = [stage.Request(policy) for policy in policies]
+    with console.progress("simulate, policies", len(requests)) as advance:
+        done: set[str] = set()
+
+        def progress(name: str, _: int) -> None:
+            if name not in done:
+                done.add(name)
+                advance(1)
+
+        _, report = stage.simulate(
+            robot, requests, project.config(place, {}).simulate, model=model, cache_dir=project.cache, progress=progress
+        )
+    return report
+
+
+def _ask(console: Console) -> None:
+    """Raises UsageError where nobody can answer, or the answer is no."""
+    import sys
+
+    if not sys.stdin.isatty():
+        raise UsageError("nobody is there to be asked whether the robot may move", where="r2s2r execute",
+                         expected="a terminal, or --yes", received="neither",
+                         hint="r2s2r execute --yes --port ...")  # fmt: skip
+    console.say("the robot will move now; the space bar stops it")
+    if not typer.confirm("run these policies on the robot?", err=True):
+        raise UsageError("nothing moved", where="r2s2r execute", expected="yes", received="no",
+                         hint="r2s2r execute --dry-run")  # fmt: skip

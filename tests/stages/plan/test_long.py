@@ -9,7 +9,7 @@ from r2s2r_cli.stages.plan.long import walks
 from r2s2r_cli.stages.plan.robust import Primitive
 from r2s2r_cli.stages.plan.route import walked
 from r2s2r_cli.stages.plan.runs import played, policy_file, run_groups
-from tests.stages.plan.test_search import bench
+from tests.stages.plan.planted import bench
 from tests.support.robots import subject
 
 FORWARD = ("101011", "001010", "111111")

@@ -2,33 +2,17 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 import pytest
 
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.plan.alike import alike, carried, told_targets
-from r2s2r_cli.stages.plan.belief import assumed
-from r2s2r_cli.stages.plan.executor import Executor, Standing
 from r2s2r_cli.stages.plan.gaits import Gait, neighbours, run_gaits
-from r2s2r_cli.stages.plan.placement import Reference, reference_of, turned
+from r2s2r_cli.stages.plan.placement import turned
 from r2s2r_cli.stages.plan.rewards import BEHAVIOURS, Outcomes, reward_named
 from r2s2r_cli.stages.plan.robust import primitive
 from r2s2r_cli.stages.plan.search import Found, Search, SearchSettings, best_of
-from r2s2r_cli.stages.plan.symmetry import symmetry_group
-from tests.support.robots import subject
-
-
-@lru_cache
-def bench() -> tuple[Executor, Reference, Standing]:
-    """The paper's robot with its own numbers, at rest, and the reference."""
-    robot = subject().robot
-    belief = assumed(robot)
-    executor = Executor(robot, belief, belief.draws(1, np.random.default_rng(0)), step=1e-3, timeout_s=2.2)
-    executor.simulator = subject().simulator
-    at = executor.standing(np.array(robot.rest_caps_m)[None], np.zeros(1, dtype=int))
-    return executor, reference_of(executor.caps(at)[0], symmetry_group(robot)), at
+from tests.stages.plan.planted import bench
 
 
 def searched(**options: float) -> Found:

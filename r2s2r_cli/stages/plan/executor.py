@@ -113,11 +113,13 @@ class Executor:
 
     draws: values (K, n) of the belief's parameters. timeout_s: a target that takes longer is given up. hurried: one
     that stalls is given up at once, and what comes after it is not simulated; else the timeout of the robot passes.
+    bias: what the controller reads too much of every cable [m], (K, cable); None: nothing.
     """
 
     def __init__(
         self, robot: Robot, belief: Belief, draws: np.ndarray, *, step: float, timeout_s: float | None = None,
-        rod_contact: bool = True, hurried: bool = False, cache_dir: Path | None = None, threads: int = 1,
+        rod_contact: bool = True, hurried: bool = False, bias: np.ndarray | None = None, cache_dir: Path | None = None,
+        threads: int = 1,
     ) -> None:  # fmt: skip
         import torch
 
@@ -135,6 +137,8 @@ class Executor:
         self.theta = one.map(lambda x: x.expand(len(draws), *x.shape[1:]).contiguous())
         self.packed = pack_parameters(self.structure, self.theta)
         self.simulator = Simulator(self.structure, cache_dir=cache_dir, threads=threads)
+        none = np.zeros((len(draws), len(robot.cables)))
+        self.bias = torch.as_tensor(none if bias is None else bias, dtype=torch.float64)
         self.period = 1.0 / robot.pid.rate_hz
         self.whole = steps_a_tick(self.period, step)
         self.cable_caps = tuple((a, b) for a, b in (cable.caps for cable in robot.cables))
@@ -256,7 +260,7 @@ class Executor:
         with torch.no_grad():
             for tick in range(1, steps * (self.timeout + 1) + 1):
                 state = unpack_state(self.structure, s)
-                length = cap_lengths(self.cable_caps, end_caps(theta, state))
+                length = cap_lengths(self.cable_caps, end_caps(theta, state)) + self.bias[draw]
                 for effect in self.structure.effects:
                     length = effect.sensing(theta.of(effect.name), length)
                 running = where.index < asked

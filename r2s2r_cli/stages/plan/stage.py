@@ -137,7 +137,9 @@ class _World:
         shared: dict[str, Any] = {
             "step": settings.step_s, "rod_contact": settings.rod_contact, "cache_dir": cache_dir, "threads": threads,
         }  # fmt: skip
-        self.executor = Executor(robot, request.belief, draws, **shared)
+        bias = settings.sensor_sd_m * generator.standard_normal((settings.draws, len(robot.cables)))
+        bias[0] = 0.0
+        self.executor = Executor(robot, request.belief, draws, bias=bias, **shared)
         slowest = float(self.executor.theta.speed_in[0].min())
         limit = SLOW * robot.pid.range_m / slowest + float(self.executor.delay[0])
         self.best = Executor(

@@ -77,3 +77,20 @@ def test_two_targets_are_one_after_the_other() -> None:
     assert torch.equal(fewer.before_last(0).s, torch.stack([track.s[-1] for track in fewer.tracks]))
     assert [len(track.u) for track in fewer.tracks] == fewer.total.tolist()
     assert fewer.tracks[0].index.tolist() == [0] * whole.ticks[0, 0] + [1] * (fewer.total[0] - whole.ticks[0, 0])
+
+
+def test_a_sensor_that_reads_too_much_leaves_its_cable_shorter() -> None:
+    """A bias of the lengths shifts where the controller stops: the cable that is reeled in ends shorter by it, to what
+    it moves in a tick."""
+    belief = assumed(subject().robot)
+    draws = np.repeat(belief.draws(1, np.random.default_rng(0)), 2, axis=0)
+    bias = np.zeros((2, 9))
+    bias[1, 1] = 0.02
+    made = Executor(subject().robot, belief, draws, step=1e-3, bias=bias)
+    made.simulator = subject().simulator
+    at = made.standing(np.repeat(subject().p_WE.numpy(), 2, axis=0), np.arange(2))
+    target = np.repeat(np.array([[[1.0, 0.4, 1, 1, 1, 1]]]), 2, axis=0)
+    p_WE = made.caps(made.run(at, target).last)
+    a, b = subject().cable_caps[1]
+    length = np.linalg.norm(p_WE[:, a] - p_WE[:, b], axis=-1)
+    assert abs(length[0] - length[1] - 0.02) < 0.003

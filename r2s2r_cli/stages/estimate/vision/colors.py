@@ -21,7 +21,7 @@ def ranges_of(robot: Robot) -> tuple[HsvRange, ...]:
             where="robot.toml [[colors]]",
             expected="a colour range for each rod, to find its caps in the pictures",
             received=f"none for {', '.join(missing)}",
-            hint="r2s2r doctor camera --camera realsense --preview see.png",
+            hint="r2s2r doctor camera --camera replay:10-record.h5 --preview see.png",
         )
     return tuple(ranges[rod.name] for rod in robot.rods)
 

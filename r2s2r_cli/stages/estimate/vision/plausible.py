@@ -15,8 +15,11 @@ from schemas.robot import Robot
 SIZE_RATIO = 1.35
 """Discs whose radius differs from what their depth says by more: depth unit or focal length are wrong. A disc
 that is half hidden has 0.7 of its radius, so the upper quartile of all is taken."""
-LENGTH_WARNS, LENGTH_FAILS = 0.02, 0.06
+LENGTH_WARNS, LENGTH_FAILS = 0.01, 0.02
 """Rods whose length is wrong by more than this share."""
+HINT = "r2s2r doctor camera --camera replay:10-record.h5"
+_LENGTH_SD = 0.015
+"""Lengths that are known better than this, as a share, are asked first: rods that lie across the line of sight."""
 _PATCH_PX = 8
 _LEAST = 3
 
@@ -33,30 +36,35 @@ def check_sizes(frames: Sequence[ImageFrame], robot: Robot, lens: Intrinsics, sc
             where=f"{len(frames)} frames; depth_scale {scale:g} m, fx {lens.fx:g}",
             expected="discs of the radius of the caps in robot.toml",
             received=f"{ratio:.2f} times that; with this focal length depth_scale would be {scale / ratio:.2g} m",
-            hint="r2s2r import FOLDER --depth-scale 0.00025",
+            hint=HINT,
         )
 
 
-def check_lengths(lengths: Sequence[float]) -> str | None:
-    """A warning where rods are not as long as they should be. Raises InputError where they are not at all.
+def check_lengths(lengths: Sequence[tuple[float, float]], lens: Intrinsics, scale: float) -> str | None:
+    """A warning where rods are not quite as long as they should be. Raises InputError where they are not at all.
 
-    lengths: distances of a rod's two caps over the length in `robot.toml`.
+    lengths: distances of a rod's two caps over the length in `robot.toml`, each with its standard deviation. Rods are
+    rigid, so many of them know the scale of the pictures far better than one does.
     """
-    if len(lengths) < _LEAST:
+    found = np.array(lengths).reshape(-1, 2)
+    if (found[:, 1] < _LENGTH_SD).sum() >= _LEAST:
+        found = found[found[:, 1] < _LENGTH_SD]
+    if len(found) < _LEAST:
         return None
-    off = float(np.median(lengths)) - 1.0
-    way = "longer" if off > 0 else "shorter"
-    spread = 1.4826 * float(np.median(np.abs(np.array(lengths) - 1.0 - off))) / np.sqrt(len(lengths))
-    if abs(off) > LENGTH_FAILS + 3 * spread:
+    ratio = float(np.median(found[:, 0]))
+    off, way = abs(ratio - 1.0), "longer" if ratio > 1 else "shorter"
+    spread = 1.4826 * float(np.median(np.abs(found[:, 0] - ratio))) / np.sqrt(len(found))
+    cure = f"depth_scale {scale / ratio:.4g} m or fx {lens.fx * ratio:.1f} would fit"
+    if off > LENGTH_FAILS + 3 * spread:
         raise InputError(
-            f"the rods look {100 * abs(off):.1f} % {way} than they are",
-            where=f"{len(lengths)} pairs of caps",
-            expected=f"the lengths of robot.toml, to {100 * LENGTH_FAILS:.0f} %",
-            received=f"{1 + off:.3f} of them: focal length, depth unit or robot.toml are wrong",
-            hint="r2s2r doctor camera --camera realsense",
+            f"the rods look {100 * off:.1f} % {way} than they are",
+            where=f"{len(found)} pairs of caps; depth_scale {scale:g} m, fx {lens.fx:g}",
+            expected=f"the lengths of robot.toml, to {100 * LENGTH_FAILS:.1f} %",
+            received=f"{ratio:.3f} of them; {cure}",
+            hint=HINT,
         )
-    if abs(off) > LENGTH_WARNS + 3 * spread:
-        return f"rods look {100 * abs(off):.1f} % {way} than in robot.toml: focal length or depth unit are a little off"
+    if off > LENGTH_WARNS + 3 * spread:
+        return f"the rods look {100 * off:.1f} % {way} than in robot.toml; {cure}"
     return None
 
 

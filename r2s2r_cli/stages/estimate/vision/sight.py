@@ -314,5 +314,5 @@ def _check(picture: np.ndarray, shape: tuple[int, ...], kind: type, name: str, i
             where=f"frame {index}",
             expected=f"{np.dtype(kind)} {shape}",
             received=f"{picture.dtype} {picture.shape}",
-            hint="r2s2r import --help",
+            hint="r2s2r doctor camera --camera replay:10-record.h5",
         )

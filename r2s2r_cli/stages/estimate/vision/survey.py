@@ -24,7 +24,7 @@ from r2s2r_cli.stages.estimate.vision.plane import (
     open3d_there,
     points_C,
 )
-from r2s2r_cli.stages.estimate.vision.plausible import check_lengths, check_sizes
+from r2s2r_cli.stages.estimate.vision.plausible import HINT, check_lengths, check_sizes
 from r2s2r_cli.stages.estimate.vision.sight import Sighter
 from r2s2r_cli.stages.estimate.vision.world import HEIGHT_M, TILT_RAD, camera_pose, disagreement
 from schemas.robot import Robot
@@ -46,8 +46,8 @@ class _Seen:
     shift_cov: list[np.ndarray] = field(default_factory=list)
     swell: list[float] = field(default_factory=list)
     caps: int = 0
-    length: list[float] = field(default_factory=list)
-    """Distances of a rod's two caps over the length of the rod."""
+    length: list[tuple[float, float]] = field(default_factory=list)
+    """Distances of a rod's two caps over the length of the rod, with standard deviation."""
 
 
 def survey(
@@ -90,7 +90,7 @@ def survey(
     if not rough.caps:
         raise _bad("no cap of the robot is seen in any frame that was looked at", f"{len(usable)} frames",
                    "two balls of the colour of each rod (robot.toml [[colors]])", "none")  # fmt: skip
-    if (doubt := check_lengths(rough.length)) is not None:
+    if (doubt := check_lengths(rough.length, lens, scale)) is not None:
         warnings.append(doubt)
     shift, shift_sd = _pooled(rough)
     second = first.with_colors(shift_px=shift, shift_sd_px=shift_sd, swell_px=0.0, swell_sd_px=0.3)
@@ -174,8 +174,10 @@ def _caps(frames: list[ImageFrame], robot: Robot, lens: Intrinsics, scale: float
         for rod, fits in enumerate(found):
             seen.caps += len(fits)
             if len(fits) >= 2:
-                apart = float(np.linalg.norm(fits[1].center - fits[0].center))
-                seen.length.append(apart / robot.rods[rod].length_m)
+                along = fits[1].center - fits[0].center
+                apart = float(np.linalg.norm(along))
+                sd = float(np.sqrt(along @ (fits[0].cov + fits[1].cov) @ along)) / max(apart, 1e-6)
+                seen.length.append((apart / robot.rods[rod].length_m, sd / robot.rods[rod].length_m))
             for fit in fits[:2]:
                 if np.isfinite(fit.shift_px).all():
                     seen.shift.append(fit.shift_px)
@@ -210,6 +212,4 @@ def _lacks(frames: list[ImageFrame]) -> str:
 
 
 def _bad(what: str, where: str, expected: str, received: str) -> InputError:
-    return InputError(
-        what, where=where, expected=expected, received=received, hint="r2s2r doctor camera --camera realsense"
-    )
+    return InputError(what, where=where, expected=expected, received=received, hint=HINT)

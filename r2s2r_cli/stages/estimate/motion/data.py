@@ -130,4 +130,4 @@ class TrackedRun:
     rounds: int
     """Gauss-Newton steps, all together."""
     settled: bool
-    """The last step moved nothing by more than a hundredth of its standard deviation."""
+    """The last step moved no cap by more than 0.1 mm."""

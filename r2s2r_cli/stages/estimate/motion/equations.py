@@ -19,9 +19,9 @@ SHARED_S = 1.0
 """[s] How long the errors that neighbouring sightings share stay alike."""
 BELOW_SD_M = 1e-3
 """[m] Of how far a cap that is not known to touch may be below the floor."""
-LIFTED_M = 0.03
+LIFTED_M, LIFTED_HIDDEN_M = 0.03, 0.1
 """[m] How high a cap may be that was taken to touch and does not: with the probability of that it widens the height
-(the variance of the mixture of both)."""
+(the variance of the mixture of both). While it is hidden, times the root of the frames that share the mistake."""
 SLIP_S = 0.3
 """[s] How long a cap keeps sliding: the slip speeds of neighbouring frames are one piece of evidence, not many."""
 
@@ -94,7 +94,8 @@ def _floor(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body, settin
         height = p[:, 2] - body.radius[cap]
         touching = evidence.touching[:, cap]
         below = np.where(height < 0, 1 - touching, 0.0) / BELOW_SD_M**2
-        stands = touching / (settings.contact_sd_m**2 + (1 - touching) * LIFTED_M**2)
+        lifted = np.where(evidence.information[:, cap, 2, 2] > 0, LIFTED_M, LIFTED_HIDDEN_M)
+        stands = touching / (settings.contact_sd_m**2 + (1 - touching) * lifted**2)
         frames.scalar(body.p(cap)[2:], one[:, None], height, stands + below)
         if np.any(touching):
             for axis in range(2):

@@ -20,11 +20,14 @@ from r2s2r_cli.stages.estimate.motion.data import (
 )  # fmt: skip
 from r2s2r_cli.stages.estimate.motion.equations import SIGHTING_FREEDOM
 from r2s2r_cli.stages.estimate.motion.factors import heavy_tail
-from r2s2r_cli.stages.estimate.motion.prepare import Prepared
+from r2s2r_cli.stages.estimate.motion.prepare import Prepared, principal
 from r2s2r_cli.stages.estimate.motion.rounds import State, cap_covariances, distances, known, sighting_residual
 
 USED = 0.3
 """A sighting whose weight fell below this share contradicts the rest: nearly 5 standard deviations off."""
+SHARED_ALONG = 0.1
+"""Share of the error along the line of sight that all frames have in common (standard deviations): of depth cameras it
+is mostly noise, but not all."""
 NEAR_S = 0.25
 """[s] A sensor that was not heard for that long before and after a frame is missing there."""
 
@@ -41,7 +44,7 @@ def tracked_run(
     quality, score = _quality(state, prepared, body)
     variance = np.diagonal(cov, axis1=1, axis2=2)
     heard = _heard(state.evidence.t, state.evidence.sensor_weight)
-    shown = p_cov + settings.systematic_sd_m**2 * np.eye(3)
+    shown = p_cov + _along(prepared) + settings.systematic_sd_m**2 * np.eye(3)
     worst = np.sqrt(np.linalg.eigvalsh(shown)[..., -1])
     mode = (
         np.where(np.any(heard, axis=1), 0, NO_SENSORS)
@@ -61,6 +64,15 @@ def tracked_run(
         acceleration=np.array([state.evidence.density[first == k].mean(axis=0) for k in range(len(rows) - 1)]),
         rounds=state.rounds, settled=state.solved is not None and state.solved.settled,
     )  # fmt: skip
+
+
+def _along(prepared: Prepared) -> np.ndarray:
+    """Shared part of the error along the lines of sight, as covariances [m^2], (frame, cap, 3, 3)."""
+    values, axes = principal(prepared.cov)
+    ray = axes[prepared.sighted][:, 2]
+    usual = np.median(values[prepared.sighted][:, 2]) * SHARED_ALONG**2
+    _, vectors = np.linalg.eigh(ray.T @ ray)
+    return np.broadcast_to(usual * np.outer(vectors[:, 2], vectors[:, 2]), prepared.cov.shape)
 
 
 def _quality(state: State, prepared: Prepared, body: Body) -> tuple[np.ndarray, np.ndarray]:

@@ -17,6 +17,8 @@ from schemas.robot import Robot
 
 BURSTS = 2.0
 """What is used over what is likeliest (as in `stages/estimate/smooth.py`): robots accelerate in bursts."""
+UNSEEN_BURSTS = 6.0
+"""The same where a cap is hidden: how it moved there is only known on average, and averages have few bursts."""
 FEW = 2
 """Gauss-Newton steps between two looks at the noise: it need not settle before the noise does."""
 SENSOR_FREEDOM = 5.0
@@ -59,7 +61,8 @@ def smooth_run(
     for left in reversed(range(TOGETHER)):
         state = learn(settle(state, body, settings, steps=FEW), prepared, body)
         state = touch(state, prepared, body, hidden=left == 0)
-    density = BURSTS * state.evidence.density
+    near = prepared.sighted[1:] & prepared.sighted[:-1]
+    density = np.where(near, BURSTS, UNSEEN_BURSTS) * state.evidence.density
     state = settle(replace(state, evidence=replace(state.evidence, density=density)), body, settings)
     return tracked_run(state, prepared, clock, body, settings)
 

@@ -13,8 +13,8 @@ from r2s2r_cli.stages.estimate.motion.data import MotionSettings
 from r2s2r_cli.stages.estimate.motion.equations import equations
 from r2s2r_cli.stages.estimate.motion.evidence import Evidence
 
-SETTLED_M = 1e-5
-"""[m] A step that moves no cap by more is the last one: a hundredth of the noise that is left."""
+SETTLED_M = 1e-4
+"""[m] A step that moves no cap by more is the last one: a fraction of what is uncertain even where all is seen."""
 HALVINGS = 8
 
 

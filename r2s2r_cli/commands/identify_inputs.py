@@ -19,7 +19,28 @@ if TYPE_CHECKING:
     from r2s2r_cli.stages.identify.request import Drive, Method, Request
     from schemas.config import IdentifySettings
 
-_KINDS = ("recording", "estimate")
+
+@dataclass(frozen=True)
+class Source:
+    """Runs of one iteration: the recorded ones, or those that executed its plan."""
+
+    place: Iteration
+    executed: bool = False
+
+    @property
+    def recording(self) -> Path:
+        """What came from the robot."""
+        return self.place.artifact("recording", executed=self.executed)
+
+    @property
+    def estimate(self) -> Path:
+        """Their states."""
+        return self.place.artifact("estimate", executed=self.executed)
+
+
+def _estimated(place: Iteration) -> list[Source]:
+    """The runs of an iteration that have states, recorded ones first."""
+    return [one for one in (Source(place), Source(place, executed=True)) if one.estimate.exists()]
 
 
 @dataclass(frozen=True)
@@ -48,21 +69,29 @@ class Asked:
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
     @cached_property
-    def sources(self) -> tuple[Iteration, ...]:
-        """The iterations whose runs are used, the main one first.
+    def sources(self) -> tuple[Source, ...]:
+        """Where the runs that are used lie, those of the main iteration first.
 
-        The main one is the iteration itself where it has an estimate, else the latest before it that has one. Raises
-        ArtifactError where there is none, UsageError for an iteration of --also that does not exist.
+        The main one is the iteration itself where it has an estimate of recorded runs, else the latest before it that
+        has any; of an earlier one the executed runs are used as well. Raises ArtifactError where there is none,
+        UsageError for an iteration of --also that does not exist.
         """
-        earlier = [i for i in self.project.iterations() if i.number < self.iteration.number]
-        main = next(
-            (i for i in (self.iteration, *reversed(earlier)) if i.artifact("estimate").exists()), self.iteration
-        )
-        others = [self.project.iteration(number) for number in self.also if number != main.number]
-        for place in (main, *others):
-            require_input(place.artifact("recording"), f"r2s2r import run.csv --iteration {place.number}")
-            require_input(place.artifact("estimate"), f"r2s2r estimate --iteration {place.number}")
-        return (main, *{place.number: place for place in others}.values())
+        earlier = [one for one in self.project.iterations() if one.number < self.iteration.number]
+        if self.iteration.artifact("estimate").exists():
+            main = [Source(self.iteration)]
+        else:
+            main = next((found for one in reversed(earlier) if (found := _estimated(one))), [Source(self.iteration)])
+        others: dict[int, list[Source]] = {}
+        for number in self.also:
+            if number != main[0].place.number:
+                place = self.project.iteration(number)
+                others[number] = _estimated(place) or [Source(place)]
+        found = [*main, *(one for part in others.values() for one in part)]
+        for one in found:
+            number, of = one.place.number, " --of execute" * one.executed
+            require_input(one.recording, f"r2s2r import run.csv --iteration {number}")
+            require_input(one.estimate, f"r2s2r estimate --iteration {number}{of}")
+        return tuple(found)
 
     @cached_property
     def last(self) -> Iteration | None:
@@ -83,20 +112,25 @@ class Asked:
         return [artifact_ref(self.project, path, whole_header(path)) for path in paths]
 
     def runs(self) -> list[RunData]:
-        """The runs of all sources; those of --also are called NNN-RUN. Raises ArtifactError, InputError."""
+        """The runs of all sources; those of --also are called NNN-RUN, an executed one with the name of a recorded one
+        executed-RUN. Raises ArtifactError, InputError."""
         from r2s2r_cli.stages.identify.load import run_data
         from r2s2r_cli.store.read import read_artifact
 
-        found = []
-        for place in self.sources:
-            recording, estimate = (read_artifact(place.artifact(kind), kind)[1] for kind in _KINDS)
-            prefix = "" if place == self.sources[0] else f"{place.number:03d}-"
-            found += [run_data(recording, estimate, run, name=prefix + run) for run in estimate.runs()]
-        return found
+        found: dict[str, RunData] = {}
+        for source in self.sources:
+            recording = read_artifact(source.recording, "recording")[1]
+            estimate = read_artifact(source.estimate, "estimate")[1]
+            prefix = "" if source.place == self.sources[0].place else f"{source.place.number:03d}-"
+            for run in estimate.runs():
+                name = prefix + run
+                name = f"executed-{name}" if name in found else name
+                found[name] = run_data(recording, estimate, run, name=name)
+        return list(found.values())
 
     def artifacts(self) -> list[Path]:
         """Recordings and estimates that are read, those of the main iteration first."""
-        return [place.artifact(kind) for place in self.sources for kind in _KINDS]
+        return [path for source in self.sources for path in (source.recording, source.estimate)]
 
     def check(self, settings: IdentifySettings) -> None:
         """Find what is wrong with the request before any work: names, bounds, intervals, runs, what goes together.

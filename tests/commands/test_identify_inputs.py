@@ -100,9 +100,23 @@ def test_an_iteration_without_an_estimate_learns_from_the_one_before(estimated: 
     """Iteration 3 takes iteration 1 where 2 has nothing; its runs keep their names."""
     (estimated / "iterations" / "002").mkdir()
     found = asked(estimated, 3)
-    assert [place.number for place in found.sources] == [1]
+    assert [source.place.number for source in found.sources] == [1]
     assert [run.name for run in found.runs()] == ["sample"]
     assert [ref.path for ref in found.refs()] == ["iterations/001/10-record.h5", ESTIMATE]
+
+
+def test_the_next_iteration_learns_from_recorded_and_executed_runs(estimated: Path) -> None:
+    """Design section 2: iteration N + 1 takes 20 and 51 of iteration N; equal names are told apart."""
+    folder = estimated / "iterations" / "001"
+    shutil.copy(folder / "10-record.h5", folder / "50-execute.h5")
+    shutil.copy(folder / "20-estimate.h5", folder / "51-estimate.h5")
+    (estimated / "iterations" / "002").mkdir()
+    found = asked(estimated, 2)
+    assert [run.name for run in found.runs()] == ["sample", "executed-sample"]
+    assert [ref.path for ref in found.refs()] == [
+        "iterations/001/10-record.h5", ESTIMATE, "iterations/001/50-execute.h5", "iterations/001/51-estimate.h5",
+    ]  # fmt: skip
+    assert [source.executed for source in asked(estimated, 1).sources] == [False]  # what it planned came later
 
 
 def test_runs_of_other_iterations_carry_their_number(estimated: Path) -> None:

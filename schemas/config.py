@@ -113,7 +113,7 @@ class PlanSettings(Frozen):
     """Start poses for each draw, rest lengths anywhere in the tolerance of the controller; as many again after a gait."""
     sensor_sd_m: Annotated[float, Field(strict=True, ge=0, le=0.1)] = 0.004
     """Error of the length sensors [m], one standard deviation, drawn for every cable and draw but the first."""
-    candidates: Annotated[int, Field(strict=True, ge=1, le=10_000)] = 45
+    candidates: Annotated[int, Field(strict=True, ge=1, le=10_000)] = 60
     """Gaits of each behaviour that are judged on a few draws; a third of them is judged on all."""
     kept: Annotated[int, Field(strict=True, ge=1, le=1000)] = 10
     """Gaits of each behaviour that are kept."""

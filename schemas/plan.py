@@ -60,7 +60,7 @@ PRIMITIVES = GroupSpec(
         column("name", "str", ("primitive",), "1", "name; the policy of this name is the gait"),
         column("behaviour", "str", ("primitive",), "1", "what it was rewarded for: m for displacements, rad for turns, the unit of a user's own reward"),
         column("nominal", "float64", ("primitive",), "1", "reward with the best numbers, from the rest pose"),
-        column("mean", "float64", ("primitive",), "1", "mean reward over drawn numbers and start poses; 0 where it did not come back to rest"),
+        column("mean", "float64", ("primitive",), "1", "mean reward over drawn numbers and start poses; 0 where it did not come back to rest on its usual triangle"),
         column("sd", "float64", ("primitive",), "1", "standard deviation of that reward"),
         column("score", "float64", ("primitive",), "1", "mean less the spread: what gaits are ranked by"),
         column("worked", "float64", ("primitive",), "1", "share of the draws in which it reached all targets and came back to rest"),

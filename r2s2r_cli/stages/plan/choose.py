@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from r2s2r_cli.stages.plan.executor import Executor, Standing, stacked
+from r2s2r_cli.stages.plan.executor import Executor
 from r2s2r_cli.stages.plan.gaits import Gait
 from r2s2r_cli.stages.plan.placement import Reference
 from r2s2r_cli.stages.plan.rewards import Outcomes, Reward
 from r2s2r_cli.stages.plan.robust import Primitive, arrived, earned, judged, primitive
 from r2s2r_cli.stages.plan.search import Found, best_of
+from r2s2r_cli.stages.plan.standing import Standing, stacked
 
 
 @dataclass(frozen=True)
@@ -52,9 +53,21 @@ class Judge:
         return [self._known[gait.key, count] for gait in gaits]
 
 
+SHORTER = 4
+"""One of so many gaits on the shortlist has fewer shapes than others may have: what is short is mostly steady."""
+
+
 def shortlist(found: Found, rewards: Mapping[str, Reward], count: int) -> dict[str, list[Gait]]:
-    """The gaits of the search with the highest rewards of every behaviour."""
-    return {name: [found.gaits[row] for row in best_of(found, reward, count)] for name, reward in rewards.items()}
+    """The gaits of the search with the highest rewards of every behaviour; a quarter of them short ones."""
+    deepest = max((len(gait.targets) for gait in found.gaits), default=0)
+    short = np.array([k for k, gait in enumerate(found.gaits) if len(gait.targets) < deepest], dtype=int)
+    fewer = replace(found, gaits=[found.gaits[k] for k in short], outcomes=found.outcomes.take(short))
+    listed = {}
+    for name, reward in rewards.items():
+        of_short = [fewer.gaits[row] for row in best_of(fewer, reward, count // SHORTER)] if len(short) else []
+        every = [found.gaits[row] for row in best_of(found, reward, count - len(of_short))]
+        listed[name] = list({gait.key: gait for gait in every + of_short}.values())
+    return listed
 
 
 def chosen(

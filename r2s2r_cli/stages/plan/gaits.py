@@ -7,9 +7,10 @@ from itertools import combinations
 
 import numpy as np
 
-from r2s2r_cli.stages.plan.executor import Executor, Standing
+from r2s2r_cli.stages.plan.executor import Executor
 from r2s2r_cli.stages.plan.placement import Reference, turned, wrapped
 from r2s2r_cli.stages.plan.rewards import Outcomes
+from r2s2r_cli.stages.plan.standing import Standing
 from r2s2r_cli.stages.plan.symmetry import principal_axis
 
 

@@ -13,10 +13,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from r2s2r_cli.stages.plan.executor import Executor, Standing, stacked
+from r2s2r_cli.stages.plan.executor import Executor
 from r2s2r_cli.stages.plan.gaits import Seen, padded, seen
 from r2s2r_cli.stages.plan.placement import Reference, wrapped
 from r2s2r_cli.stages.plan.robust import Primitive
+from r2s2r_cli.stages.plan.standing import Standing, stacked
 from r2s2r_cli.stages.plan.symmetry import principal_axis
 
 NEAR_M, SHARE = 0.02, 0.25

@@ -1,8 +1,8 @@
-"""Gaits judged over what is not known: the simulator's numbers, and the pose that the robot starts from.
+"""Gaits judged over what is not known: the simulator's numbers, its sensors, and the pose that the robot starts from.
 
 The score is mean minus so many standard deviations of the reward over all pairs of drawn numbers and start poses; a
-gait that gives a target up, or does not come back to rest, has earned nothing there. A gait that works in one simulator
-only loses to one that works in all of them.
+gait that gives a target up, does not come back to rest, or not on its usual triangle, has earned nothing there. A gait
+that works in one simulator only loses to one that works in all of them.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from r2s2r_cli.stages.plan.executor import Executor, Standing, stacked
+from r2s2r_cli.stages.plan.executor import Executor
 from r2s2r_cli.stages.plan.gaits import Gait, padded, run_gaits
 from r2s2r_cli.stages.plan.placement import Reference
 from r2s2r_cli.stages.plan.rewards import Outcomes, Reward
+from r2s2r_cli.stages.plan.standing import Standing, stacked
 from schemas.robot import Robot
 
 
@@ -86,8 +87,16 @@ def judged(
     ]
 
 
+def steady(came: Outcomes, good: np.ndarray) -> tuple[int, np.ndarray]:
+    """The symmetry that the gait mostly ends with, and where it came back to rest so, (B,)."""
+    usual = int(np.bincount(came.element[good] if good.any() else came.element[:1]).argmax())
+    return usual, good & (came.element == usual)
+
+
 def earned(reward: Reward, came: Outcomes, good: np.ndarray) -> np.ndarray:
-    """Rewards (B,), 0 where the gait did not come back to rest."""
+    """Rewards (B,), 0 where the gait did not come back to rest, or on another triangle than it mostly does: what
+    follows it would then go astray."""
+    _, good = steady(came, good)
     value = np.zeros(len(came))
     if good.any():
         value[good] = reward(came.take(np.flatnonzero(good)))
@@ -100,12 +109,11 @@ def primitive(
     """What a gait is worth, of its outcomes over all pairs; the first pair is the best numbers from the rest pose."""
     value = earned(reward, came, good)
     mean, sd = float(value.mean()), float(value.std())
-    elements = came.element[good] if good.any() else came.element[:1]
-    usual = int(np.bincount(elements).argmax())
-    of = good & (came.element == usual)
+    usual, of = steady(came, good)
     shown = came.take(np.flatnonzero(of) if of.any() else np.arange(1))
     moves = np.column_stack([shown.com[:, :2], shown.turn])
+    same = float(of.sum() / good.sum()) if good.any() else 0.0
     return Primitive(
         name, behaviour, gait, float(value[0]), mean, sd, mean - spread * sd, float(good.mean()), moves.mean(axis=0),
-        moves.std(axis=0), usual, float((elements == usual).mean()), float(shown.duration.mean()),
+        moves.std(axis=0), usual, same, float(shown.duration.mean()),
     )  # fmt: skip

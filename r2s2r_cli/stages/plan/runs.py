@@ -10,10 +10,11 @@ import numpy as np
 
 from r2s2r_cli import __version__
 from r2s2r_cli.artifact import Group, Scalar
-from r2s2r_cli.stages.plan.executor import Executor, Standing, Track
+from r2s2r_cli.stages.plan.executor import Executor
 from r2s2r_cli.stages.plan.gaits import outcomes, padded, seen
 from r2s2r_cli.stages.plan.placement import Reference
 from r2s2r_cli.stages.plan.rewards import Outcomes
+from r2s2r_cli.stages.plan.standing import Standing, Track
 from r2s2r_cli.stages.segments import segments, target_intervals
 from r2s2r_cli.stages.simulate.frames import frame_datasets, stored_rows
 from r2s2r_cli.stages.simulate.policies import policy_group

@@ -17,10 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.stages.plan.alike import Alike, alike, carried, told_targets
-from r2s2r_cli.stages.plan.executor import Executor, Standing
+from r2s2r_cli.stages.plan.executor import Executor
 from r2s2r_cli.stages.plan.gaits import Gait, Seen, neighbours, outcomes, seen
 from r2s2r_cli.stages.plan.placement import Reference
 from r2s2r_cli.stages.plan.rewards import Outcomes, Reward, joined
+from r2s2r_cli.stages.plan.standing import Standing
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,9 @@ from functools import lru_cache
 import numpy as np
 
 from r2s2r_cli.stages.plan.belief import assumed
-from r2s2r_cli.stages.plan.executor import Executor, Standing
+from r2s2r_cli.stages.plan.executor import Executor
 from r2s2r_cli.stages.plan.placement import Reference, reference_of
+from r2s2r_cli.stages.plan.standing import Standing
 from r2s2r_cli.stages.plan.symmetry import symmetry_group
 from tests.support.robots import subject
 

@@ -1,0 +1,88 @@
+"""Long policies: which sequences of gaits are tried for each, and which of them is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from r2s2r_cli.errors import NumericalError
+from r2s2r_cli.stages.plan.long import Walk, walks
+from r2s2r_cli.stages.plan.robust import Primitive
+from r2s2r_cli.stages.plan.route import (
+    LONG,
+    Goal,
+    Moves,
+    Paths,
+    best_sequences,
+    different_sequences,
+    moves_of,
+    walked,
+    way_to,
+    without_rare,
+)
+from r2s2r_cli.stages.plan.world import Progress, Request, World
+from schemas.config import PlanSettings
+
+SEQUENCES = 4
+"""Sequences of gaits that are tried for each long policy."""
+LOST = -10.0
+"""Worth of a sequence in which the robot gives a target up: less than any other."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """A long policy before it is judged. path: on paper."""
+
+    name: str
+    path: Paths
+    walk: Walk
+
+
+def ways(
+    world: World, request: Request, settings: PlanSettings, primitives: Sequence[Primitive], progress: Progress
+) -> list[Way]:
+    """The paper's long gaits and the ways to the goals, made of gaits that can be relied on.
+
+    Of several sequences for each the one is taken that does best in the simulator, over drawn numbers.
+    """
+    fit = without_rare(primitives)
+    moves = moves_of(world.reference, fit)
+    values: dict[str, Callable[[Paths], np.ndarray]] = dict(LONG)
+    tried: list[tuple[str, Paths]] = []
+    for name, value in LONG.items():
+        best = partial(best_sequences, length=settings.cycles, value=value, count=1)
+        tried += [(name, path) for path in different_sequences(moves, best, SEQUENCES)]
+    for name, goal in request.goals.items():
+        way_to(moves, goal)  # raises where there is none at all
+        values[name] = partial(_near, goal)
+        tried += [(name, path) for path in different_sequences(moves, partial(_way_or_none, goal), SEQUENCES)]
+    longest = max((path.picks.shape[1] for _, path in tried), default=0)
+
+    def walked_along(paths: list[tuple[str, Paths]], *, smooth: bool, part: str) -> list[Walk]:
+        sequences = [[fit[k] for k in path.picks[0]] for _, path in paths]
+        return walks(world.executor, world.reference, world.few, sequences, smooth=smooth,
+                     progress=lambda done: progress(part, done, longest))  # fmt: skip
+
+    score: dict[str, tuple[float, Paths]] = {}
+    for (name, path), walk in zip(tried, walked_along(tried, smooth=False, part="sequences"), strict=True):
+        worth = np.where(walk.lost, LOST, values[name](walked(walk.way)))
+        one = float(worth.mean() - settings.spread * worth.std())
+        if name not in score or one > score[name][0]:
+            score[name] = one, path
+    chosen_paths = [(name, path) for name, (_, path) in score.items()]
+    made = walked_along(chosen_paths, smooth=settings.smooth, part="long policies")
+    return [Way(name, path, walk) for (name, path), walk in zip(chosen_paths, made, strict=True)]
+
+
+def _near(goal: Goal, paths: Paths) -> np.ndarray:
+    return -goal.miss(paths)
+
+
+def _way_or_none(goal: Goal, moves: Moves) -> Paths | None:
+    try:
+        return way_to(moves, goal)
+    except NumericalError:
+        return None

@@ -26,6 +26,7 @@ from r2s2r_cli.commands.plan import plan
 from r2s2r_cli.commands.record import record
 from r2s2r_cli.commands.recover import recover
 from r2s2r_cli.commands.rig import rig
+from r2s2r_cli.commands.run import run
 from r2s2r_cli.commands.simulate import simulate
 from r2s2r_cli.commands.status import status
 from r2s2r_cli.commands.validate import validate
@@ -40,6 +41,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "plan": plan,
     "execute": execute,
     "compare": compare,
+    "run": run,
     "floor": floor,
     "simulate": simulate,
     "rig": rig,

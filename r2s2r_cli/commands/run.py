@@ -1,0 +1,141 @@
+"""`r2s2r run`: all stages of an iteration, one after the other; what is fresh is not made again."""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from r2s2r_cli.commands.record import Protocol
+from r2s2r_cli.console import Console
+from r2s2r_cli.errors import ExitCode, Interrupted, UsageError
+from r2s2r_cli.options import DrawOption, DryRunOption, IterationOption, ProjectOption, QuietOption
+from r2s2r_cli.store.project import Iteration, Project
+
+STAGES = ("record", "estimate", "identify", "plan", "execute", "estimate-executed", "compare")
+"""In their order; `import` takes the place of `record` where logs are given."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One stage: its command without `r2s2r`, and the artifact that it makes. robot: it moves the robot, and is not
+    done again where its artifact is there."""
+
+    name: str
+    words: tuple[str, ...]
+    target: Path
+    robot: bool = False
+
+
+def run(
+    source: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Logs to import instead of recording.", show_default=False),
+    ] = None,
+    port: Annotated[
+        str | None,
+        typer.Option("--port", metavar="PORT", help="The robot: /dev/ttyUSB0, socket://HOST:PORT or udp://HOST:PORT."),
+    ] = None,
+    protocol: Annotated[Protocol, typer.Option("--protocol", help="How it talks.")] = Protocol.CHECKED,
+    camera: Annotated[
+        str | None, typer.Option("--camera", metavar="CAMERA", help="realsense[:SERIAL], open3d or rig://HOST:PORT.")
+    ] = None,
+    random: Annotated[int, typer.Option("--random", metavar="N", help="Targets of the random policy to record.")] = 15,
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--policy", metavar="NAME", help="Policy of the plan to execute; repeatable. Default: the long ones."
+        ),
+    ] = None,
+    repeats: Annotated[int, typer.Option("--repeats", metavar="N", help="Execute every policy N times.")] = 1,
+    until: Annotated[
+        str, typer.Option("--until", metavar="STAGE", help=f"Stop after this stage: {', '.join(STAGES)}.")
+    ] = STAGES[-1],
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before the robot executes the plan.")] = False,
+    project: ProjectOption = None,
+    iteration: IterationOption = None,
+    quiet: QuietOption = False,
+    draw: DrawOption = True,
+    dry_run: DryRunOption = False,
+) -> None:
+    """Record (or import), estimate, identify, plan, execute, estimate again and compare: one iteration of the loop.
+
+    Every stage is the command of that name; a fresh one says so and costs nothing, one that was interrupted goes on
+    where it was, a robot that has moved is not moved again. The first stage that fails ends the run, with its code.
+
+    Example: r2s2r run --port /dev/ttyUSB0 --camera realsense
+    """  # fmt: skip
+    console = Console(quiet=quiet)
+    here = Project.find(project)
+    place = here.iteration(iteration, create=True)
+    if until not in STAGES:
+        raise UsageError("there is no such stage", where="--until", expected=" | ".join(STAGES), received=until,
+                         hint=f"r2s2r run --until {STAGES[-1]}")  # fmt: skip
+    robot: tuple[str, ...] = () if port is None else ("--port", port, "--protocol", protocol.value)
+    robot += () if camera is None else ("--camera", camera)
+    names = tuple(policy or ()) or ("straight", "arching", "turn-clockwise", "turn-counterclockwise")
+    steps = list(_steps(here, place, tuple(source or ()), robot, random, names, repeats, yes=yes))
+    steps = [step for step in steps if STAGES.index(step.name) <= STAGES.index(until)]
+    common = ("--project", str(here.root), "--iteration", str(place.number), *(("--quiet",) if quiet else ()),
+              *(() if draw else ("--no-draw",)))  # fmt: skip
+    for number, step in enumerate(steps, start=1):
+        words = ("r2s2r", *step.words, "--iteration", str(place.number))
+        if step.robot and step.target.exists():
+            console.say(f"[{number}/{len(steps)}] {here.relative(step.target)} is there: the robot is not moved again")
+            continue
+        console.say(f"[{number}/{len(steps)}] {shlex.join(words)}")
+        if dry_run:
+            continue
+        _carry_out((*step.words, *common, *_resumed(step)), shlex.join(words))
+    if dry_run:
+        console.say("nothing was done")
+
+
+def _steps(
+    project: Project, place: Iteration, source: Sequence[Path], robot: tuple[str, ...], random: int,
+    policies: tuple[str, ...], repeats: int, *, yes: bool,
+) -> Iterator[Step]:  # fmt: skip
+    """The stages of this iteration. Without a robot and without logs an iteration learns from the runs before it."""
+    recording, executed = place.artifact("recording"), place.artifact("recording", executed=True)
+    earlier = any(one.artifact("estimate").exists() for one in project.iterations() if one.number < place.number)
+    if source:
+        yield Step("record", ("import", *map(str, source)), recording)
+    elif robot and not earlier:
+        yield Step("record", ("record", "--random", str(random), *robot), recording, robot=True)
+    elif not earlier and not recording.exists():
+        raise UsageError("there is neither a robot nor a log", where="r2s2r run", expected="--port PORT, or log files",
+                         received="neither", hint="r2s2r run run.csv")  # fmt: skip
+    if source or recording.exists() or not earlier:
+        yield Step("estimate", ("estimate",), place.artifact("estimate"))
+    yield Step("identify", ("identify",), place.artifact("identification"))
+    yield Step("plan", ("plan",), place.artifact("plan"))
+    if robot or executed.exists():
+        words = ("execute", *policies, "--repeats", str(repeats), *robot, *(("--yes",) if yes else ()))
+        yield Step("execute", words, executed, robot=True)
+        yield Step("estimate-executed", ("estimate", "--of", "execute"), place.artifact("estimate", executed=True))
+    yield Step("compare", ("compare",), place.artifact("comparison"))
+
+
+def _resumed(step: Step) -> tuple[str, ...]:
+    """`--resume` where the stage takes it: without a checkpoint it begins anew, and says so."""
+    return ("--resume",) if step.name in ("identify", "plan") else ()
+
+
+def _carry_out(words: Sequence[str], shown: str) -> None:
+    """One command in a process of its own, so that its memory is given back; its words are ours. Leaves with its code
+    where it fails."""
+    with subprocess.Popen([sys.executable, "-m", "r2s2r_cli", *words]) as child:
+        try:
+            code = child.wait()
+        except KeyboardInterrupt:
+            code = child.wait()  # it had the same signal, and stops what it does in its own way
+    if code == ExitCode.INTERRUPTED or code < 0:
+        raise Interrupted(f"stopped in: {shown}", hint=shlex.join(["r2s2r", *sys.argv[1:]]))
+    if code != ExitCode.DONE:
+        raise typer.Exit(code)

@@ -1,0 +1,112 @@
+"""`run`: which stages an iteration needs, in which order, and what ends it."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pytest
+
+from tests.commands.conftest import invoke
+
+Calls = list[list[str]]
+
+
+class Child:
+    """Stands for the process of a stage: notes its words, leaves with the code that was set."""
+
+    calls: ClassVar[Calls] = []
+    codes: ClassVar[dict[str, int]] = {}
+
+    def __init__(self, words: list[str]) -> None:
+        Child.calls.append(words[3:])
+
+    def __enter__(self) -> Child:
+        return self
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def wait(self) -> int:
+        """The code of this stage."""
+        return Child.codes.get(Child.calls[-1][0], 0)
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
+    """The stages that were called, in order; none of them does anything."""
+    Child.calls, Child.codes = [], {}
+    monkeypatch.setattr(subprocess, "Popen", Child)
+    return Child.calls
+
+
+def stages(calls: Calls) -> list[str]:
+    """Their names."""
+    return [words[0] + (" executed" if "execute" in words[1:3] else "") for words in calls]
+
+
+def test_a_robot_goes_through_all_stages(project: Path, calls: Calls) -> None:
+    """In the order of the data, the estimate twice."""
+    result = invoke("run", "--port", "socket://nowhere:1", "--camera", "rig://nowhere:2", "--yes", "--random", "3")
+    assert result.exit_code == 0, result.stderr
+    assert stages(Child.calls) == [
+        "record", "estimate", "identify", "plan", "execute", "estimate executed", "compare",
+    ]  # fmt: skip
+    record, execute = Child.calls[0], Child.calls[4]
+    assert record[1:3] == ["--random", "3"]
+    assert "straight" in execute and "--yes" in execute
+    assert all("socket://nowhere:1" in words for words in (record, execute))
+
+
+def test_a_log_needs_no_robot(project: Path, calls: Calls) -> None:
+    """It is imported; nothing is executed."""
+    result = invoke("run", "sample.csv", "--until", "identify")
+    assert result.exit_code == 0, result.stderr
+    assert stages(Child.calls) == ["import", "estimate", "identify"]
+
+
+def test_a_robot_that_has_moved_is_not_moved_again(estimated: Path, calls: Calls) -> None:
+    """The recording is there: the rest goes on from it."""
+    result = invoke("run", "--port", "socket://nowhere:1", "--until", "plan")
+    assert result.exit_code == 0, result.stderr
+    assert "not moved again" in result.stderr
+    assert stages(Child.calls) == ["estimate", "identify", "plan"]
+
+
+def test_the_next_iteration_records_nothing(estimated: Path, calls: Calls) -> None:
+    """It learns from the runs of the one before (design.md, section 2)."""
+    result = invoke("run", "--iteration", "2", "--port", "socket://nowhere:1", "--until", "execute")
+    assert result.exit_code == 0, result.stderr
+    assert stages(Child.calls) == ["identify", "plan", "execute"]
+
+
+@pytest.mark.parametrize(("code", "wanted"), [(3, 3), (4, 4), (5, 5), (6, 6), (130, 130), (-9, 130)])
+def test_the_first_failure_ends_it_with_its_code(estimated: Path, calls: Calls, code: int, wanted: int) -> None:
+    """What comes after is not begun; a killed stage counts as interrupted."""
+    Child.codes["identify"] = code
+    result = invoke("run")
+    assert result.exit_code == wanted
+    assert stages(Child.calls)[-1] == "identify"
+
+
+def test_without_robot_and_log_nothing_begins(project: Path, calls: Calls) -> None:
+    """Exit code 2, with what to give."""
+    result = invoke("run")
+    assert result.exit_code == 2
+    assert Child.calls == []
+    assert "--port" in result.stderr
+
+
+def test_dry_run_says_the_commands(estimated: Path, calls: Calls) -> None:
+    """Each can be pasted."""
+    result = invoke("run", "--dry-run")
+    assert result.exit_code == 0
+    assert Child.calls == []
+    assert "r2s2r identify --iteration 1" in result.stderr
+
+
+def test_an_unknown_stage_is_refused(project: Path, calls: Calls) -> None:
+    """With the names."""
+    result: Any = invoke("run", "--until", "diagnoze")
+    assert result.exit_code == 2
+    assert "compare" in result.stderr

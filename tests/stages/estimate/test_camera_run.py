@@ -194,6 +194,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "out of view": ({"change": spoiled.empty}, "no cap"),
     "unit four times": ({"scale": 4.0}, "large as their depth"),
     "unit a quarter": ({"scale": 0.25}, "large as their depth"),
+    "unit 5 % off": ({"scale": 1.05}, "rods look"),
 }
 
 
@@ -208,7 +209,7 @@ def test_what_cannot_be_tracked_is_refused_with_the_way_out(case: Case, name: st
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("share", [1.2, 1 / 1.5])
+@pytest.mark.parametrize("share", [1.2, 1.05, 1 / 1.5])
 def test_a_wrong_focal_length_is_refused(case: Case, share: float) -> None:
     """Rods are rigid: their length in the pictures tells."""
     lens = case.frames.lens

@@ -24,6 +24,8 @@ PIXEL_SD = 0.32
 """What a pixel of the mask differs by from the modelled rim: 1 / sqrt(12) as it is yes or no, and colour noise."""
 RIM_SD_PX = 0.10
 """Common error of the disc across the line of sight: uneven light, a rim that the range cuts on one side."""
+MASK_SD_PX = 0.35
+"""The same where too little is seen to tell how much of a pixel is the ball: what lies beside moves a mask."""
 CORE, FRAY_PX = 0.85, 1.5
 """Depths beyond this share of the disc's radius, or so close to its rim, are left out: edges fray."""
 EDGES_PX, DEPTHS_ENOUGH = 2.2, 12
@@ -197,7 +199,7 @@ class BallFitter:
             limit = _STEP_PX * c[2] / self.f
             c = c + disc.E @ np.clip(step[:3], -limit, limit)
             delta += float(np.clip(step[3], -0.5, 0.5))
-        across = (RIM_SD_PX * c[2] / self.f) ** 2
+        across = ((MASK_SD_PX if share is patch.colored else RIM_SD_PX) * c[2] / self.f) ** 2
         along = ALONG_SD_M if len(depths.z) else BLIND_SD_M
         cov_C = disc.E @ (cov[:3, :3] + np.diag([across, across, along**2])) @ disc.E.T
         edge = np.abs(disc.rho - disc.rim) * self.f < RIM_PX / 2

@@ -22,7 +22,6 @@ from r2s2r_cli.stages.estimate.vision.plane import (
     Method,
     find_ground,
     open3d_there,
-    points_C,
 )
 from r2s2r_cli.stages.estimate.vision.plausible import HINT, check_lengths, check_sizes
 from r2s2r_cli.stages.estimate.vision.sight import Sighter
@@ -126,10 +125,13 @@ def _ground(
     frames: list[ImageFrame], lens: Intrinsics, scale: float, seed: int, method: Method, warnings: list[str]
 ) -> Ground:
     chosen = frames[:: max(len(frames) // PLANES, 1)][:PLANES]
-    found = []
+    rays, found = Lens(lens), []
+    slopes = np.stack([rays.x, rays.y, np.ones_like(rays.x)], axis=-1)
     for frame in chosen:
         assert frame.depth is not None  # noqa: S101
-        ground = find_ground(points_C(frame.depth, lens, scale), seed=seed, method=method)
+        ground = find_ground(
+            slopes * np.where(frame.depth > 0, frame.depth * scale, np.nan)[..., None], seed=seed, method=method
+        )
         if ground is not None:
             found.append(ground)
     if not found:

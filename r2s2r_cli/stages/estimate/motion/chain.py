@@ -17,7 +17,7 @@ from r2s2r_cli.errors import NumericalError
 
 @dataclass(frozen=True)
 class Normal:
-    """H dx = -g. diagonal: (frame, dim, dim), upper: H of frames k and k + 1, (frame - 1, dim, dim), g: (frame, dim)."""
+    """H dx = -g. diagonal: (frame, dim, dim); upper: H of frames k, k + 1, (frame - 1, dim, dim); g: (frame, dim)."""
 
     diagonal: np.ndarray
     upper: np.ndarray

@@ -82,7 +82,7 @@ def _sensors(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body) -> N
         )
         slope = np.hstack([-u, u, -later * u, later * u, np.ones((len(x), 1))])
         residual = length + x[:, body.bias.start + s] - evidence.shown[:, s]
-        frames.scalar(states, slope, residual, weight, evidence.sensor_freedom)
+        frames.scalar(states, slope, residual, weight, bend=evidence.sensor_bend)
 
 
 def _floor(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body, settings: MotionSettings) -> None:

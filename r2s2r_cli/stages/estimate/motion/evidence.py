@@ -31,8 +31,8 @@ class Evidence:
     """How many, (frame, sensor)."""
     sensor_weight: np.ndarray
     """[1/m^2], (frame, sensor)."""
-    sensor_freedom: float | None
-    """Of Student's t of the sensors; None: Gaussian, so that even sensors far off pull, which a first guess may need."""
+    sensor_bend: float | None
+    """Beyond so many standard deviations the cost of a sensor grows linearly; None: never."""
     touching: np.ndarray
     """Probability that a cap carries weight, (frame, cap); 0 everywhere while it is not asked for."""
 

@@ -11,8 +11,8 @@ import numpy as np
 class Frames:
     """Sum of costs over frames: value, gradient (frame, dim), Gauss-Newton matrix (frame, dim, dim).
 
-    A cost is half a squared residual over its variance; with `freedom` that of Student's t instead, which a residual far
-    out moves little (Lange, Little and Taylor, JASA 84 (1989) 881).
+    A cost is half a squared residual over its variance; with `freedom` that of Student's t instead, which a residual
+    far out moves little (Lange, Little and Taylor, JASA 84 (1989) 881).
     """
 
     frames: int
@@ -27,14 +27,15 @@ class Frames:
 
     def scalar(
         self, states: np.ndarray, slope: np.ndarray, residual: np.ndarray, weight: np.ndarray,
-        freedom: float | None = None,
+        freedom: float | None = None, bend: float | None = None,
     ) -> None:  # fmt: skip
-        """Add one residual a frame.
+        """Add one residual a frame. bend: beyond so many standard deviations its cost grows linearly (pseudo-Huber).
 
         states: indices that it depends on, shape (m,); slope: its derivatives by these, (frame, m); residual, weight
         (1 / variance; 0: none): (frame,).
         """
-        value, used = _robust(weight * residual**2, 1, freedom)
+        square = weight * residual**2
+        value, used = _robust(square, 1, freedom) if bend is None else _bent(square, bend)
         self.cost += value
         weighted = slope * (used * weight)[:, None]
         self.gradient[:, states] += weighted * residual[:, None]
@@ -60,6 +61,11 @@ class Frames:
 def heavy_tail(square: np.ndarray, count: int, freedom: float) -> np.ndarray:
     """Weight that Student's t with `freedom` gives a residual of `count` parts with this squared size; 1 on average."""
     return np.asarray((freedom + count) / (freedom + square))
+
+
+def _bent(square: np.ndarray, bend: float) -> tuple[float, np.ndarray]:
+    root = np.sqrt(1.0 + square / bend**2)
+    return bend**2 * float(np.sum(root - 1.0)), 1.0 / root
 
 
 def _robust(square: np.ndarray, count: int, freedom: float | None) -> tuple[float, np.ndarray]:

@@ -55,9 +55,9 @@ def label(
     candidates: of each rod, centres of the blobs of its colour [m], shape (blob, 3), in any frame whose z points up;
     two or more (distractors). length: of the cables by their sensors [m], shape (cable,), NaN where there is none;
     None or all NaN: the shape at rest of robot.toml is compared instead, mirror images told apart, which holds only
-    while the robot rests. predicted: caps (cap, 3) and covariance (cap, 3, 3) where the filter expects them; it takes the
-    place of the shape at rest. partly: a cap may be missing (NaN, pick -1), at a price. None where some rod has no two
-    blobs a rod length apart (partly: where no blob is left).
+    while the robot rests. predicted: caps (cap, 3) and covariance (cap, 3, 3) where the filter expects them; it takes
+    the place of the shape at rest. partly: a cap may be missing (NaN, pick -1), at a price. None where some rod has no
+    two blobs a rod length apart (partly: where no blob is left).
     """
     blobs = [np.asarray(one, dtype=float).reshape(-1, 3) for one in candidates]
     pairs = [_pairs(one, rod.length_m, partly) for one, rod in zip(blobs, robot.rods, strict=True)]

@@ -48,7 +48,7 @@ def prepare(sighted: Sighted, body: Body) -> Prepared:
         )  # fmt: skip
     if len(t) < MIN_FRAMES or not np.all(np.isfinite(t)) or np.any(np.diff(t) <= 0):
         raise InputError(
-            "the frames allow no estimate", where="camera/t", expected=f"at least {MIN_FRAMES} frames, stamps that increase",
+            "the frames allow no estimate", where="camera/t", expected=f"at least {MIN_FRAMES} frames, rising stamps",
             received=f"{len(t)} frames, {int(np.sum(~(np.diff(t) > 0)))} stamps not after the one before",
             hint="r2s2r inspect 10-record.h5 shows the stamps",
         )  # fmt: skip
@@ -119,12 +119,12 @@ def first_evidence(prepared: Prepared, body: Body, settings: MotionSettings, swi
         across=np.zeros((len(prepared.t), body.caps, 3, ACROSS)),
         density=np.full((gaps, body.caps), settings.acceleration), kick=kick,
         shown=none, later=none, samples=none, sensor_weight=none,
-        sensor_freedom=None, touching=np.zeros((len(prepared.t), body.caps)),
+        sensor_bend=None, touching=np.zeros((len(prepared.t), body.caps)),
     )  # fmt: skip
 
 
 def principal(cov: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Variances (..., 3), ascending, and unit vectors as rows (..., 3, 3) of covariances; the last is the line of sight."""
+    """Variances (..., 3), ascending, and unit vectors as rows (..., 3, 3) of covariances; last: the line of sight."""
     values, vectors = np.linalg.eigh(cov)
     return np.maximum(values, 1e-12), np.swapaxes(vectors, -1, -2)
 

@@ -25,7 +25,7 @@ DEAD_NOISE_M = 0.02
 
 @dataclass(frozen=True)
 class State:
-    """Where the alternation stands. factor: on the variances of the sightings, (2,); noise: of one sample [m], (sensor,)."""
+    """Where the alternation stands. factor: on variances of the sightings, (2,); noise: of a sample [m], (sensor,)."""
 
     x: np.ndarray
     evidence: Evidence

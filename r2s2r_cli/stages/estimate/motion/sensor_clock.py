@@ -12,6 +12,8 @@ from r2s2r_cli.stages.estimate.motion.data import Readings, SensorClock
 STEP_S = 0.01
 CLEAR_M = 0.004
 """[m] Lengths that the camera knows worse than this say nothing."""
+MOVED_M = 0.002
+"""[m] A cable whose length scatters less than this tells no time."""
 KNOWN_SD_S = 0.02
 LEAST = 30
 """Fewest samples of a sensor."""
@@ -38,7 +40,8 @@ def find_clock(
         stamp, shown = stamp[order], shown[order]
         inside = (stamp > t[0] + range_s) & (stamp < t[-1] - range_s)
         stamp, shown = stamp[inside], shown[inside]
-        if len(stamp) < LEAST:
+        clear = length[sd[:, s] < CLEAR_M, s]
+        if len(stamp) < LEAST or len(clear) < LEAST or np.std(clear) < MOVED_M:
             continue
         squares = np.array([_residual(t, length[:, s], rate[:, s], sd[:, s], stamp, shown, at) for at in grid])
         valid = np.all(np.isfinite(squares), axis=0)
@@ -69,7 +72,7 @@ def find_clock(
 def _residual(
     t: np.ndarray, length: np.ndarray, rate: np.ndarray, sd: np.ndarray, stamp: np.ndarray, shown: np.ndarray, at: float
 ) -> np.ndarray:
-    """Shown minus the best offset, gain and bow of the lengths `at` earlier; NaN where the camera does not know them."""
+    """Shown minus the best offset, gain and bow of lengths `at` earlier; NaN where the camera does not know them."""
     when = stamp - at
     k = np.clip(np.searchsorted(t, when, side="right") - 1, 0, len(t) - 2)
     seen = hermite(t, length, rate, k, when)

@@ -15,7 +15,7 @@ LEAST = 0.02
 def shared_errors(prepared: Prepared, factor: np.ndarray) -> np.ndarray:
     """Shared error of one standard deviation in two directions across the line of sight [m], (frame, cap, 3, 2).
 
-    factor: on the stated variances, across and along the line of sight, that gives the scatter from frame to frame (2,).
+    factor: on the stated variances, across and along the line of sight, that gives the scatter between frames (2,).
     A cap that is half behind something, or lit from one side, is seen beside its place in every frame alike. Sightings
     state the whole error; their scatter is what is independent, the rest is shared. The directions are the same in all
     frames: across the mean line of sight, which is the axis along which most sightings are worst.

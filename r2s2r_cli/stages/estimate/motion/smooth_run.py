@@ -21,9 +21,9 @@ UNSEEN_BURSTS = 6.0
 """The same where a cap is hidden: how it moved there is only known on average, and averages have few bursts."""
 FEW = 2
 """Gauss-Newton steps between two looks at the noise: it need not settle before the noise does."""
-SENSOR_FREEDOM = 5.0
-"""Of Student's t: more sensor samples are wild than sightings (dropouts). A first guess of a hidden cap may be far off,
-where Student's t would take the sensors for wild: they come in as Gaussian, once."""
+SENSOR_BEND = 2.5
+"""Sensor samples are wild at times (dropouts), so that their cost bends; but it never stops growing, because a first
+guess of a hidden cap may be far off where all its sensors seem wild. They come in unbent, once, for the same reason."""
 ALONE, TOGETHER = 2, 3
 """Rounds of states and noise: with sightings alone, and with everything."""
 
@@ -56,8 +56,8 @@ def smooth_run(
     state = settle(state, body, settings, steps=FEW)
     state, clock = _with_sensors(state, readings, body, settings)
     state = touch(state, prepared, body, hidden=False)
-    state = settle(state, body, settings, steps=2 * FEW)
-    state = replace(state, evidence=replace(state.evidence, sensor_freedom=SENSOR_FREEDOM))
+    state = settle(state, body, settings)
+    state = replace(state, evidence=replace(state.evidence, sensor_bend=SENSOR_BEND))
     for left in reversed(range(TOGETHER)):
         state = learn(settle(state, body, settings, steps=FEW), prepared, body)
         state = touch(state, prepared, body, hidden=left == 0)

@@ -13,7 +13,7 @@ from r2s2r_cli.stages.estimate.camera_input import Pictures, kept_frames, sensor
 from r2s2r_cli.stages.estimate.ground import Ground
 from r2s2r_cli.stages.estimate.lengths import sensor_lengths
 from r2s2r_cli.stages.estimate.motion.data import REJECTED, SEEN, MotionSettings, Readings, Sighted, TrackedRun
-from r2s2r_cli.stages.estimate.motion.smooth_run import smooth_run
+from r2s2r_cli.stages.estimate.pieces import smooth_pieces
 from r2s2r_cli.stages.estimate.rigid import make_rigid
 from r2s2r_cli.stages.estimate.run import RunState, intervals_of, switches
 from r2s2r_cli.stages.estimate.smooth import MISSING, OBSERVED, OUTLIER, Tracks
@@ -77,9 +77,10 @@ def tracked_run(
     readings = sensor_readings(streams, robot)
     sighter = Sighter(robot, source.lens, source.depth_scale, known)
     swept = Sweep(run, source, sighter, known.X_WC, readings, robot, motion, advance).run()
-    show(f"{run}: smoothing", 0, 1, "")
-    tracked = smooth_run(swept.sighted, readings, robot, motion, switches=switches(streams, source.t))
-    show(f"{run}: smoothing", 1, 1, "")
+    tracked = smooth_pieces(
+        swept.sighted, readings, robot, motion, switches=switches(streams, source.t),
+        show=lambda pieces, all_: show(f"{run}: smoothing", pieces, all_, ""),
+    )  # fmt: skip
     return _state(run, streams, source, robot, settings, known, swept, tracked, readings,
                   np.arange(n) if rows is None else rows)  # fmt: skip
 

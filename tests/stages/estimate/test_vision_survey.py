@@ -94,6 +94,25 @@ def test_a_knocked_camera_is_warned_of() -> None:
     assert any("knocked" in word for word in found.warnings)
 
 
+def test_a_floor_full_of_things_is_warned_of() -> None:
+    """Boxes of all heights all about, so that the largest plane is not the ground: it is warned of, and a stated pose
+    is believed instead."""
+    source, rng = shifted(), np.random.default_rng(TUNING)
+    assert source.X_WC is not None
+    boxes = np.kron(rng.integers(200, 2000, (30, 40)), np.ones((16, 16))).astype(np.uint16)
+    boxes[:, 260:380] = 0
+    frames = [
+        replace(frame, depth=np.where(frame.depth > 0, frame.depth - boxes, 0).astype(np.uint16))
+        for frame in source.frames
+        if frame.depth is not None
+    ]
+    found = survey(replace(source, frames=frames), ROBOT, frames=2, method="numpy")
+    assert any("need not be the ground" in word for word in found.warnings)
+    assert any("the stated pose is used" in word for word in found.warnings)
+    assert pytest.approx(source.X_WC) == found.X_WC
+    assert found.ground is not None and found.ground.distance == pytest.approx(1.3)
+
+
 def changed(kind: str) -> Recorded:
     """A recording with one thing wrong."""
     source = shifted()

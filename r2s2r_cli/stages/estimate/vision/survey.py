@@ -5,7 +5,7 @@ And whether the pictures fit the robot at all.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -75,13 +75,17 @@ def survey(
     X_WC = camera_pose(ground)
     if source.X_WC is not None:
         angle, height = disagreement(source.X_WC, ground)
-        if angle > TILT_RAD or abs(height) > HEIGHT_M:
+        if angle <= TILT_RAD and abs(height) <= HEIGHT_M:
+            X_WC = source.X_WC
+        else:
+            trusted = ground.share >= MIN_SHARE
             warnings.append(
                 f"the recording's camera pose and the ground that is seen differ by {np.degrees(angle):.1f} degrees, "
-                f"{1e3 * height:.0f} mm; the ground that is seen is used"
+                f"{1e3 * height:.0f} mm; {'the ground that is seen' if trusted else 'the stated pose'} is used"
             )
-        else:
-            X_WC = source.X_WC
+            if not trusted:
+                X_WC = source.X_WC
+                ground = replace(ground, normal_C=X_WC[2, :3].copy(), distance=float(X_WC[2, 3]))
     noise = _noise(usable[:: max(len(usable) // NOISE_FRAMES, 1)][:NOISE_FRAMES], lens, scale, ground)
     first = Survey(X_WC, ground, noise)
     check_sizes(usable, robot, lens, scale)

@@ -68,7 +68,7 @@ def test_without_noise_the_caps_are_where_they_are() -> None:
     assert seen.visible[full] == pytest.approx(1.0, abs=0.08)
 
 
-@pytest.mark.parametrize("height", [1.44, 2.4])
+@pytest.mark.parametrize("height", [1.44, pytest.param(2.4, marks=pytest.mark.slow)])
 def test_with_noise_the_covariance_is_honest(height: float) -> None:
     """Robots tumbled at random, so that rods and motors hide caps: no sighting is off by five of its deviations, the
     mean squared normalised error is below 3.5 (3 where exact), and hardly a cap that shows a third is missed."""
@@ -106,7 +106,7 @@ def arm_over(cap: int, share: float) -> Occluder:
     return Occluder(a_m=(p[0] - 0.15, p[1], p[2]), b_m=(p[0] + 0.15, p[1], p[2]), radius_m=radius)
 
 
-@pytest.mark.parametrize("share", [0.35, 0.6])
+@pytest.mark.parametrize("share", [pytest.param(0.35, marks=pytest.mark.slow), 0.6])
 def test_an_arm_that_hides_a_part_moves_nothing(share: float) -> None:
     """A cap hidden in part by something the robot knows nothing of is seen within five deviations, and less surely."""
     camera = settings().model_copy(update={"occluders": (arm_over(1, share),)})

@@ -81,6 +81,7 @@ def test_a_pose_that_the_ground_contradicts_is_warned_of() -> None:
     assert found.X_WC[2, 3] == pytest.approx(1.3, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_knocked_camera_is_warned_of() -> None:
     """The ground 1 cm lower from the middle of the run on."""
     source = shifted()
@@ -94,6 +95,7 @@ def test_a_knocked_camera_is_warned_of() -> None:
     assert any("knocked" in word for word in found.warnings)
 
 
+@pytest.mark.slow
 def test_a_floor_full_of_things_is_warned_of() -> None:
     """Boxes of all heights all about, so that the largest plane is not the ground: it is warned of, and a stated pose
     is believed instead."""
@@ -142,7 +144,8 @@ def changed(kind: str) -> Recorded:
     ("kind", "says"),
     [
         ("focal", "shorter than they are"), ("black", "no frame of the run"),
-        ("white", "no frame of the run"), ("grey", "no cap"), ("no depth", "no frame of the run"),
+        ("white", "no frame of the run"), pytest.param("grey", "no cap", marks=pytest.mark.slow),
+        ("no depth", "no frame of the run"),
         ("swapped", "not one of this camera"),
     ],
 )  # fmt: skip
@@ -161,6 +164,7 @@ def test_the_wrong_depth_unit_is_named() -> None:
     assert scale == pytest.approx(0.00025, rel=0.33)
 
 
+@pytest.mark.slow
 def test_a_robot_out_of_view_is_refused() -> None:
     """A floor without a robot."""
     with pytest.raises(InputError, match="no cap of the robot"):

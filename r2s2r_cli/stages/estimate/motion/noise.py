@@ -85,7 +85,7 @@ def gap_density(x: np.ndarray, marginal: Marginals, evidence: Evidence, body: Bo
 def next_density(each: np.ndarray, kick: np.ndarray, dt: np.ndarray, believed: np.ndarray) -> np.ndarray:
     """Density of every gap and cap for the next round: its neighbourhood, drawn to the mean of the run.
 
-    each: of `gap_density`; kick: (frame - 1,); believed: whether the cap was sighted about the gap, (frame - 1, cap).
+    each: of `gap_density`; kick: (frame - 1,); believed: whether anything told of the cap's motion, (frame - 1, cap).
     Motion comes in bursts: at rest the density is small, where motors pull and caps touch down it is large.
     """
     own = np.maximum(each - (kick / dt)[:, None], FLOOR_DENSITY)

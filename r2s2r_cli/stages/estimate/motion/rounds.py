@@ -65,7 +65,9 @@ def learn(state: State, prepared: Prepared, body: Body) -> State:
         usual = square < 16.0 * max(float(np.median(square)) / 0.455, 0.1)
         noise[s] *= np.sqrt(sensor_variance(residual[used], variance, spread[used], usual))
     each = gap_density(state.x, known(state), evidence, body)
-    believed = prepared.sighted[1:] & prepared.sighted[:-1]
+    heard = np.any(evidence.sensor_weight > 0, axis=1)[:, None]
+    told = prepared.sighted | heard
+    believed = told[1:] & told[:-1]
     density = next_density(each, evidence.kick, np.diff(evidence.t), believed)
     weight = sensor_weights(evidence.samples, noise)
     evidence = replace(

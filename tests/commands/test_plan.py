@@ -69,9 +69,12 @@ def test_a_plan_is_whole(planned: Path) -> None:
 
 @pytest.mark.slow
 def test_it_is_fresh_and_its_policies_run(planned: Path) -> None:
-    """The same command has nothing to do; `simulate 40-plan.h5:NAME` runs a policy, and comes as far as in the plan."""
+    """The same command has nothing to do, and made again it gives the same bits; `simulate 40-plan.h5:NAME` runs a
+    policy, and comes as far as in the plan."""
     again = document(*small("--to", "0.1,0,0", goal_within_m=1.0))
     assert again["state"] == "fresh"
+    forced = document(*small("--to", "0.1,0,0", goal_within_m=1.0), "--force", "--no-draw")
+    assert forced["state"] == "done" and forced["content_sha256"] == again["content_sha256"]
     result = document("simulate", f"{PLAN}:straight", "--no-draw")
     _, data = read_artifact(planned / PLAN, "plan")
     p_WE = data.groups["runs/straight/frames"]["p_WE"]

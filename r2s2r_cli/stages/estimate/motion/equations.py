@@ -51,7 +51,7 @@ def _sightings(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body) ->
         states = np.concatenate([body.p(cap), body.shared(cap)])
         slope = sighting_slope(evidence, body, cap)
         residual = (slope @ x[:, states, None])[:, :, 0] - evidence.seen[:, cap]
-        frames.vector(states, slope, residual, evidence.information[:, cap], SIGHTING_FREEDOM)
+        frames.vector(states, slope, residual, evidence.information[:, cap], SIGHTING_FREEDOM, evidence.sighting_bend)
 
 
 def sighting_slope(evidence: Evidence, body: Body, cap: int) -> np.ndarray:

@@ -31,6 +31,8 @@ class Evidence:
     """How many, (frame, sensor)."""
     sensor_weight: np.ndarray
     """[1/m^2], (frame, sensor)."""
+    sighting_bend: float | None
+    """Beyond so many standard deviations the cost of a sighting grows linearly; None: Student's t, which lets it go."""
     sensor_bend: float | None
     """Beyond so many standard deviations the cost of a sensor grows linearly; None: never."""
     touching: np.ndarray

@@ -48,10 +48,12 @@ class Frames:
         residual: np.ndarray,
         information: np.ndarray,
         freedom: float | None = None,
+        bend: float | None = None,
     ) -> None:
         """Add r' I r / 2: states (m,), slope (frame, 3, m), residual r (frame, 3), information I (frame, 3, 3)."""
         pull = np.einsum("kij,kj->ki", information, residual)
-        value, used = _robust(np.sum(pull * residual, axis=1), 3, freedom)
+        square = np.sum(pull * residual, axis=1)
+        value, used = _robust(square, 3, freedom) if bend is None else _bent(square, bend)
         self.cost += value
         turned = np.swapaxes(slope, 1, 2)
         self.gradient[:, states] += used[:, None] * (turned @ pull[:, :, None])[:, :, 0]

@@ -22,8 +22,8 @@ from schemas.robot import Robot
 
 GATE = 30.0
 """Squared distance over variance beyond which a sighting is refused (3 parts: 1e-6)."""
-BURST = 3.0
-"""[m^2/s^3] Density of the acceleration where sightings leave the prediction: 0.3 m/s within 1/30 s."""
+BURST = 10.0
+"""[m^2/s^3] Density of the acceleration where sightings leave the prediction: 0.6 m/s within 1/30 s."""
 REFUSED = 5
 """Frames in a row that may refuse a cap, or contradict rods and sensors, before it counts as lost."""
 BLIND_S = 0.3

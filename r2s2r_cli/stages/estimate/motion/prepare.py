@@ -16,6 +16,8 @@ HOLE = 1.6
 MOST_KNOTS = 300
 """Frames put into one hole."""
 MIN_FRAMES = 5
+SIGHTING_BEND = 4.0
+"""At first, sightings far off still pull: where a cap hits the floor, motion has to give way before they do."""
 TWIN_SD, TWIN_SHARE = 6.0, 0.05
 """Two caps of a rod are not both its caps where their distance is off by so many standard deviations and by this share
 of the length, which robot.toml may have wrong."""
@@ -119,7 +121,7 @@ def first_evidence(prepared: Prepared, body: Body, settings: MotionSettings, swi
         across=np.zeros((len(prepared.t), body.caps, 3, ACROSS)),
         density=np.full((gaps, body.caps), settings.acceleration), kick=kick,
         shown=none, later=none, samples=none, sensor_weight=none,
-        sensor_bend=None, touching=np.zeros((len(prepared.t), body.caps)),
+        sighting_bend=SIGHTING_BEND, sensor_bend=None, touching=np.zeros((len(prepared.t), body.caps)),
     )  # fmt: skip
 
 

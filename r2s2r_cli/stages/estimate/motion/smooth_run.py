@@ -57,7 +57,7 @@ def smooth_run(
     state, clock = _with_sensors(state, readings, body, settings)
     state = touch(state, prepared, body, hidden=False)
     state = settle(state, body, settings)
-    state = replace(state, evidence=replace(state.evidence, sensor_bend=SENSOR_BEND))
+    state = replace(state, evidence=replace(state.evidence, sighting_bend=None, sensor_bend=SENSOR_BEND))
     for left in reversed(range(TOGETHER)):
         state = learn(settle(state, body, settings, steps=FEW), prepared, body)
         state = touch(state, prepared, body, hidden=left == 0)

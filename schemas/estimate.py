@@ -160,8 +160,9 @@ TRACKS = GroupSpec(
         column("speed_change", "float64", ("cap",), "m/s", "process noise: standard deviation of the change of velocity "
           "over 1 s, per axis, as used: twice the density of highest likelihood"),
         column("innovation_variance", "float64", ("cap",), "1", "mean squared innovation over its variance, at the highest "
-          "likelihood (camera images: sighting minus smoothed state); 1 where the assumed noise is right, below 1 where it is too large"),
-        column("innovation_lag1", "float64", ("cap",), "1", "correlation of neighbouring innovations; 0 where they are white"),
+          "likelihood (camera images: of frames/score); 1 where the assumed noise is right, below 1 where it is too large"),
+        column("innovation_lag1", "float64", ("cap",), "1", "correlation of neighbouring innovations; 0 where they are white; camera images: "
+          "of sightings/residual"),
         column("white", "bool", ("cap",), "bool", "that correlation lies within 2 standard deviations of 0"),
     ),
 )  # fmt: skip
@@ -202,8 +203,8 @@ SIGHTINGS = GroupSpec(
           frame="W", nan_means="not seen"),
         column("visible", "float64", ("frame", "cap"), "1", "share of the cap's disc that is seen in its colour"),
         column("code", "uint8", ("frame", "cap"), "code", "how it was seen, or why not", codes=SIGHT),
-        column("residual", "float64", ("frame", "cap", "xyz"), "1", "sighting minus smoothed cap in standard deviations of "
-          "that difference, along its principal axes", nan_means="not seen, or not used"),
+        column("residual", "float64", ("frame", "cap", "xyz"), "1", "sighting minus smoothed cap over the sighting's own "
+          "standard deviations, along its principal axes; errors that neighbouring frames share are in it", nan_means="not seen, or not used"),
     ),
 )  # fmt: skip
 

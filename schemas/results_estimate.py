@@ -79,7 +79,7 @@ class CapSight(Frozen):
     hidden_longest_s: float
     """Longest time without a sighting."""
     residual_sd: float | None
-    """Root mean square of sighting minus smoothed state over the standard deviation of that; 1 where both are right."""
+    """Root mean square of `frames/score`: 1 where sightings are as noisy as they are taken for."""
 
 
 class SensorFigures(Frozen):

@@ -61,9 +61,10 @@ def camera_warnings(state: RunState, facts: CameraFacts) -> list[str]:
         seen = float(np.mean(facts.tracked.quality[:, cap] == SEEN))
         if seen < SELDOM:
             found.append(f"end cap {cap} is seen in {seen:.0%} of the frames only")
-    square = np.nanmean(facts.residual**2) if np.isfinite(facts.residual).any() else 1.0
-    if not OFF[0] <= np.sqrt(square) <= OFF[1]:
-        found.append(f"sightings and smoothed caps differ by {np.sqrt(square):.1f} standard deviations: "
+    score = facts.tracked.score[facts.tracked.quality == SEEN]
+    size = float(np.sqrt(np.nanmean(score**2))) if np.isfinite(score).any() else 1.0
+    if not OFF[0] <= size <= OFF[1]:
+        found.append(f"sightings and smoothed caps differ by {size:.1f} standard deviations: "
                      "the covariances are not right")  # fmt: skip
     dead = np.flatnonzero(facts.tracked.sensor_dead)
     if facts.readings is None:
@@ -78,12 +79,12 @@ def camera_warnings(state: RunState, facts: CameraFacts) -> list[str]:
 
 def _sight(t: np.ndarray, facts: CameraFacts, cap: int) -> CapSight:
     seen = facts.tracked.quality[:, cap] == SEEN
-    residual = facts.residual[:, cap]
-    known = np.isfinite(residual)
+    score = facts.tracked.score[seen, cap]
+    score = score[np.isfinite(score)]
     return CapSight(
         cap=cap, seen=float(np.mean(seen)), rejected=int(np.sum(facts.tracked.quality[:, cap] > SEEN + 1)),
         hidden_longest_s=_longest(t, seen),
-        residual_sd=float(np.sqrt(np.mean(residual[known] ** 2))) if known.any() else None,
+        residual_sd=float(np.sqrt(np.mean(score**2))) if len(score) else None,
     )  # fmt: skip
 
 

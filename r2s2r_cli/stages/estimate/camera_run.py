@@ -34,8 +34,8 @@ class CameraFacts:
     """What only a run of camera images has. Positions in W, ground at z = 0.
 
     X_WC: pose of the camera (4, 4). survey: what the pictures were found to be. swept, tracked: sightings and states,
-    before the floor under the caps was put at z = 0. readings: of the cable sensors. residual: sightings minus smoothed
-    caps, whitened, (frame, cap, 3), NaN where there is none.
+    before the floor under the caps was put at z = 0. readings: of the cable sensors. residual: of `residuals`,
+    (frame, cap, 3), NaN where there is none.
     """
 
     X_WC: np.ndarray
@@ -97,7 +97,7 @@ def _state(
         tracked.p_WE, tracked.cov_p, tracked.v_WE, tracked.cov_v, length, np.zeros(len(length), dtype=bool)
     )
     observed = swept.sighted.p_WE
-    residual = whitened(swept.sighted, tracked)
+    residual = residuals(swept.sighted, tracked)
     quality = np.select([tracked.quality == SEEN, tracked.quality == REJECTED], [OBSERVED, OUTLIER], MISSING)
     variance = np.where(np.isfinite(observed), np.diagonal(swept.sighted.cov, axis1=2, axis2=3), np.nan)
     intervals, parts = intervals_of(streams, t)
@@ -125,20 +125,17 @@ def _state(
     )  # fmt: skip
 
 
-def whitened(sighted: Sighted, tracked: TrackedRun) -> np.ndarray:
-    """Sightings that were used minus smoothed caps, in standard deviations, along each sighting's principal axes.
+def residuals(sighted: Sighted, tracked: TrackedRun) -> np.ndarray:
+    """Sightings that were used minus smoothed caps, over the standard deviations that the sightings themselves state.
 
-    Shape (frame, cap, 3), the best known axis first; NaN where no sighting was used. The smoothed state has the
-    sighting in it, so that the variance of the difference is that of the sighting (scaled as the run shows it) minus
-    that of the state; the state's part that neighbouring frames share is no part of it, so at most half is taken off.
+    Along each sighting's principal axes, the best known first, shape (frame, cap, 3); NaN where none was used. Errors
+    that neighbouring frames share are in it, which is why neighbours are alike; `score` is without them.
     """
     used = np.isfinite(sighted.p_WE[..., 0]) & (tracked.quality == SEEN)
     found = np.full(sighted.p_WE.shape, np.nan)
     value, vector = np.linalg.eigh(sighted.cov[used])
-    seen = value * np.square(tracked.noise_scale)[[0, 0, 1]]
-    state = np.einsum("kji,kjl,kli->ki", vector, tracked.cov_p[used], vector)
     off = np.einsum("kji,kj->ki", vector, (sighted.p_WE - tracked.p_WE)[used])
-    found[used] = off / np.sqrt(np.maximum(seen - state, 0.5 * seen))
+    found[used] = off / np.sqrt(value)
     return found
 
 

@@ -84,8 +84,22 @@ def _frames(state: RunState) -> Group:
     return Group(datasets, {"source_rigid": bool(np.all(state.rigid)), "roll_observable": False})
 
 
-def _tracks(state: RunState) -> Group:
+def innovations(state: RunState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mean square over variance, lag-1 correlation and whether that is 0; each of shape (cap,).
+
+    Camera images: of sightings against smoothed caps; the mean square is that of `score`, without what neighbouring
+    sightings share, which the correlation shows.
+    """
     variance, lag1, white = whiteness(state.tracks.innovation)
+    if state.camera is None:
+        return variance, lag1, white
+    used = np.isfinite(state.tracks.innovation).all(axis=2) & np.isfinite(state.tracks.score)
+    square = np.where(used, np.nan_to_num(state.tracks.score) ** 2, 0.0)
+    return np.sum(square, axis=0) / np.maximum(np.sum(used, axis=0), 1), lag1, white
+
+
+def _tracks(state: RunState) -> Group:
+    variance, lag1, white = innovations(state)
     known = {}
     if state.camera is not None:
         swept = state.camera.swept

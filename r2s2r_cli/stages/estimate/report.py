@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from r2s2r_cli.stages.estimate.camera_report import camera_figures, camera_warnings
+from r2s2r_cli.stages.estimate.groups import innovations
 from r2s2r_cli.stages.estimate.run import RunState
-from r2s2r_cli.stages.estimate.smooth import JUMP, OUTLIER, whiteness
+from r2s2r_cli.stages.estimate.smooth import JUMP, OUTLIER
 from r2s2r_cli.stages.frames import fit_rod_length, ground_offset
 from schemas.results_estimate import BrokenFrames, CapFigures, EstimateRun, GroundFigures, RodFigures
 
@@ -45,7 +46,7 @@ def _rows(state: RunState) -> int:
 
 
 def _caps(state: RunState) -> tuple[CapFigures, ...]:
-    variance, lag1, white = whiteness(state.tracks.innovation)
+    variance, lag1, white = innovations(state)
     speed = np.linalg.norm(state.rods.v_WE, axis=-1)
     sd = np.sqrt(np.trace(state.rods.cov_p, axis1=2, axis2=3) / 3)
     return tuple(

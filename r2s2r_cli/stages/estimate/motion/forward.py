@@ -123,7 +123,7 @@ class Forward:
         p_WE = self._without_twins(p_WE)
         seen = np.all(np.isfinite(p_WE), axis=1)
         used = seen & (self._squares(p_WE, cov) <= GATE)
-        if np.any(seen & ~used) and self._elapsed > 0:
+        if np.any(seen & ~used) and self._elapsed != 0:
             # Motors that switch and caps that touch down change velocities at once: likelier than a wrong sighting.
             calm = self._cov
             self._cov = self._spread_by(self._cov, self._elapsed, BURST)

@@ -70,9 +70,7 @@ def test_chain_solves_what_one_big_matrix_solves() -> None:
         here = slice(k * dim, (k + 1) * dim)
         np.testing.assert_allclose(marginal.cov[k], full[here, here], atol=1e-12)
         if k + 1 < n:
-            np.testing.assert_allclose(
-                marginal.cross[k], full[here, (k + 1) * dim : (k + 2) * dim], atol=1e-12
-            )
+            np.testing.assert_allclose(marginal.cross[k], full[here, (k + 1) * dim : (k + 2) * dim], atol=1e-12)
 
 
 def test_an_undetermined_state_is_refused() -> None:

@@ -21,6 +21,7 @@ from r2s2r_cli.stages.plan.robust import Primitive
 @dataclass(frozen=True)
 class Moves:
     """Primitives as moves of the reference. shift: (P, 2) [m]; yaw: (P,) [rad]; element: (P,); duration: (P,) [s].
+    risk: share of the draws in which it did not work or ended on another triangle, (P,).
     after: (element, element), the symmetry of a robot of the first after a move of the second; axis: direction of the
     principal axis of each symmetry against yaw, (element,) [rad]."""
 
@@ -28,6 +29,7 @@ class Moves:
     yaw: np.ndarray
     element: np.ndarray
     duration: np.ndarray
+    risk: np.ndarray
     after: np.ndarray
     axis: np.ndarray
 
@@ -36,7 +38,10 @@ class Moves:
 
     def take(self, rows: np.ndarray) -> Moves:
         """Some of the moves."""
-        return Moves(self.shift[rows], self.yaw[rows], self.element[rows], self.duration[rows], self.after, self.axis)
+        shared = (self.after, self.axis)
+        return Moves(
+            self.shift[rows], self.yaw[rows], self.element[rows], self.duration[rows], self.risk[rows], *shared
+        )
 
 
 @dataclass(frozen=True)
@@ -63,7 +68,8 @@ def moves_of(reference: Reference, primitives: Sequence[Primitive]) -> Moves:
     after = np.array([[group.product(b, a) for b in range(len(group))] for a in range(len(group))])
     return Moves(
         move[:, :2], wrapped(move[:, 2] - axis[element] + axis[0]), element,
-        np.array([one.duration for one in primitives]), after, axis,
+        np.array([one.duration for one in primitives]),
+        np.array([1.0 - one.worked * one.same_element for one in primitives]), after, axis,
     )  # fmt: skip
 
 
@@ -89,14 +95,22 @@ def extended(moves: Moves, paths: Paths) -> Paths:
     )  # fmt: skip
 
 
+RISK = 2.0
+"""[m] or [rad] that a sequence may be shorter for not going wrong once."""
+SLOWER = 20.0
+"""Times its duration that a detour may take for it, on the way to a goal."""
+
+
 def best_sequences(
     moves: Moves, length: int, value: Callable[[Paths], np.ndarray], *, beam: int = 400, count: int = 6
 ) -> Paths:
-    """The `count` sequences of `length` moves with the highest value, by beam search on `value` of their beginnings."""
+    """The `count` sequences of `length` moves with the highest value, less RISK times what may go wrong on the way, by
+    beam search on their beginnings."""
     paths = start_paths()
     for _ in range(length):
         paths = extended(moves, paths)
-        paths = paths.take(np.argsort(-value(paths), kind="stable")[:beam])
+        worth = value(paths) - RISK * moves.risk[paths.picks].sum(axis=1)
+        paths = paths.take(np.argsort(-worth, kind="stable")[:beam])
     return paths.take(np.arange(min(count, len(paths.yaw))))
 
 
@@ -197,7 +211,8 @@ NEARLY = 4.0
 
 
 def way_to(moves: Moves, goal: Goal) -> Paths:
-    """The sequence of moves that takes least time to a goal, by A* (weighted by GREED) on their displacements.
+    """The sequence of moves that takes least time to a goal, by A* (weighted by GREED) on their displacements; moves
+    that may go wrong count as slower.
 
     Where none leads there within NODES poses, the one that comes nearly there; raises NumericalError where none does,
     with the nearest place.
@@ -235,7 +250,7 @@ def way_to(moves: Moves, goal: Goal) -> Paths:
         for k, cell in enumerate(_cells(after)):
             if cell not in done:
                 count += 1
-                cost = spent + float(moves.duration[k])
+                cost = spent + float(moves.duration[k] * (1.0 + SLOWER * moves.risk[k]))
                 heapq.heappush(queue, (cost + GREED * float(time[k]), count, cost, after, k))
     near = best[1]
     if best[0] <= NEARLY:

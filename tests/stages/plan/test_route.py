@@ -99,6 +99,17 @@ def test_the_long_gaits_ask_for_what_their_names_say() -> None:
         assert best_sequences(moves, 4, LONG[name], count=1).picks[0, :3].tolist() == [pick] * 3
 
 
+def test_a_gait_that_may_go_wrong_is_not_worth_a_little_more_way() -> None:
+    """0.25 m that fails once in ten against 0.2 m that never does: the second, in sequences and on the way to a goal;
+    0.6 m that fails once in ten is worth it."""
+    sure, risky = made("a", 0.0, 0.2, 0.0), made("b", 0.0, 0.25, 0.0, worked=0.9)
+    moves = moves_of(three_bar(), [sure, risky])
+    assert best_sequences(moves, 4, LONG["straight"], count=1).picks.tolist() == [[0] * 4]
+    assert set(way_to(moves, Goal((0.0, 1.0), 0.0, within_m=0.01)).picks[0].tolist()) == {0}
+    far = moves_of(three_bar(), [sure, made("c", 0.0, 0.6, 0.0, worked=0.9)])
+    assert best_sequences(far, 4, LONG["straight"], count=1).picks.tolist() == [[1] * 4]
+
+
 def test_an_arc_loses_nothing_but_its_length() -> None:
     """A regular polygon whose sides turn by ARC is worth its length; the straight line of that length less."""
     turn = ARC * np.arange(5)

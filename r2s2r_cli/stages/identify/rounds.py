@@ -76,13 +76,10 @@ def first_round(
     With many start states that are free there is no population, and derivatives go on to the end. Raises as `fit`.
     """
     frees, loss = predictor.mapping.frees, LOSSES[recipe.loss]
-    problem = problem_of(predictor, windows, recipe)
-    lengths = recipe.horizons(max(len(one.intervals) for one in windows))
-    stages = [problem_of(predictor, [one.until(length) for one in windows], recipe) for length in lengths[:-1]]
-    stages.append(problem)
+    names, stages, near = _stages(predictor, windows, recipe)
+    problem = stages[-1]
     few = len(moving_of(problem)) <= MOST_UNKNOWNS
-    smooth = max(1, sum(length <= SMOOTH for length in lengths)) if few else len(lengths)
-    names = [*(f"{length} intervals" for length in lengths[:-1]), "all"]
+    smooth = near if few else len(stages)
     last = Limits(max_iterations=recipe.max_iterations, tolerance=FROM_AFAR, step_sd=0.05)
     solution = solve_growing(
         list(zip(names, stages, strict=True))[:smooth], started(problem, values), loss=loss, early=EARLY_HORIZONS,
@@ -103,6 +100,15 @@ def first_round(
             problem, solution.z, loss=loss, max_iterations=recipe.max_iterations, tolerance=1e-4
         )
     return Fit(problem, solution, values_of(frees, solution.z[: len(frees)]))
+
+
+def cost_near(predictor: Predictor, windows: Sequence[Window], values: np.ndarray, recipe: Recipe) -> float:
+    """What derivatives reach over the intervals that they can be trusted with. Raises as `fit`."""
+    names, stages, near = _stages(predictor, windows, recipe)
+    return solve_growing(
+        list(zip(names, stages, strict=True))[:near], started(stages[-1], values), loss=LOSSES[recipe.loss],
+        early=EARLY_HORIZONS, last=BEFORE_POPULATION,
+    ).cost  # fmt: skip
 
 
 def later_round(
@@ -162,6 +168,17 @@ def more_starts(
         end = cool(problem, z0, wide, loss=loss, seed=seed + number + 1, cooling=cooling, told=hear)
         found.append((z0, solution_at(problem, end.z, end, loss, cooling.generations)))
     return found
+
+
+def _stages(
+    predictor: Predictor, windows: Sequence[Window], recipe: Recipe
+) -> tuple[list[str], list[CapResiduals], int]:
+    """Problems over growing horizons with their names, and how many of them derivatives can be trusted with."""
+    lengths = recipe.horizons(max(len(one.intervals) for one in windows))
+    stages = [problem_of(predictor, [one.until(length) for one in windows], recipe) for length in lengths[:-1]]
+    stages.append(problem_of(predictor, windows, recipe))
+    names = [*(f"{length} intervals" for length in lengths[:-1]), "all"]
+    return names, stages, max(1, sum(length <= SMOOTH for length in lengths))
 
 
 def wide_about(problem: CapResiduals, cooling: Cooling, share: float = 1.0) -> np.ndarray:

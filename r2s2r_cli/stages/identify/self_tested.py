@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from r2s2r_cli.stages.identify.cables import with_cables
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.default_method import first_fit, holding
 from r2s2r_cli.stages.identify.kept import Kept
@@ -34,7 +35,7 @@ def self_tested(
     """
     require_replay(request)
     frees = free_parameters(robot, runs, request, settings)
-    task = Task(robot, runs, request, settings, cache_dir)
+    task = with_cables(Task(robot, runs, request, settings, cache_dir))
     predictor = task.predictor(frees)
 
     def once(planted: Sequence[RunData]) -> Fitted:

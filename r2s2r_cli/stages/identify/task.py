@@ -39,6 +39,8 @@ class Task:
     checkpoint: Checkpoint | None = None
     held: tuple[str, ...] = ()
     """Free parameters that the training intervals do not show."""
+    stock: bool = False
+    """Winched cables as robot.toml has them, although the default set goes with softer ones (`cables.py`)."""
 
     @property
     def recipe(self) -> Recipe:
@@ -53,11 +55,18 @@ class Task:
     @property
     def given(self) -> dict[str, float]:
         """Values of parameters that are not fitted: of the request, and those that the default set goes with."""
+        return {**({} if self.stock else self.softer), **self.request.fixed}
+
+    @property
+    def softer(self) -> dict[str, float]:
+        """Those that the default set goes with, where it is what is free and none of them was asked for."""
         asked = (*self.settings.free, *self.request.free)
         own = default_fixed(self.robot) if all(spec.startswith(PLUS) for spec in asked) else {}
         named = {name_of(spec.removeprefix(PLUS)).partition(".")[0] for spec in asked}
-        kept = {name: value for name, value in own.items() if not {name, name.partition("_")[0]} & named}
-        return {**kept, **self.request.fixed}
+        return {
+            name: value for name, value in own.items()
+            if not {name, name.partition("_")[0]} & named and name not in self.request.fixed
+        }  # fmt: skip
 
     def predictor(self, frees: Sequence[Free]) -> Predictor:
         """The engine with these free numbers, those that were given, and the effects that were asked for."""
@@ -76,7 +85,7 @@ class Task:
             ParameterFound(
                 known[name], value, nan, nan, nan, (nan, nan), None,
                 "fixed by hand" if name in self.request.fixed
-                else f"goes with the default set; robot.toml has {known[name].start:g}",
+                else f"the training intervals prefer it to robot.toml's {known[name].start:g}",
             )
             for name, value in self.given.items()
         )  # fmt: skip

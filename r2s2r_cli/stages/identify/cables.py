@@ -1,0 +1,51 @@
+"""How much winched cables give way: as robot.toml says, or softer and damped, whichever the training intervals prefer.
+
+The two are far apart and a third number would be a 13th that a crawl does not determine, so both are tried and the
+better one is given. On the real crawl softer cables win (docs/concepts/identification.md), on a robot that is as its
+robot.toml says those of robot.toml do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from r2s2r_cli.errors import NumericalError
+from r2s2r_cli.stages.identify.rounds import cost_near
+from r2s2r_cli.stages.identify.task import Task, free_parameters
+from r2s2r_cli.stages.identify.training import training_windows
+
+FIXED_BY_HAND = 4
+"""Code of `schemas.identification.TRUST`."""
+
+
+def with_cables(task: Task) -> Task:
+    """The task with those of both that fit the training intervals better over the first few of them.
+
+    Nothing is tried where the request names these numbers or a set of its own; --online keeps what the estimate that it
+    goes on from was made with. Raises NumericalError where neither can be simulated, InputError as the fit does.
+    """
+    softer = task.softer
+    if not softer:
+        return task
+    if task.request.before is not None:
+        table = task.request.before.groups["parameters"]
+        given = table["name"][table["trust"] == FIXED_BY_HAND].tolist()
+        return replace(task, stock=not {name.encode() for name in softer} & set(given))
+    both = [_cost(replace(task, stock=stock)) for stock in (False, True)]
+    if not np.isfinite(both).any():
+        raise NumericalError("the training intervals cannot be simulated", where="identify", expected="a finite loss",
+                             received="none", hint="r2s2r validate robot.toml")  # fmt: skip
+    return replace(task, stock=bool(both[1] < both[0]))
+
+
+def _cost(task: Task) -> float:
+    frees = free_parameters(task.robot, task.runs, task.request, task.settings)
+    predictor = task.predictor(frees)
+    values = np.array([free.start for free in frees])
+    try:
+        windows = training_windows(task.runs, task.request.train, predictor, values, task.recipe)
+        return cost_near(predictor, windows, values, task.recipe)
+    except NumericalError:
+        return float("inf")

@@ -1,4 +1,4 @@
-"""Runs of the rig's plant under a gait, with truth at every millisecond that is asked for, and noisy sightings of them."""
+"""Runs of the rig's plant under a gait, with the truth at any time, and noisy sightings and sensor lengths of them."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def motion(seed: int, seconds: float, *, step_s: float = 0.01, gait_s: float = 1
     weight = 9.81 * sum(part.mass_kg for rod in robot.rods for part in rod.parts)
     low, span = robot.pid.min_length_m, robot.pid.range_m
     caps, normal = [], []
-    target = np.ones(len(robot.actuated))
+    target: np.ndarray = np.ones(len(robot.actuated))
     sign = np.array([motor.sign for motor in robot.motors], dtype=float)
     order = [robot.actuated.index(motor.cable) for motor in robot.motors]
     steps = round(seconds / step_s)
@@ -91,6 +91,6 @@ def readings(
         lagged[k] = keep * lagged[k - 1] + (1 - keep) * length[k]
     t = np.arange(0.0, truth.t[-1], SAMPLE_S) + 0.003
     shown = np.column_stack([np.interp(t, fine, column) for column in lagged.T])
-    bias = 4e-3 * rng.standard_normal(length.shape[1]) if bias is None else bias
-    shown = shown + bias + noise_m * rng.standard_normal(shown.shape)
-    return Readings(t + offset_s, shown, np.arange(shown.shape[1])), bias
+    planted: np.ndarray = 4e-3 * np.asarray(rng.standard_normal(length.shape[1])) if bias is None else bias
+    shown = shown + planted + noise_m * rng.standard_normal(shown.shape)
+    return Readings(t + offset_s, shown, np.arange(shown.shape[1])), planted

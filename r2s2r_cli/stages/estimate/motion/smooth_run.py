@@ -1,31 +1,26 @@
-"""The whole run at once: states, covariances, sensor offsets, clock, floor and contacts from stored sightings."""
+"""The whole run: states, covariances, sensor offsets, clock and contacts from stored sightings, stretch by stretch."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from r2s2r_cli.stages.estimate.motion.body import Body
 from r2s2r_cli.stages.estimate.motion.data import MotionSettings, Readings, SensorClock, Sighted, TrackedRun
-from r2s2r_cli.stages.estimate.motion.prepare import first_evidence, first_states, prepare
-from r2s2r_cli.stages.estimate.motion.result import tracked_run
-from r2s2r_cli.stages.estimate.motion.rounds import State, distances, known, learn, sensor_weights, settle, touch
-from r2s2r_cli.stages.estimate.motion.sensor_clock import find_clock
-from r2s2r_cli.stages.estimate.motion.sensors import bin_readings
+from r2s2r_cli.stages.estimate.motion.prepare import prepare
+from r2s2r_cli.stages.estimate.motion.window import smooth_window
 from schemas.robot import Robot
 
-BURSTS = 2.0
-"""What is used over what is likeliest (as in `stages/estimate/smooth.py`): robots accelerate in bursts."""
-UNSEEN_BURSTS = 6.0
-"""The same where a cap is hidden: how it moved there is only known on average, and averages have few bursts."""
-FEW = 2
-"""Gauss-Newton steps between two looks at the noise: it need not settle before the noise does."""
-SENSOR_BEND = 2.5
-"""Sensor samples are wild at times (dropouts), so that their cost bends; but it never stops growing, because a first
-guess of a hidden cap may be far off where all its sensors seem wild. They come in unbent, once, for the same reason."""
-ALONE, TOGETHER = 2, 3
-"""Rounds of states and noise: with sightings alone, and with everything."""
+LONGEST = 1200
+"""Frames of one stretch. The equations of a frame take 0.2 MB: longer runs are cut, so that memory stays the same."""
+OVERLAP = 120
+"""Frames that neighbouring stretches share; each gives one half. A smoother forgets within tens of frames."""
+PER_FRAME = (
+    "t", "p_WE", "cov_p", "v_WE", "cov_v", "length", "length_sd", "sensor_bias", "sensor_bias_sd", "contact",
+    "contact_probability", "quality", "mode", "score",
+)  # fmt: skip
 
 
 def smooth_run(
@@ -39,51 +34,72 @@ def smooth_run(
     """Maximum of the posterior over all frames, and its covariance.
 
     switches: gaps between frames (index k: between k and k + 1) in which a motor was switched, shape (any,).
-    First the sightings and rods alone: they give the clock of the sensors, their offsets and the first contacts. Then
-    everything together, the noise of each source and of the motion as the run shows it.
+    Runs of more than LONGEST frames are smoothed in stretches that overlap; what belongs to the whole run (noise,
+    clock) is then the median of the stretches.
     Raises InputError where some cap is never sighted or the stamps do not increase; NumericalError where the search
     fails.
     """
     settings = settings or MotionSettings()
-    body = Body.of(robot, None if readings is None else readings.cable, sharing=True)
-    prepared = prepare(sighted, body)
-    state = State(
-        x=first_states(prepared, body), evidence=first_evidence(prepared, body, settings, switches), factor=np.ones(2),
-        noise=np.full(len(body.sensor), settings.sensor_noise_sd_m),
-    )  # fmt: skip
-    for _ in range(ALONE):
-        state = learn(settle(state, body, settings, steps=FEW), prepared, body)
-    state = settle(state, body, settings, steps=FEW)
-    state, clock = _with_sensors(state, readings, body, settings)
-    state = touch(state, prepared, body, hidden=False)
-    state = settle(state, body, settings)
-    state = replace(state, evidence=replace(state.evidence, sighting_bend=None, sensor_bend=SENSOR_BEND))
-    for left in reversed(range(TOGETHER)):
-        state = learn(settle(state, body, settings, steps=FEW), prepared, body)
-        state = touch(state, prepared, body, hidden=left == 0)
-    near = prepared.sighted[1:] & prepared.sighted[:-1]
-    density = np.where(near, BURSTS, UNSEEN_BURSTS) * state.evidence.density
-    state = settle(replace(state, evidence=replace(state.evidence, density=density)), body, settings)
-    return tracked_run(state, prepared, clock, body, settings)
+    if len(sighted.t) <= LONGEST:
+        return smooth_window(sighted, readings, robot, settings, switches, None)
+    prepare(sighted, Body.of(robot))
+    parts: list[TrackedRun] = []
+    clock: SensorClock | None = None
+    cuts = windows(np.all(np.isfinite(sighted.p_WE), axis=2))
+    for first, last in cuts:
+        part = Sighted(sighted.t[first:last], sighted.p_WE[first:last], sighted.cov[first:last])
+        own = None if switches is None else switches[(switches >= first) & (switches < last - 1)] - first
+        heard = _near(readings, part.t, settings.clock_range_s)
+        parts.append(smooth_window(part, heard, robot, settings, own, clock))
+        clock = parts[-1].clock if parts[-1].clock.known else clock
+    return _joined(parts, cuts)
 
 
-def _with_sensors(
-    state: State, readings: Readings | None, body: Body, settings: MotionSettings
-) -> tuple[State, SensorClock]:
-    """Sensors at the frames they belong to, offsets from where the camera sees well."""
-    if readings is None or not np.any(np.isfinite(readings.length)):
-        return state, SensorClock(0.0, float("inf"), False)
-    t = state.evidence.t
-    length, rate, sd = distances(state.x, known(state).cov, body, body.sensor)
-    clock = find_clock(t, length, rate, sd, readings, settings.clock_range_s)
-    binned = bin_readings(t, readings, clock.delay_s)
-    x = state.x.copy()
-    for s in range(len(body.sensor)):
-        clear = (binned.samples[:, s] > 0) & (sd[:, s] < 3 * settings.sensor_noise_sd_m)
-        if np.any(clear):
-            x[:, body.bias.start + s] = np.median((binned.shown - length - binned.later * rate)[clear, s])
-    evidence = replace(
-        state.evidence, shown=binned.shown, later=binned.later, samples=binned.samples,
-        sensor_weight=sensor_weights(binned.samples, state.noise),
-    )  # fmt: skip
-    return replace(state, x=x, evidence=evidence), clock
+def windows(seen: np.ndarray) -> list[tuple[int, int]]:
+    """First frame and the one after the last of stretches that overlap; each shows every cap at least once.
+
+    seen: (frame, cap) bool. A stretch that misses a cap is joined with the next, the last one with that before.
+    """
+    n, found, first = len(seen), [], 0
+    while True:
+        last = min(first + LONGEST, n)
+        while last < n and not np.all(np.any(seen[first:last], axis=0)):
+            last = min(last + LONGEST, n)
+        found.append((first, last))
+        if last == n:
+            break
+        first = last - OVERLAP
+    while len(found) > 1 and not np.all(np.any(seen[found[-1][0] :], axis=0)):
+        found[-2:] = [(found[-2][0], n)]
+    return found
+
+
+def _near(readings: Readings | None, t: np.ndarray, range_s: float) -> Readings | None:
+    if readings is None:
+        return None
+    rows = (readings.t >= t[0] - range_s) & (readings.t <= t[-1] + range_s)
+    return Readings(readings.t[rows], readings.length[rows], readings.cable)
+
+
+def _joined(parts: list[TrackedRun], cuts: list[tuple[int, int]]) -> TrackedRun:
+    """One half of each overlap from each side."""
+    edges = [0, *((a[1] + b[0]) // 2 for a, b in pairwise(cuts)), cuts[-1][1]]
+    rows = [slice(a - cut[0], b - cut[0]) for (a, b), cut in zip(pairwise(edges), cuts, strict=True)]
+    frames = {
+        name: np.concatenate([getattr(part, name)[row] for part, row in zip(parts, rows, strict=True)])
+        for name in PER_FRAME
+    }
+    gaps = [part.acceleration[row.start : row.stop] for part, row in zip(parts, rows, strict=True)]
+    clocks = [part.clock for part in parts if part.clock.known]
+    middle = sorted(clocks, key=lambda clock: clock.delay_s)[len(clocks) // 2] if clocks else parts[0].clock
+    return replace(
+        parts[0],
+        **frames,
+        acceleration=np.concatenate(gaps),
+        clock=middle,
+        sensor_noise_sd=np.median([part.sensor_noise_sd for part in parts], axis=0),
+        sensor_dead=np.all([part.sensor_dead for part in parts], axis=0),
+        noise_scale=np.median([part.noise_scale for part in parts], axis=0),
+        rounds=sum(part.rounds for part in parts),
+        settled=all(part.settled for part in parts),
+    )

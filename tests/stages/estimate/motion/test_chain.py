@@ -113,7 +113,7 @@ def test_information_of_a_gap_is_the_inverse_of_its_noise() -> None:
 
 
 def test_gradient_is_the_slope_of_the_cost() -> None:
-    """Central differences in random directions: motion, sightings with shared errors, rods, sensors, floor, crossing."""
+    """Central differences: motion, sightings with shared errors, rods, sensors, floor, crossing rods."""
     body = Body.of(known(), sharing=True)
     rng = np.random.default_rng(3)
     x, known_of = evidence(body, rng, 4)

@@ -115,7 +115,7 @@ def test_hermite_is_exact_for_cubics() -> None:
 
 
 def test_samples_go_to_the_frame_nearest_to_when_they_were_true() -> None:
-    """Two samples of one frame are averaged, with how late they are; the delay of the clock is taken off; NaN is none."""
+    """Two samples of one frame are averaged, with how late they are; the clock's delay is taken off; NaN is none."""
     t = np.array([0.0, 0.1, 0.2])
     shown = Readings(np.array([0.14, 0.17, 0.24]), np.array([[1.0], [3.0], [np.nan]]), np.array([0]))
     binned = bin_readings(t, shown, 0.05)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.estimate.motion import smooth_run as smooth_run_module
 from r2s2r_cli.stages.estimate.motion.data import (
     BLIND,
     HIDDEN,
@@ -20,7 +21,7 @@ from r2s2r_cli.stages.estimate.motion.data import (
     TrackedRun,
 )
 from r2s2r_cli.stages.estimate.motion.forward import Forward
-from r2s2r_cli.stages.estimate.motion.smooth_run import smooth_run
+from r2s2r_cli.stages.estimate.motion.smooth_run import smooth_run, windows
 from tests.support.camera_motion import Motion, motion, readings, sighted
 
 CHI2_95 = 7.815
@@ -135,7 +136,7 @@ def test_filter_follows_and_finds_again() -> None:
     assert not np.any(lost[:60])
     assert not np.any(lost[76:])
     assert np.mean(off[78:]) < 5e-3
-    np.testing.assert_allclose(forward.p_WE, truth.at(forward.t), atol=5e-3)
+    np.testing.assert_allclose(forward.p_WE, truth.at(np.array(forward.t)), atol=5e-3)
 
 
 def test_filter_runs_backwards() -> None:
@@ -149,7 +150,7 @@ def test_filter_runs_backwards() -> None:
         forward.update(float(seen.t[k]), seen.p_WE[k], seen.cov[k])
         assert np.max(np.linalg.norm(forward.p_WE - truth.at(seen.t[k]), axis=-1)) < 0.02
         assert not forward.lost
-    rate = (truth.at(forward.t + 0.02) - truth.at(forward.t - 0.02)) / 0.04
+    rate = (truth.at(np.array(forward.t) + 0.02) - truth.at(np.array(forward.t) - 0.02)) / 0.04
     np.testing.assert_allclose(forward.v_WE, rate, atol=0.06)
 
 
@@ -193,6 +194,34 @@ def test_sightings_that_cannot_be_used_are_refused() -> None:
         smooth_run(replace(seen, t=np.zeros_like(seen.t)), None, truth.robot)
     with pytest.raises(InputError, match="do not fit the robot"):
         smooth_run(replace(seen, p_WE=seen.p_WE[:, :4]), None, truth.robot)
+
+
+@pytest.mark.slow
+def test_stretches_give_what_the_whole_run_gives(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run cut into stretches of 70 frames: the same caps within their standard deviation, seams included."""
+    truth, rng = moving(), np.random.default_rng(6)
+    seen = sighted(truth, rng)
+    heard, _ = readings(truth, rng, offset_s=OFFSET_S)
+    whole = smooth_run(seen, heard, truth.robot)
+    monkeypatch.setattr(smooth_run_module, "LONGEST", 70)
+    monkeypatch.setattr(smooth_run_module, "OVERLAP", 30)
+    cut = smooth_run(seen, heard, truth.robot)
+    np.testing.assert_array_equal(cut.t, whole.t)
+    assert cut.acceleration.shape == whole.acceleration.shape
+    off = np.linalg.norm(cut.p_WE - whole.p_WE, axis=-1) / np.sqrt(np.linalg.eigvalsh(whole.cov_p)[..., -1])
+    assert np.quantile(off, 0.95) < 1.0
+    assert abs(cut.clock.delay_s - OFFSET_S - LAG_S) < 0.015
+
+
+def test_stretches_show_every_cap() -> None:
+    """Stretches overlap and cover the run; one that misses a cap is joined with its neighbour."""
+    seen = np.ones((4000, 6), dtype=bool)
+    assert windows(seen) == [(0, 1200), (1080, 2280), (2160, 3360), (3240, 4000)]
+    seen[1000:2400, 3] = False
+    assert windows(seen)[1] == (1080, 3480)
+    seen[:] = True
+    seen[3200:, 0] = False
+    assert windows(seen)[-1] == (2160, 4000)
 
 
 @pytest.mark.slow

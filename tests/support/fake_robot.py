@@ -77,10 +77,12 @@ class FakeLink:
         true = np.array([s.slope_f_per_m * self.length[s.cable] + s.offset_f for s in self.robot.sensors])
         self.capacitance = np.where(fresh, true, self.capacitance)
         self.t_sensor = np.where(fresh, self.t, self.t_sensor)
+        motors = np.arange(len(self.robot.actuated))
         sample = Sample(
             t_host=self.t, board=board, t_board=self.t - 90.0 + board, due=board == self.boards - 1,
             capacitance=self.capacitance, t_sensor=self.t_sensor, fresh=fresh,
-            encoder=np.arange(len(self.robot.actuated)) + self.count, a_B=np.array([0.0, 0.0, 9.81]),
+            encoder=np.where(motors % self.boards == board, motors + self.count, np.nan),
+            a_B=np.array([0.0, 0.0, 9.81]),
             w_WB=np.zeros(3), voltage=7.4,
         )  # fmt: skip
         self.count += 1

@@ -111,6 +111,9 @@ class RunLoop:
             return
         self.t = t
         self.tally.sample(t, sample)
+        # Every board tells of its own motors alone, and a tick falls on one of them.
+        self._encoder = np.where(np.isfinite(sample.encoder), sample.encoder, self._encoder)
+        self._voltage = self._voltage if sample.voltage is None else sample.voltage
         if sample.due:
             self._control(t, sample, pictures)
         self._write(t, sample)
@@ -137,9 +140,7 @@ class RunLoop:
         for stream, row in self._interval.tick(t, target, control, done):
             self._put(stream, row)
         self._put("commands", {"t": t, "target": target, "control": control, "done": done})
-        self._encoder = np.where(np.isfinite(sample.encoder), sample.encoder, self._encoder)
         self.tally.turned(control, self._encoder)
-        self._voltage = self._voltage if sample.voltage is None else sample.voltage
         self._put("motors", {"t": t, "position": self._pid.position(length), "speed": control,
                              "encoder": self._encoder, "voltage": self._voltage})  # fmt: skip
         number = self._interval.count + 1

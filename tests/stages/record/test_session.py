@@ -99,6 +99,17 @@ def test_unsynchronised_boards_leave_gaps_in_their_rows() -> None:
     assert np.array_equal(missing, board[:, None] != own)
 
 
+def test_every_motor_is_heard_though_a_tick_falls_on_one_board() -> None:
+    """Each board tells of its own motors: the row of a tick has the latest of all, none of them older than a round."""
+    link = FakeLink(calibrated(), boards=3)
+    session, rows = recorded(link, policy(link.robot, 0.4))
+    encoder = rows.column("runs/gait/motors", "encoder")
+    counts = encoder - np.arange(encoder.shape[1])
+    assert np.array_equal(np.ptp(counts, axis=1), np.full(len(counts), 2.0))  # three boards, one sample apart each
+    assert (np.diff(counts, axis=0) == 3).all()
+    assert not [text for text in session.runs[0].warnings if "encoder" in text]
+
+
 def test_intervals_and_segments_are_those_of_the_commands() -> None:
     """What was written while the run went on is what the whole run gives afterwards."""
     link = FakeLink(calibrated())

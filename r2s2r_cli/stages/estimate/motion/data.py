@@ -32,7 +32,7 @@ class MotionSettings:
     """Of one sample, to start from; estimated over the run."""
     clock_range_s: float = 0.5
     """Clock offset and lag together are searched for up to that much, either way."""
-    ground_sd_m: float = 0.0005
+    ground_sd_m: float = 0.0002
     """Of the plane z = 0 against the floor under the caps; it is not estimated again from the contacts, because a plane
     through a hundred thousand points is better known than the heights of a few caps."""
     ground_tilt_sd_rad: float = 0.001

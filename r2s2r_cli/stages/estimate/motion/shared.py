@@ -6,8 +6,9 @@ import numpy as np
 
 from r2s2r_cli.stages.estimate.motion.prepare import Prepared, principal
 
-TOTAL = 1.0
-"""What the whole error is taken for, over what the sightings state (variances)."""
+TOTAL = 0.9
+"""What the whole error is taken for, over what the sightings state (variances): at 1.44 m they state a little too
+much, at 2.4 m a little too little (tuning runs)."""
 LEAST = 0.02
 """Least share of the stated variance that is shared."""
 

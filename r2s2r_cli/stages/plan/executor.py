@@ -55,7 +55,9 @@ class Executor:
 
         self.robot, self.step, self.hurried = robot, step, hurried
         structure = replace(structure_of(robot), rod_contact=rod_contact)
-        self.mapping = Mapping(robot, belief.frees, belief.effects, fixed=belief.fixed, structure=structure)
+        own = belief.model.mapping
+        effects = tuple(effect.name for effect in own.structure.effects)
+        self.mapping = Mapping(robot, own.frees, effects, fixed=own.fixed, structure=structure)
         self.structure = self.mapping.structure
         self.values = torch.as_tensor(draws, dtype=torch.float64)
         one = self.mapping.theta(self.values)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import torch
 
 from r2s2r_cli.engine.closed_loop import closed_loop
 from r2s2r_cli.engine.flat import pack_state, unpack_state
 from r2s2r_cli.engine.link import Link
-from r2s2r_cli.stages.identify.free.base import values_of
+from r2s2r_cli.stages.identified import Identified
 from r2s2r_cli.stages.identify.free.catalogue import entries
+from r2s2r_cli.stages.identify.free.mapping import Mapping
 from r2s2r_cli.stages.plan.belief import Belief, assumed
 from r2s2r_cli.stages.plan.executor import Executor
 from tests.support.robots import subject
@@ -28,12 +27,11 @@ def test_a_batch_does_what_the_closed_loop_does_one_by_one() -> None:
     """Policies of two targets with numbers and a delay of their own: same states at the ends of both targets, same
     ticks, same targets given up, as the engine's closed loop gives them alone, to rounding."""
     robot = subject().robot
-    delay = replace(entries(robot)["command_delay"].free, start=0.03)
-    base = assumed(robot)
-    belief = replace(base, frees=(*base.frees, delay), covariance=np.diag([0.01] * len(base.frees) + [1e-3]) ** 2)
+    frees = tuple(entries(robot)[name].free for name in ("motor_speed", "friction", "command_delay"))
+    values = np.array([frees[0].start, frees[1].start, 0.03])
+    belief = Belief(Identified("a test", robot, Mapping(robot, frees), values, np.diag([1e-2, 1e-2, 1e-3]) ** 2), True)
     draws = belief.draws(3, np.random.default_rng(1))
-    assert len(set(draws[:, 0])) == 3 and np.allclose(draws[0], values_of(belief.frees, np.array(
-        [free.to_z(free.start) for free in belief.frees])))  # fmt: skip
+    assert len(set(draws[:, 0])) == 3 and np.array_equal(draws[0], values)
     made = executor(belief, draws, timeout_s=1.3)
     at = made.standing(np.repeat(subject().p_WE.numpy(), 3, axis=0), np.arange(3))
     targets = np.array([[[1, 0, 1, 1, 0, 1], [1, 1, 1, 1, 1, 1]], [[0, 0, 0, 0, 0, 0], [1, 1, 0, 1, 1, 1]],

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from r2s2r_cli.artifact import ArtifactData, Group
-from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.errors import ArtifactError, InputError
 from r2s2r_cli.stages.estimate.camera_input import Pictures
 from r2s2r_cli.stages.estimate.groups import run_groups
 from r2s2r_cli.stages.estimate.report import run_report
@@ -37,11 +37,11 @@ def estimate(
 
     pictures: gives the encoded images of a run (`camera_input.py`); without them only runs with observed end caps can
     be estimated. A run that has both is estimated from its end caps. The report of the first estimated run warns of
-    those that were left out.
+    those that were left out, runs of pictures in which the robot cannot be tracked among them.
 
     Raises InputError where no run can be estimated, for a run with fewer than five kept frames, of another robot, with
-    numbers that are not finite, or with pictures in which the robot cannot be found; NumericalError where the smoother
-    cannot explain a track.
+    numbers that are not finite, or where no run has pictures in which the robot is found; NumericalError where the
+    smoother cannot explain a track.
     """
     if recording.kind != "recording" or not recording.runs():
         raise ArtifactError(
@@ -55,15 +55,26 @@ def estimate(
     reports = []
     streams = {run: dict(recording.streams(run)) for run in recording.runs()}
     usable = [run for run in streams if _usable(streams[run], pictures)]
-    left_out = tuple(
+    left_out = [
         f"run {run} of the recording is left out: it holds neither observed end caps nor camera images"
         for run in streams
         if run not in usable
-    )
+    ]
+    refused: InputError | None = None
     for run in usable or streams:  # none usable: `estimate_run` refuses the first with what it holds
-        state = _state(run, streams[run], robot, settings, pictures, show)
+        try:
+            state = _state(run, streams[run], robot, settings, pictures, show)
+        except InputError as error:
+            if "caps" in streams[run] or run not in usable:
+                raise
+            # A robot that left the picture in one run says nothing about the others.
+            refused = refused or error
+            left_out.append(f"run {run} of the recording is left out: {error.what}; received: {error.received}")
+            continue
         groups.update(run_groups(state))
         reports.append(run_report(state))
+    if not reports and refused is not None:
+        raise refused
     reports[0] = reports[0].model_copy(update={"warnings": (*left_out, *reports[0].warnings)})
     return ArtifactData(kind="estimate", groups=groups), EstimateReport(runs=tuple(reports))
 

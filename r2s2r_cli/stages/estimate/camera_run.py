@@ -9,11 +9,12 @@ import numpy as np
 
 from r2s2r_cli.artifact import Group
 from r2s2r_cli.devices.camera import Intrinsics
+from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.estimate.camera_input import Pictures, kept_frames, sensor_readings
 from r2s2r_cli.stages.estimate.ground import Ground
 from r2s2r_cli.stages.estimate.lengths import sensor_lengths
 from r2s2r_cli.stages.estimate.motion.data import REJECTED, SEEN, MotionSettings, Readings, Sighted, TrackedRun
-from r2s2r_cli.stages.estimate.pieces import smooth_pieces
+from r2s2r_cli.stages.estimate.motion.smooth_run import smooth_run
 from r2s2r_cli.stages.estimate.rigid import make_rigid
 from r2s2r_cli.stages.estimate.run import RunState, intervals_of, switches
 from r2s2r_cli.stages.estimate.smooth import MISSING, OBSERVED, OUTLIER, Tracks
@@ -57,7 +58,15 @@ def camera_run(
     Raises InputError where the pictures cannot be tracked, NumericalError where no motion explains them.
     """
     rows, source = kept_frames(run, streams, pictures)
-    return tracked_run(run, streams, source, robot, settings, rows=rows, show=show)
+    try:
+        return tracked_run(run, streams, source, robot, settings, rows=rows, show=show)
+    except InputError as error:
+        if run in error.what:
+            raise
+        raise InputError(
+            f"run {run}: {error.what}", where=error.where or f"runs/{run}/camera", expected=error.expected,
+            received=error.received, hint=error.hint,
+        ) from error  # fmt: skip
 
 
 def tracked_run(
@@ -77,10 +86,9 @@ def tracked_run(
     readings = sensor_readings(streams, robot)
     sighter = Sighter(robot, source.lens, source.depth_scale, known)
     swept = Sweep(run, source, sighter, known.X_WC, readings, robot, motion, advance).run()
-    tracked = smooth_pieces(
-        swept.sighted, readings, robot, motion, switches=switches(streams, source.t),
-        show=lambda pieces, all_: show(f"{run}: smoothing", pieces, all_, ""),
-    )  # fmt: skip
+    show(f"{run}: smoothing", 0, 1, "")
+    tracked = smooth_run(swept.sighted, readings, robot, motion, switches=switches(streams, source.t))
+    show(f"{run}: smoothing", 1, 1, "")
     return _state(run, streams, source, robot, settings, known, swept, tracked, readings,
                   np.arange(n) if rows is None else rows)  # fmt: skip
 

@@ -14,10 +14,11 @@ import cv2
 import numpy as np
 import pytest
 
-from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.commands.bench_estimate_case import TUNING_SEEDS, Case, make_case
 from r2s2r_cli.commands.bench_estimate_score import errors_of, summed_up
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.estimate import estimate
 from r2s2r_cli.stages.estimate.camera_run import tracked_run
 from r2s2r_cli.stages.estimate.groups import run_groups
 from r2s2r_cli.stages.estimate.report import run_report
@@ -243,3 +244,25 @@ def test_pictures_of_an_artifact_by_number(tmp_path: Path) -> None:
             assert pictures[k] == images[k]
         assert file.pictures(f"runs/{run}/camera/t") is None
         assert file.pictures("runs/nobody/camera/color") is None
+
+
+@pytest.mark.slow
+def test_a_run_in_which_the_robot_is_not_seen_costs_no_other(case: Case) -> None:
+    """It is left out with a warning that names it; where it is the only one, the error does."""
+    facts = {"width": 640, "height": 480, "depth_scale": case.frames.depth_scale, "cx": 320.0, "cy": 240.0}
+    camera = Group({"t": case.frames.t, "pair": case.frames.pair}, {**facts, "fx": 607.7, "fy": 607.7})
+    dark = {"color": np.zeros((480, 640, 3), np.uint8), "depth": np.zeros((480, 640), np.uint16)}
+    black = {name: [cv2.imencode(".png", image)[1].tobytes()] * len(case.frames) for name, image in dark.items()}
+
+    def pictures(run: str, name: str) -> Any:
+        return black[name] if run == "away" else getattr(case.frames, name)
+
+    def runs(*names: str) -> ArtifactData:
+        made = {f"runs/{run}/{name}".rstrip("/"): group for run in names for name, group in case.streams.items()}
+        return ArtifactData("recording", made | {f"runs/{run}/camera": camera for run in names})
+
+    data, report = estimate(runs("away", "good"), case.robot, EstimateSettings(), pictures=pictures)
+    assert data.runs() == ["good"]
+    assert "run away of the recording is left out" in report.runs[0].warnings[0]
+    with pytest.raises(InputError, match="run away"):
+        estimate(runs("away"), case.robot, EstimateSettings(), pictures=pictures)

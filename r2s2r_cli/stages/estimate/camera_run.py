@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.estimate.camera_input import Pictures, kept_frames, sensor_readings
 from r2s2r_cli.stages.estimate.ground import Ground
 from r2s2r_cli.stages.estimate.lengths import sensor_lengths
-from r2s2r_cli.stages.estimate.motion.data import REJECTED, SEEN, MotionSettings, Readings, Sighted, TrackedRun
+from r2s2r_cli.stages.estimate.motion.data import LOST, REJECTED, SEEN, MotionSettings, Readings, Sighted, TrackedRun
 from r2s2r_cli.stages.estimate.motion.smooth_run import smooth_run
 from r2s2r_cli.stages.estimate.rigid import make_rigid
 from r2s2r_cli.stages.estimate.run import RunState, intervals_of, switches
@@ -23,9 +24,11 @@ from r2s2r_cli.stages.estimate.vision.frames import FrameSource
 from r2s2r_cli.stages.estimate.vision.known import Survey
 from r2s2r_cli.stages.estimate.vision.sight import Sighter
 from r2s2r_cli.stages.estimate.vision.survey import survey
+from r2s2r_cli.stages.segments import Intervals, Segments
 from schemas.estimate import EstimateSettings
 from schemas.robot import Robot
 
+Table = TypeVar("Table", Intervals, Segments)
 Show = Callable[[str, int, int, str], None]
 """Progress: part of the work, items done and in all, a word beside them (`Console.parts`)."""
 
@@ -109,6 +112,7 @@ def _state(
     quality = np.select([tracked.quality == SEEN, tracked.quality == REJECTED], [OBSERVED, OUTLIER], MISSING)
     variance = np.where(np.isfinite(observed), np.diagonal(swept.sighted.cov, axis1=2, axis2=3), np.nan)
     intervals, parts = intervals_of(streams, t)
+    lost = (tracked.mode & LOST) > 0
     seen_late = t + (tracked.clock.delay_s if tracked.clock.known else 0.0)
     return RunState(
         run=run, streams=streams, robot=robot, kept=rows, t=t, observed=observed,
@@ -123,7 +127,9 @@ def _state(
         ground=Ground(shift=shift, shift_sd=float(tracked.ground_sd[0]), slope=tracked.ground[1:],
                       slope_sd=tracked.ground_sd[1:]),
         p_WE=rods.p_WE + np.array([0.0, 0.0, shift]), height_error=None, probability=tracked.contact_probability,
-        contact=tracked.contact, intervals=intervals, segments=parts,
+        contact=tracked.contact,
+        intervals=None if intervals is None else _seen(intervals, lost),
+        segments=None if parts is None else _seen(parts, lost),
         sensors=None if readings is None else sensor_lengths(seen_late, streams["sensors"], robot,
                                                              settings.sensor_gap_s),
         camera=CameraFacts(
@@ -131,6 +137,11 @@ def _state(
             readings=readings, residual=residual,
         ),
     )  # fmt: skip
+
+
+def _seen(table: Table, lost: np.ndarray) -> Table:
+    """Intervals or segments, complete only where the robot was not lost at the first frame or at the key frame."""
+    return replace(table, complete=table.complete & ~lost[table.first] & ~lost[table.last])
 
 
 def residuals(sighted: Sighted, tracked: TrackedRun) -> np.ndarray:

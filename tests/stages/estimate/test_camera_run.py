@@ -177,6 +177,18 @@ def test_frames_without_the_robot_are_marked_and_bridged(
 
 
 @pytest.mark.slow
+def test_intervals_at_whose_ends_the_robot_was_lost_are_not_judged(case: Case, state: RunState) -> None:
+    """It walks out of the picture for good: what the smoother guesses from then on is no key frame."""
+    gone = tracked(case, change=during(2.0, 99.0, spoiled.empty))
+    lost = marked(gone, 8)
+    assert lost[-1] and not marked(state, 8).any()
+    for before, after in ((state.intervals, gone.intervals), (state.segments, gone.segments)):
+        assert before is not None and after is not None
+        assert np.array_equal(after.complete, before.complete & ~lost[after.first] & ~lost[after.last])
+    assert gone.intervals is not None and not gone.intervals.complete[-1] and gone.intervals.complete[0]
+
+
+@pytest.mark.slow
 def test_tracking_begins_where_the_caps_are_seen_and_goes_back(case: Case) -> None:
     """The first second is black: the caps are told apart after it, the frames before are marked."""
     late = tracked(case, change=during(-1.0, 1.0, spoiled.black))

@@ -84,14 +84,14 @@ def _compute(asked: Asked, console: Console) -> tuple[ArtifactData, CompareRepor
     from r2s2r_cli.commands.interrupts import whole_items
 
     (stage,) = whole_items(_loaded())
-    runs, models = asked.runs(), asked.simulators()
+    (runs, left_out), models = asked.runs(), asked.simulators()
     settings = asked.project.config(asked.iteration, {}).simulate
     with console.progress("compare, runs", len(runs) * len(models)) as advance:
         data, report = stage.compare(
             runs, models, settings, keyframe_floor_m=asked.keyframe_floor(), cache_dir=asked.project.cache,
             done=lambda: advance(1),
         )  # fmt: skip
-    return data, report
+    return data, report.model_copy(update={"warnings": (*left_out, *report.warnings)})
 
 
 def _loaded() -> Iterator[Any]:

@@ -83,8 +83,8 @@ class Asked:
             for path in (self.estimate, *others, *self.files.values())
         ]
 
-    def runs(self) -> tuple[RealRun, ...]:
-        """The real runs. Raises ArtifactError, InputError."""
+    def runs(self) -> tuple[tuple[RealRun, ...], tuple[str, ...]]:
+        """The real runs, and why others are left out. Raises ArtifactError, InputError."""
         from r2s2r_cli.stages.compare import real_runs
         from r2s2r_cli.store.read import read_artifact
 

@@ -21,23 +21,42 @@ from schemas.robot import Robot
 
 @dataclass(frozen=True)
 class RealRun:
-    """One executed policy. walk: smoothed. targets: what the controller was given, rest before and after included.
+    """One executed policy. walk: smoothed, up to the first interval that is not complete; intervals: how many there are
+    in all. targets: what the controller was given, rest before and after included.
     data: what a replay of its commands needs; None where the motor commands were not logged."""
 
     name: str
     policy: str
+    intervals: int
     walk: Walk
     targets: Targets
     data: RunData | None
 
 
-def real_runs(estimate: ArtifactData, recording: ArtifactData | None, robot: Robot) -> tuple[RealRun, ...]:
-    """All runs of an estimate. Raises InputError where there is none, or one that allows no comparison."""
-    found = tuple(_run(estimate, recording, run, robot) for run in estimate.runs())
+def real_runs(
+    estimate: ArtifactData, recording: ArtifactData | None, robot: Robot
+) -> tuple[tuple[RealRun, ...], tuple[str, ...]]:
+    """The runs of an estimate that allow a comparison, and why others do not, in words.
+
+    Raises InputError where none does.
+    """
+    found, refused = [], []
+    for run in estimate.runs():
+        try:
+            found.append(_run(estimate, recording, run, robot))
+        except InputError as error:
+            refused.append(error)
+    if not found and refused:
+        raise refused[0]
     if not found:
         raise InputError("there is no run to compare with", where="estimate", expected="at least one estimated run",
                          received="none", hint="r2s2r estimate")  # fmt: skip
-    return found
+    left_out = tuple(f"left out: {error.what} ({error.received})" for error in refused)
+    cut = tuple(
+        f"run {one.name}: its first {len(one.walk.intervals)} target intervals are compared, the next is not complete"
+        for one in found if len(one.walk.intervals) < one.intervals
+    )  # fmt: skip
+    return tuple(found), left_out + cut
 
 
 def cap_shares(robot: Robot) -> np.ndarray:
@@ -57,7 +76,7 @@ def _run(estimate: ArtifactData, recording: ArtifactData | None, run: str, robot
     frames = groups["frames"]
     intervals = _intervals(groups, run, frames)
     return RealRun(
-        name=run, policy=_policy(groups[""], run),
+        name=run, policy=_policy(groups[""], run), intervals=len(groups["intervals"]["first"]),
         walk=Walk(frames["t"], frames["p_WE"], cap_shares(robot), intervals),
         targets=_targets(estimate, recording, run, intervals, robot),
         data=_data(estimate, recording, run),
@@ -72,7 +91,7 @@ def _intervals(groups: dict[str, Group], run: str, frames: Group) -> Intervals:
     if whole is None or count < 2:
         raise InputError(
             f"run {run} has no gait to compare", where=f"runs/{run}/intervals",
-            expected="at least two complete target intervals", received=f"{count} of {len(frames['t'])} frames",
+            expected="at least two complete target intervals, from the first on", received=f"{count}",
             hint="r2s2r record gait.toml --port ...",
         )  # fmt: skip
     return Intervals(**{name: value[:count] for name, value in vars(whole).items()})

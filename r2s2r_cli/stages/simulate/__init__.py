@@ -70,8 +70,8 @@ def simulate(
     """Simulate every request; the layout is that of `schemas/simulation.py`.
 
     model: whose numbers are simulated; None: robot.toml's. progress: called with the run's name and how many of its
-    `parts` are done. Raises UsageError where two runs have one name, InputError for a robot or policy that cannot be simulated,
-    NumericalError where numbers are not finite.
+    `parts` are done. Raises UsageError where two runs have one name, InputError for a robot or policy that cannot be
+    simulated, NumericalError where numbers are not finite.
     """
     names = [request.name for request in requests]
     for name in names:

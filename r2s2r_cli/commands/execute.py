@@ -133,11 +133,29 @@ def _chosen(project: Project, place: Iteration, names: Sequence[str]) -> tuple[l
     files = [text for text in names if Path(text).suffix in (".toml", ".h5") or ".h5:" in text]
     if not names or len(files) < len(names):
         require_input(plan, f"r2s2r plan --iteration {place.number}")
+        _require_fresh(project, place, plan)
     texts = [text if text in files else f"{plan}:{text}" for text in names] or [str(plan)]
     found = [policy for text in texts for policy in read_policies(text)]
     for policy in found:
         sequence(policy, project.robot())
     return found, Asked(project, place, tuple(texts), None, 0, (), None).refs()
+
+
+def _require_fresh(project: Project, place: Iteration, plan: Path) -> None:
+    """Raises InputError where the plan was made for another robot.toml, model or settings than there are now."""
+    from r2s2r_cli.commands.stage import wanted_again
+    from r2s2r_cli.errors import InputError
+    from r2s2r_cli.store.header import whole_header
+    from r2s2r_cli.store.staleness import reasons
+
+    header = whole_header(plan)
+    found = reasons(project, header, wanted_again(project, place, header.provenance))
+    if found:
+        raise InputError(
+            "the plan is stale: it was made for another robot or simulator than there is now",
+            where=project.relative(plan), expected="a fresh plan", received="; ".join(found),
+            hint=f"r2s2r plan --iteration {place.number}",
+        )  # fmt: skip
 
 
 def _expect(

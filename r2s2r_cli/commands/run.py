@@ -119,7 +119,8 @@ def _steps(
         words = ("execute", *policies, "--repeats", str(repeats), *robot, *(("--yes",) if yes else ()))
         yield Step("execute", words, executed, robot=True)
         yield Step("estimate-executed", ("estimate", "--of", "execute"), place.artifact("estimate", executed=True))
-    yield Step("compare", ("compare",), place.artifact("comparison"))
+    if robot or executed.exists() or source or recording.exists() or not earlier:
+        yield Step("compare", ("compare",), place.artifact("comparison"))
 
 
 def _resumed(step: Step) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -136,18 +137,28 @@ def _unsealed(project: Project, iteration: Iteration | None, path: Path, busy: s
 
 def _forward(project: Project) -> str:
     """The next command where nothing is to be mended."""
-    latest = project.iterations()[-1:]
-    if not latest or not latest[0].artifact("recording").exists():
+    every = project.iterations()
+    earlier = any(
+        one.artifact("estimate", executed=executed).exists() for one in every[:-1] for executed in (False, True)
+    )
+    if not every or not (every[-1].artifact("recording").exists() or earlier):
         return "r2s2r import run.csv"
-    place = latest[0]
+    place = every[-1]
+    if not place.artifact("recording").exists():  # it learns from the iteration before
+        return _planned(place, ("identification", "plan"))
     held = list(read_header(place.artifact("recording")).datasets)
     if not any(name.endswith("/caps/p_WE") or "/camera/depth" in name for name in held):
         # Nothing to estimate states from yet; sensors alone tell how far the robot repeats itself.
         repeats = len({name.split("/")[1] for name in held if name.startswith("runs/")}) > 1
         return "r2s2r floor" if repeats and not project.artifact("floor", None).exists() else ""
-    for kind, command in (("estimate", "estimate"), ("identification", "identify"), ("plan", "plan")):
+    return _planned(place, ("estimate", "identification", "plan"))
+
+
+def _planned(place: Iteration, kinds: Sequence[str]) -> str:
+    """The next command of an iteration whose robot has done what it can without a plan."""
+    for kind in kinds:
         if not place.artifact(kind).exists():
-            return f"r2s2r {command} --iteration {place.number}"
+            return f"r2s2r {'identify' if kind == 'identification' else kind} --iteration {place.number}"
     if place.artifact("recording", executed=True).exists():
         if not place.artifact("estimate", executed=True).exists():
             return f"r2s2r estimate --of execute --iteration {place.number}"

@@ -25,8 +25,8 @@ ARTIFACTS := $(RECORD) $(ESTIMATE) $(IDENTIFY)
 LAST := iterations/$(shell printf '%03d' "$$(expr '$(ITER)' - 1)" 2>/dev/null || printf 'none')
 FROM := $(ESTIMATE)
 ifeq ($(strip $(SOURCE))$(wildcard $(RECORD)),)
-ifneq ($(wildcard $(LAST)/20-estimate.h5),)
-FROM := $(LAST)/20-estimate.h5
+ifneq ($(wildcard $(LAST)/20-estimate.h5 $(LAST)/51-estimate.h5),)
+FROM := $(wildcard $(LAST)/20-estimate.h5 $(LAST)/51-estimate.h5)
 ARTIFACTS := $(IDENTIFY)
 endif
 endif

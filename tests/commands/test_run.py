@@ -80,6 +80,13 @@ def test_the_next_iteration_records_nothing(estimated: Path, calls: Calls) -> No
     assert stages(Child.calls) == ["identify", "plan", "execute"]
 
 
+def test_a_later_iteration_without_a_robot_ends_with_its_plan(estimated: Path, calls: Calls) -> None:
+    """There is no run of its own to compare with."""
+    result = invoke("run", "--iteration", "2")
+    assert result.exit_code == 0, result.stderr
+    assert stages(Child.calls) == ["identify", "plan"]
+
+
 @pytest.mark.parametrize(("code", "wanted"), [(3, 3), (4, 4), (5, 5), (6, 6), (130, 130), (-9, 130)])
 def test_the_first_failure_ends_it_with_its_code(estimated: Path, calls: Calls, code: int, wanted: int) -> None:
     """What comes after is not begun; a killed stage counts as interrupted."""

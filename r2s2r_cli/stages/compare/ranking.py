@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,14 +10,18 @@ import numpy as np
 from r2s2r_cli.stages.compare.repeats import ended, turned
 from r2s2r_cli.stages.compare.walk import Walk
 
+STILL_M, STILL_RAD = 1e-3, 1e-3
+"""Ways and turns that differ by less are the same."""
 LEAST = 4
 """Gaits below which a rank correlation says nothing: of three, one order in six is perfect by chance."""
 
 
 @dataclass(frozen=True)
 class Ranking:
-    """Spearman's rank correlation of real and simulated gaits. com: of how far the centre of mass came; turn: of how
-    far the robot turned; None where they have no headings, or all are equal. gaits: number of policies."""
+    """Spearman's rank correlation of real and simulated gaits.
+
+    com: of how far the centre of mass came along the line on which the real gaits differ most, forth and back told
+    apart; turn: of how far the robot turned; None where they have no headings, or all are equal. gaits: of policies."""
 
     gaits: int
     com: float | None
@@ -34,23 +38,30 @@ def ranking(real: Mapping[str, Walk], simulated: Mapping[str, Walk], policies: M
     if len(names) < LEAST:
         return None
     both = [[_of_policy(walks, policies, name) for name in names] for walks in (real, simulated)]
-    com = _spearman([one[0] for one in both[0]], [one[0] for one in both[1]])
+    ends = [np.array([one[0] for one in side]) for side in both]
+    line = np.linalg.svd(ends[0] - ends[0].mean(axis=0))[2][0]
+    com = _spearman(_coarse(ends[0] @ line, STILL_M), _coarse(ends[1] @ line, STILL_M))
     turns = [[one[1] for one in side] for side in both]
     known = all(value is not None for side in turns for value in side)
-    turn = _spearman(turns[0], turns[1]) if known else None  # type: ignore[arg-type]
+    turn = _spearman(*(_coarse(np.array(side, dtype=float), STILL_RAD) for side in turns)) if known else None
     return Ranking(len(names), com, turn)
 
 
-def _of_policy(walks: Mapping[str, Walk], policies: Mapping[str, str], name: str) -> tuple[float, float | None]:
-    """Way of the centre of mass [m] and turn [rad], means over the runs of a policy."""
+def _of_policy(walks: Mapping[str, Walk], policies: Mapping[str, str], name: str) -> tuple[np.ndarray, float | None]:
+    """End of the centre of mass (2,) [m] and turn [rad], means over the runs of a policy."""
     mine = [walk for run, walk in walks.items() if policies[run] == name]
     turns = [turned(walk) for walk in mine]
-    far = float(np.mean([np.linalg.norm(ended(walk)) for walk in mine]))
+    far = np.mean([ended(walk) for walk in mine], axis=0)
     known = [one for one in turns if one is not None]
     return far, float(np.mean(known)) if len(known) == len(turns) else None
 
 
-def _spearman(one: Sequence[float], other: Sequence[float]) -> float | None:
+def _coarse(values: np.ndarray, step: float) -> np.ndarray:
+    """Rounded to what is no difference: gaits that do not turn have no order."""
+    return np.round(values / step)
+
+
+def _spearman(one: np.ndarray, other: np.ndarray) -> float | None:
     from scipy.stats import rankdata
 
     a, b = rankdata(one), rankdata(other)

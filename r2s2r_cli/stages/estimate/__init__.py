@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from r2s2r_cli.artifact import ArtifactData, Group
-from r2s2r_cli.errors import ArtifactError, InputError
+from r2s2r_cli.errors import ArtifactError, InputError, NumericalError
 from r2s2r_cli.stages.estimate.camera_input import Pictures
 from r2s2r_cli.stages.estimate.groups import run_groups
 from r2s2r_cli.stages.estimate.report import run_report
@@ -60,11 +60,11 @@ def estimate(
         for run in streams
         if run not in usable
     ]
-    refused: InputError | None = None
+    refused: InputError | NumericalError | None = None
     for run in usable or streams:  # none usable: `estimate_run` refuses the first with what it holds
         try:
             state = _state(run, streams[run], robot, settings, pictures, show)
-        except InputError as error:
+        except (InputError, NumericalError) as error:
             if "caps" in streams[run] or run not in usable:
                 raise
             # A robot that left the picture in one run says nothing about the others.

@@ -120,5 +120,10 @@ def test_ranking_is_of_order_and_not_of_size() -> None:
     assert bad is not None
     assert (good.com, good.turn) == pytest.approx((1.0, 1.0))
     assert (bad.com, bad.turn) == pytest.approx((-1.0, -1.0))
+    backwards = {name: walk(-v, turn=0.0) for name, v in speeds.items()}
+    wrong = ranking(real, backwards, policies)
+    assert wrong is not None
+    assert wrong.com == pytest.approx(-1.0)  # as far, but the other way
+    assert wrong.turn is None  # none of them turns: there is no order
     few = dict(list(real.items())[: LEAST - 1])
     assert ranking(few, few, policies) is None

@@ -25,7 +25,7 @@ from r2s2r_cli.stages.estimate.vision.plane import (
 )
 from r2s2r_cli.stages.estimate.vision.plausible import HINT, check_lengths, check_sizes
 from r2s2r_cli.stages.estimate.vision.sight import Sighter
-from r2s2r_cli.stages.estimate.vision.world import HEIGHT_M, TILT_RAD, camera_pose, disagreement
+from r2s2r_cli.stages.estimate.vision.world import HEIGHT_M, TILT_RAD, camera_pose, disagreement, levelled
 from schemas.robot import Robot
 
 FRAMES = 24
@@ -76,7 +76,7 @@ def survey(
     if source.X_WC is not None:
         angle, height = disagreement(source.X_WC, ground)
         if angle <= TILT_RAD and abs(height) <= HEIGHT_M:
-            X_WC = source.X_WC
+            X_WC = levelled(source.X_WC, ground)
         else:
             trusted = ground.share >= MIN_SHARE
             warnings.append(

@@ -27,6 +27,19 @@ def camera_pose(ground: Ground) -> np.ndarray:
     return X_WC
 
 
+def levelled(X_WC: np.ndarray, ground: Ground) -> np.ndarray:
+    """A stated pose (4, 4) with the ground that is seen: place over the ground and heading as stated, height, roll and
+    pitch as seen. A camera sees its floor to a millimetre; a pose that was measured once is off by several."""
+    own = camera_pose(ground)
+    both = X_WC[:3, :3] @ own[:3, :3].T
+    yaw = np.arctan2(both[1, 0] - both[0, 1], both[0, 0] + both[1, 1])
+    c, s = np.cos(yaw), np.sin(yaw)
+    found = np.eye(4)
+    found[:3, :3] = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ own[:3, :3]
+    found[:3, 3] = [X_WC[0, 3], X_WC[1, 3], ground.distance]
+    return found
+
+
 def disagreement(X_WC: np.ndarray, ground: Ground) -> tuple[float, float]:
     """How far a stated pose X_WC and the ground that is seen are apart: angle [rad], height of the camera [m]."""
     cosine = float(np.clip(X_WC[2, :3] @ ground.normal_C, -1.0, 1.0))

@@ -13,6 +13,7 @@ from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
 
 if TYPE_CHECKING:
+    from r2s2r_cli.artifact import Group
     from r2s2r_cli.stages.compare import Model, RealRun
 
 INITIAL = "initial"
@@ -106,9 +107,29 @@ class Asked:
             if self.project.relative(self.estimate) in used:
                 segments = data.groups["segments"]
                 roles = zip(segments["run"].tolist(), segments["role"].tolist(), strict=True)
-                trained = frozenset(run.decode() for run, role in roles if role == TRAIN)
+                trained = self._own({run.decode() for run, role in roles if role == TRAIN}, segments)
             found.append(Model(name, identified(data, robot, words=self.project.relative(path)), trained))
         return tuple(found)
+
+    def _own(self, trained: set[str], segments: Group) -> frozenset[str]:
+        """Of the runs that were trained on, by the names that `identify` gave them, those of this estimate, by theirs.
+
+        There a run of another iteration is called NNN-RUN, and an executed one executed-RUN where both have one name.
+        """
+        known = {run.decode() for run in segments["run"].tolist()}
+        found = set()
+        for run in self._names:
+            plain = {run, f"{self.iteration.number:03d}-{run}"}
+            marked = {f"executed-{name}" for name in plain}
+            if (marked if self.of == "execute" and marked & known else plain) & trained:
+                found.add(run)
+        return frozenset(found)
+
+    @cached_property
+    def _names(self) -> list[str]:
+        from r2s2r_cli.store.read import read_artifact
+
+        return read_artifact(self.estimate, "estimate")[1].runs()
 
     def keyframe_floor(self) -> float | None:
         """Of the caps at key frames [m], from floor.h5; None where there is none."""

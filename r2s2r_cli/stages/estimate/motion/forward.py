@@ -34,6 +34,8 @@ TWIN_M = 0.04
 """[m] Two caps of a rod whose distance is farther off than this are not both caps of it."""
 BENT_M, FAR_OFF_M, FAR_OFF = 0.005, 0.04, 2
 """Rods farther off than the first [m], or so many sensors farther off than the second [m], contradict the states."""
+OLD_S = 0.2
+"""[s] A length that was shown longer ago says nothing any more."""
 UNKNOWN_DELAY_S = 0.06
 """Clock offset and lag of the sensors, not known yet: a changing length is that much out of date."""
 START_SD_M = 0.005
@@ -63,7 +65,8 @@ class Forward:
         self._t = float("nan")
         self._way = 1.0
         self._refused = np.zeros(self.body.caps, dtype=int)
-        self._shown = np.full(len(self.body.sensor), np.nan)
+        self._shown, self._heard = np.full((2, len(self.body.sensor)), np.nan)
+        self._agreed = np.zeros(len(self.body.sensor), dtype=bool)
         self._count, self._sum, self._late = (np.zeros(len(self.body.sensor)) for _ in range(3))
         self._elapsed = 0.0
         self._unseen = np.zeros(self.body.caps)
@@ -139,7 +142,6 @@ class Forward:
             sighting_rows(stack, x, body, np.where(used[:, None], p_WE, np.nan), cov)
             rod_rows(stack, x, body, self.settings)
             floor_rows(stack, x, body, self.settings, self._spread())
-
             if not np.any(used):
                 standing_rows(stack, x, body)
 
@@ -173,6 +175,7 @@ class Forward:
         good = np.isfinite(length)
         if np.isnan(self._t) or not np.any(good):
             return
+        self._shown, self._heard = np.where(good, length, self._shown), np.where(good, t, self._heard)
         self._count += good
         self._sum += np.where(good, length, 0.0)
         self._late += np.where(good, t, 0.0)
@@ -186,7 +189,6 @@ class Forward:
         length = np.where(heard, self._sum / some, np.nan)
         later = np.where(heard, self._late / some - self._t, 0.0)
         noise = self.settings.sensor_noise_sd_m / np.sqrt(some)
-        self._shown = np.where(heard, length, self._shown)
         self._count, self._sum, self._late = (np.zeros(len(some)) for _ in range(3))
 
         def rows(stack: Stack, x: np.ndarray) -> None:
@@ -216,10 +218,10 @@ class Forward:
         A rod of which one cap or none is seen stays with the others by cables and rods.
         """
         self._go(t)
-        bias = self._x[self.body.bias]
         length = np.full(len(self.body.cable), np.nan)
-        length[self._cable] = self._shown - bias
-        found = label(candidates, self.robot, length, predicted=(self.p_WE, self.cov_p), partly=True)
+        length[self._cable] = self._shown - self._x[self.body.bias]
+        kept = self._unseen <= FRESH_S
+        found = label(candidates, self.robot, length, predicted=(self.p_WE, self.cov_p), partly=True, kept=kept)
         if found is None or not found.sure:
             return False
         body, seen = self.body, np.all(np.isfinite(found.p_WE), axis=1)
@@ -251,14 +253,18 @@ class Forward:
         self._refused[:] = 0
         self._unseen[:] = 0.0
         self._wrong = 0
+        self._agreed[:] = False
 
     def _consistent(self) -> bool:
-        """Whether rods and sensors are as long as they should be."""
+        """Whether rods and sensors are as long as they should be. A sensor that agreed with its caps, and leaves them
+        while both are in sight, contradicts itself: it has jumped."""
         p = self.body.positions(self._x)
         rods = np.linalg.norm(p[self.body.rod[:, 1]] - p[self.body.rod[:, 0]], axis=-1) - self.body.rod_length
         seen = np.linalg.norm(p[self.body.sensor[:, 1]] - p[self.body.sensor[:, 0]], axis=-1)
         off = np.abs(self._shown - self._x[self.body.bias] - seen)
-        return bool(np.all(np.abs(rods) < BENT_M) and np.sum(off > FAR_OFF_M) < FAR_OFF)
+        in_sight = np.all(self._unseen[self.body.sensor] <= FRESH_S, axis=1)
+        self._agreed = in_sight & (self._agreed | (off <= FAR_OFF_M))
+        return bool(np.all(np.abs(rods) < BENT_M) and np.sum((off > FAR_OFF_M) & ~self._agreed) < FAR_OFF)
 
     def _spread(self) -> np.ndarray:
         """Standard deviation of each cap's height, (cap,)."""
@@ -289,6 +295,7 @@ class Forward:
             cov = cov * shrink[:, None] * shrink
         self._cov = cov
         self._t = float(t)
+        self._shown[np.abs(self._t - self._heard) > OLD_S] = np.nan
 
     def _spread_by(self, cov: np.ndarray, dt: float, density: float) -> np.ndarray:
         """Cov after white acceleration of that density over dt [s], either way in time."""

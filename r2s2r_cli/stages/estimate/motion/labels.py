@@ -22,6 +22,8 @@ MISSING_COST = 12.0
 """Price of leaving out a cap, in half squared deviations: nearly 5 standard deviations of one of them."""
 FREEDOM = 4.0
 """Of Student's t of the distance from where a cap was expected: it may be far off after it was lost."""
+HERE_M = 0.02
+"""[m] A blob no farther from where a cap in sight is expected is a cap of that rod."""
 FIT = 5.0
 """Most that half the squared deviations may be per constraint; beyond, the blobs are not the robot."""
 
@@ -49,6 +51,7 @@ def label(
     *,
     predicted: tuple[np.ndarray, np.ndarray] | None = None,
     partly: bool = False,
+    kept: np.ndarray | None = None,
 ) -> Labelling | None:
     """Tell the caps apart.
 
@@ -56,11 +59,15 @@ def label(
     two or more (distractors). length: of the cables by their sensors [m], shape (cable,), NaN where there is none;
     None or all NaN: the shape at rest of robot.toml is compared instead, mirror images told apart, which holds only
     while the robot rests. predicted: caps (cap, 3) and covariance (cap, 3, 3) where the filter expects them; it takes
-    the place of the shape at rest. partly: a cap may be missing (NaN, pick -1), at a price. None where some rod has no
-    two blobs a rod length apart (partly: where no blob is left).
+    the place of the shape at rest. partly: a cap may be missing (NaN, pick -1), at a price. kept: whether
+    a cap was in sight just before, (cap,): a blob that lies where it is predicted is not left out if it fits its rod.
+    None where some rod has no two blobs a rod length apart (partly: where no blob is left).
     """
     blobs = [np.asarray(one, dtype=float).reshape(-1, 3) for one in candidates]
     pairs = [_pairs(one, rod.length_m, partly) for one, rod in zip(blobs, robot.rods, strict=True)]
+    if kept is not None and predicted is not None:
+        near = zip(pairs, blobs, predicted[0].reshape(-1, 2, 3), kept.reshape(-1, 2), strict=True)
+        pairs = [_with_those_here(of_rod, one, at[here]) for of_rod, one, at, here in near]
     if not all(pairs):
         return None
     picks = np.array([np.concatenate(choice) for choice in itertools.product(*pairs)])
@@ -104,6 +111,13 @@ def _pairs(blobs: np.ndarray, length: float, partly: bool) -> list[tuple[int, in
         return alone
     apart = np.linalg.norm(blobs[:, None] - blobs[None], axis=-1)
     return [(int(i), int(j)) for i, j in np.argwhere(np.abs(apart - length) < 5 * ROD_SD)] + alone
+
+
+def _with_those_here(pairs: list[tuple[int, int]], blobs: np.ndarray, at: np.ndarray) -> list[tuple[int, int]]:
+    """The pairs that hold every blob at one of those places (place, 3); all of them where none does."""
+    far = np.linalg.norm(at[:, None] - blobs[None], axis=-1)
+    here = {int(np.argmin(of_place)) for of_place in far if len(of_place) and np.min(of_place) < HERE_M}
+    return [pair for pair in pairs if here <= set(pair)] or pairs
 
 
 def _from_rest(p_WE: np.ndarray, rest: np.ndarray) -> np.ndarray:

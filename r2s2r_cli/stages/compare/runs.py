@@ -13,7 +13,6 @@ from r2s2r_cli.stages.calibrate.masses import mass_properties
 from r2s2r_cli.stages.compare.walk import Walk
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.load import run_data
-from r2s2r_cli.stages.record.plan import with_rest
 from r2s2r_cli.stages.segments import Intervals
 from r2s2r_cli.stages.simulate.policies import Sequence as Targets, sequence, stored_policies
 from schemas.robot import Robot
@@ -106,13 +105,11 @@ def _policy(root: Group, run: str) -> str:
 def _targets(
     estimate: ArtifactData, recording: ArtifactData | None, run: str, intervals: Intervals, robot: Robot
 ) -> Targets:
-    """Of the policy that the run names, with its holds and the rest round it; of a log the targets that it shows."""
+    """Of the policy as it was run (holds and the rest round it are in it); of a log the targets that it shows."""
     for data in (recording, estimate):
         group = None if data is None else data.group(run, "policy")
         if data is not None and group is not None:
-            policy = sequence(stored_policies(data)[run], robot)
-            rest = float(data.groups[f"runs/{run}"].attributes.get("rest", 0.0))
-            return with_rest(policy, rest=rest, timeout=robot.pid.step_timeout_s)
+            return sequence(stored_policies(data)[run], robot)
     none = np.zeros(len(intervals))
     return Targets(intervals.target, none, none + robot.pid.step_timeout_s)
 

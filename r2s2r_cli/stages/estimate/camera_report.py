@@ -52,6 +52,8 @@ def mode_caps(facts: CameraFacts) -> int:
 def camera_warnings(state: RunState, facts: CameraFacts) -> list[str]:
     """What a person should know, in words."""
     found = list(facts.survey.warnings)
+    if facts.left_s is not None:
+        found.append(f"the robot left the picture at {facts.left_s:.1f} s and did not come back: the states end there")
     n, mode = len(state.t), facts.tracked.mode
     for bit, words in ((LOST, "some cap is less certain than 30 mm"), (BLIND, "no cap is seen"),
                        (NO_PICTURE, "there is no picture")):  # fmt: skip

@@ -28,6 +28,10 @@ from r2s2r_cli.stages.segments import Intervals, Segments
 from schemas.estimate import EstimateSettings
 from schemas.robot import Robot
 
+LEFT_S = 1.5
+"""Without a cap in view for longer than this up to its end, a run ends where the robot was last seen."""
+LEAST_FRAMES = 10
+"""A robot that is seen in fewer frames than this is not tracked to where it left, but refused further on."""
 Table = TypeVar("Table", Intervals, Segments)
 Show = Callable[[str, int, int, str], None]
 """Progress: part of the work, items done and in all, a word beside them (`Console.parts`)."""
@@ -50,6 +54,8 @@ class CameraFacts:
     tracked: TrackedRun
     readings: Readings | None
     residual: np.ndarray
+    left_s: float | None = None
+    """Time at which the robot left the picture for good [s]; the states end there. None: it stayed."""
 
 
 def camera_run(
@@ -89,18 +95,26 @@ def tracked_run(
     readings = sensor_readings(streams, robot)
     sighter = Sighter(robot, source.lens, source.depth_scale, known)
     swept = Sweep(run, source, sighter, known.X_WC, readings, robot, motion, advance).run()
+    seen = swept.in_view
+    if source.t[-1] - source.t[max(seen - 1, 0)] > LEFT_S and seen >= LEAST_FRAMES:
+        # It walked out of the picture. What would be guessed from there on spoils what was seen before.
+        n, swept = seen, swept.until(seen)
+        if readings is not None:
+            heard = readings.t <= source.t[n - 1]
+            readings = Readings(readings.t[heard], readings.length[heard], readings.cable)
+    t = source.t[:n]
     show(f"{run}: smoothing", 0, 1, "")
-    tracked = smooth_run(swept.sighted, readings, robot, motion, switches=switches(streams, source.t))
+    tracked = smooth_run(swept.sighted, readings, robot, motion, switches=switches(streams, t))
     show(f"{run}: smoothing", 1, 1, "")
-    return _state(run, streams, source, robot, settings, known, swept, tracked, readings,
-                  np.arange(n) if rows is None else rows)  # fmt: skip
+    return _state(run, streams, source, t, robot, settings, known, swept, tracked, readings,
+                  np.arange(n) if rows is None else rows[:n])  # fmt: skip
 
 
 def _state(
-    run: str, streams: dict[str, Group], source: FrameSource, robot: Robot, settings: EstimateSettings, known: Survey,
-    swept: Swept, tracked: TrackedRun, readings: Readings | None, rows: np.ndarray,
+    run: str, streams: dict[str, Group], source: FrameSource, t: np.ndarray, robot: Robot, settings: EstimateSettings,
+    known: Survey, swept: Swept, tracked: TrackedRun, readings: Readings | None, rows: np.ndarray,
 ) -> RunState:  # fmt: skip
-    t, shift = source.t, -float(tracked.ground[0])
+    shift = -float(tracked.ground[0])
     X_WC = known.X_WC.copy()
     X_WC[2, 3] += shift
     length = np.array([rod.length_m for rod in robot.rods])
@@ -112,7 +126,9 @@ def _state(
     quality = np.select([tracked.quality == SEEN, tracked.quality == REJECTED], [OBSERVED, OUTLIER], MISSING)
     variance = np.where(np.isfinite(observed), np.diagonal(swept.sighted.cov, axis1=2, axis2=3), np.nan)
     intervals, parts = intervals_of(streams, t)
+    left = len(t) < len(source.t)
     lost = (tracked.mode & LOST) > 0
+    lost[-1] |= left  # what it was doing then has no end
     seen_late = t + (tracked.clock.delay_s if tracked.clock.known else 0.0)
     return RunState(
         run=run, streams=streams, robot=robot, kept=rows, t=t, observed=observed,
@@ -134,7 +150,7 @@ def _state(
                                                              settings.sensor_gap_s),
         camera=CameraFacts(
             X_WC=X_WC, lens=source.lens, depth_scale=source.depth_scale, survey=known, swept=swept, tracked=tracked,
-            readings=readings, residual=residual,
+            readings=readings, residual=residual, left_s=float(t[-1]) if left else None,
         ),
     )  # fmt: skip
 

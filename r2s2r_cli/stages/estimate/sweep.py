@@ -21,6 +21,8 @@ from r2s2r_cli.stages.estimate.vision.sightings import HIDDEN, Candidate
 from r2s2r_cli.stages.estimate.vision.world import from_world, to_world
 from schemas.robot import Robot
 
+AT_LEAST = 2
+"""A single patch of colour may be anything."""
 FRESH_S = 0.06
 """Readings of the sensors up to this old count as those of a frame: three samples of a board."""
 
@@ -43,6 +45,19 @@ class Swept:
     known_sd: np.ndarray
     first: int
     searched: np.ndarray
+
+    @property
+    def in_view(self) -> int:
+        """Frames up to the last one in which two caps or more were seen: after it the robot did not come back."""
+        seen = np.isfinite(self.sighted.p_WE[..., 0]).sum(axis=1) >= AT_LEAST
+        return int(np.flatnonzero(seen)[-1]) + 1 if seen.any() else 0
+
+    def until(self, frames: int) -> Swept:
+        """The first frames alone."""
+        sighted = Sighted(self.sighted.t[:frames], self.sighted.p_WE[:frames], self.sighted.cov[:frames])
+        rows = {name: getattr(self, name)[:frames] for name in (
+            "visible", "code", "shift_px", "known", "known_sd", "searched")}  # fmt: skip
+        return Swept(sighted=sighted, first=self.first, **rows)
 
 
 class Sweep:

@@ -21,8 +21,8 @@ from r2s2r_cli.stages.estimate.vision.sightings import HIDDEN, Candidate
 from r2s2r_cli.stages.estimate.vision.world import from_world, to_world
 from schemas.robot import Robot
 
-AT_LEAST = 2
-"""A single patch of colour may be anything."""
+MOST = 0.6
+"""Of the caps in view, below which a robot is on its way out of the picture."""
 FRESH_S = 0.06
 """Readings of the sensors up to this old count as those of a frame: three samples of a board."""
 
@@ -48,8 +48,8 @@ class Swept:
 
     @property
     def in_view(self) -> int:
-        """Frames up to the last one in which two caps or more were seen: after it the robot did not come back."""
-        seen = np.isfinite(self.sighted.p_WE[..., 0]).sum(axis=1) >= AT_LEAST
+        """Frames up to the last one in which most caps were seen: after it the robot did not come back as a whole."""
+        seen = np.isfinite(self.sighted.p_WE[..., 0]).mean(axis=1) > MOST
         return int(np.flatnonzero(seen)[-1]) + 1 if seen.any() else 0
 
     def until(self, frames: int) -> Swept:

@@ -228,7 +228,7 @@ def test_a_host_that_ends_leaves_a_robot_at_rest(root: Path, number: int, code: 
         with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as host:
             wait_until(lambda: rig.truth.exists() and int(read_truth(rig.truth).duty.any(axis=1).sum()) > 50, 20.0)
             host.send_signal(number)
-            _, said = host.communicate(timeout=30)
+            _, said = host.communicate(timeout=90)
         gone_s = read_truth(rig.truth).t[-1]
         wait_until(lambda: read_truth(rig.truth).t[-1] > gone_s + 1.0)
         assert stopped_after(rig, gone_s, f"host {number.name}") <= LIMIT_S + 2 * TICK_S

@@ -19,6 +19,9 @@ TRUST = {
     4: "fixed: it was not free",
 }
 
+FIXED_BY_HAND = 4
+"""The code of TRUST for a number that was given."""
+
 ROLES = {0: "not used", 1: "train", 2: "test"}
 
 _NO_SD = "the runs do not say it"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -81,9 +81,9 @@ def compare(
 
 
 def _compute(asked: Asked, console: Console) -> tuple[ArtifactData, CompareReport]:
-    from r2s2r_cli.commands.interrupts import whole_items
+    from r2s2r_cli.commands.interrupts import loaded
 
-    (stage,) = whole_items(_loaded())
+    stage = loaded("r2s2r_cli.stages.compare")
     (runs, left_out), models = asked.runs(), asked.simulators()
     settings = asked.project.config(asked.iteration, {}).simulate
     with console.progress("compare, runs", len(runs) * len(models)) as advance:
@@ -92,14 +92,6 @@ def _compute(asked: Asked, console: Console) -> tuple[ArtifactData, CompareRepor
             done=lambda: advance(1),
         )  # fmt: skip
     return data, report.model_copy(update={"warnings": (*left_out, *report.warnings)})
-
-
-def _loaded() -> Iterator[Any]:
-    """The stage, with its libraries: compiled modules do not take an exception out of the blue while they load."""
-    import r2s2r_cli.engine  # noqa: F401 - torch, roma, llvmlite
-    import r2s2r_cli.stages.compare as stage
-
-    yield stage
 
 
 def _draw(data: ArtifactData, report: CompareReport) -> Iterator[tuple[str, bytes]]:

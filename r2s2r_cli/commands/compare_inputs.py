@@ -13,7 +13,7 @@ from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
 
 if TYPE_CHECKING:
-    from r2s2r_cli.artifact import Group
+    from r2s2r_cli.artifact import ArtifactData, Group
     from r2s2r_cli.stages.compare import Model, RealRun
 
 INITIAL = "initial"
@@ -90,7 +90,7 @@ class Asked:
         from r2s2r_cli.store.read import read_artifact
 
         recording = read_artifact(self.recording, "recording")[1] if self.recording.exists() else None
-        return real_runs(read_artifact(self.estimate, "estimate")[1], recording, self.project.robot())
+        return real_runs(self._states, recording, self.project.robot())
 
     def simulators(self) -> tuple[Model, ...]:
         """The simulators, that of robot.toml first. Raises ArtifactError, InputError."""
@@ -118,7 +118,7 @@ class Asked:
         """
         known = {run.decode() for run in segments["run"].tolist()}
         found = set()
-        for run in self._names:
+        for run in self._states.runs():
             plain = {run, f"{self.iteration.number:03d}-{run}"}
             marked = {f"executed-{name}" for name in plain}
             if (marked if self.of == "execute" and marked & known else plain) & trained:
@@ -126,10 +126,10 @@ class Asked:
         return frozenset(found)
 
     @cached_property
-    def _names(self) -> list[str]:
+    def _states(self) -> ArtifactData:
         from r2s2r_cli.store.read import read_artifact
 
-        return read_artifact(self.estimate, "estimate")[1].runs()
+        return read_artifact(self.estimate, "estimate")[1]
 
     def keyframe_floor(self) -> float | None:
         """Of the caps at key frames [m], from floor.h5; None where there is none."""

@@ -177,16 +177,11 @@ def _expect(
 def _simulated(
     project: Project, place: Iteration, policies: Sequence[PolicyFile], numbers: Path | None, console: Console
 ) -> SimulateReport:
-    from r2s2r_cli.commands.interrupts import whole_items
-    from r2s2r_cli.commands.simulate import loaded
-    from r2s2r_cli.stages.identified import identified
-    from r2s2r_cli.store.read import read_artifact
+    from r2s2r_cli.commands.interrupts import loaded
+    from r2s2r_cli.commands.simulate_inputs import Asked
 
-    (stage,) = whole_items(loaded())
-    robot, model = project.robot(), None
-    if numbers is not None:
-        _, found = read_artifact(numbers, "identification")
-        model = identified(found, robot, words=project.relative(numbers))
+    stage = loaded("r2s2r_cli.stages.simulate")
+    robot, model = project.robot(), Asked(project, place, (), None, 0, (), None, numbers).simulator()
     requests = [stage.Request(policy) for policy in policies]
     with console.progress("simulate, policies", len(requests)) as advance:
         done: set[str] = set()

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from r2s2r_cli.commands.interrupts import whole_items
+from r2s2r_cli.commands.interrupts import loaded
 from r2s2r_cli.console import Console
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def compute(
     """Fit; the report knows how long each part took. What is asked for is checked before anything heavy is loaded."""
     runs = asked.runs()
     request = asked.request(runs, settings.train_share)
-    (stage,) = whole_items(_loaded())
+    stage = loaded("r2s2r_cli.stages.identify")
     clock = Clock()
     with _shown(console, clock) as progress:
         data, report = stage.identify(
@@ -42,7 +42,7 @@ def plant(asked: Asked, settings: IdentifySettings, console: Console) -> None:
 
     runs = asked.runs()
     request = asked.request(runs, settings.train_share)
-    (stage,) = whole_items(_loaded_self_test())
+    stage = loaded("r2s2r_cli.stages.identify.self_tested")
     clock = Clock()
     with _shown(console, clock) as progress:
         report: SelfTestReport = stage.self_tested(
@@ -95,14 +95,6 @@ def _shown(console: Console, clock: Clock) -> Iterator[Callable[[Step], None]]:
             show(step.part, step.done, step.total, "" if step.cost is None else f"loss {step.cost:.6g}")
 
         yield progress
-
-
-def _loaded() -> Iterator[Any]:
-    """The stage, with its libraries: compiled modules do not take an exception out of the blue while they load."""
-    import r2s2r_cli.engine  # noqa: F401 - torch, roma, llvmlite
-    import r2s2r_cli.stages.identify as stage
-
-    yield stage
 
 
 def _loaded_self_test() -> Iterator[Any]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import signal
 import threading
 from collections.abc import Iterable, Iterator
-from typing import TypeVar
+from typing import Any, TypeVar
 
 Item = TypeVar("Item")
 
@@ -24,6 +25,18 @@ def whole_items(items: Iterable[Item]) -> Iterator[Item]:
         if item is done:
             return
         yield item  # type: ignore[misc]
+
+
+def loaded(stage: str) -> Any:
+    """Module `stage`, with the engine's libraries: compiled modules do not take an exception out of the blue while
+    they load."""
+
+    def made() -> Iterator[Any]:
+        importlib.import_module("r2s2r_cli.engine")  # torch, roma, llvmlite
+        yield importlib.import_module(stage)
+
+    (found,) = whole_items(made())
+    return found
 
 
 @contextlib.contextmanager

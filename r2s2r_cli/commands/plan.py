@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -135,10 +135,10 @@ def _compute(
     asked: Asked, settings: PlanSettings, checkpoint: CheckpointFile, console: Console
 ) -> tuple[ArtifactData, PlanReport]:
     from r2s2r_cli.commands.identify_run import Clock
-    from r2s2r_cli.commands.interrupts import whole_items
+    from r2s2r_cli.commands.interrupts import loaded
 
     request, robot = asked.request(settings), asked.project.robot()
-    (stage,) = whole_items(_loaded())
+    stage = loaded("r2s2r_cli.stages.plan.stage")
     clock = Clock()
     with console.parts() as show:
 
@@ -160,14 +160,6 @@ def _cores() -> int:
 
     known = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return min(4, known)
-
-
-def _loaded() -> Iterator[Any]:
-    """The stage, with its libraries: compiled modules do not take an exception out of the blue while they load."""
-    import r2s2r_cli.engine  # noqa: F401 - torch, roma, llvmlite
-    import r2s2r_cli.stages.plan.stage as stage
-
-    yield stage
 
 
 def _draw(data: ArtifactData, robot: Robot, report: PlanReport) -> Iterator[tuple[str, bytes]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -117,9 +117,9 @@ def _page(project: Project, place: Iteration) -> Path:
 
 
 def _compute(asked: Asked, settings: SimulateSettings, console: Console) -> tuple[ArtifactData, SimulateReport]:
-    from r2s2r_cli.commands.interrupts import whole_items
+    from r2s2r_cli.commands.interrupts import loaded
 
-    (stage,) = whole_items(loaded())
+    stage = loaded("r2s2r_cli.stages.simulate")
     requests, robot = asked.requests(), asked.project.robot()
     passed = {request.name: 0 for request in requests}
     with console.progress("simulate, targets", sum(map(stage.parts, requests))) as advance:
@@ -133,14 +133,6 @@ def _compute(asked: Asked, settings: SimulateSettings, console: Console) -> tupl
             robot, requests, settings, model=asked.simulator(), cache_dir=asked.project.cache, progress=progress
         )
     return data, report
-
-
-def loaded() -> Iterator[Any]:
-    """The stage, with its libraries: compiled modules do not take an exception out of the blue while they load."""
-    import r2s2r_cli.engine  # noqa: F401 - torch, roma, llvmlite
-    import r2s2r_cli.stages.simulate as stage
-
-    yield stage
 
 
 def _draw(data: ArtifactData, robot: Robot, report: SimulateReport) -> Iterator[tuple[str, bytes]]:

@@ -15,14 +15,13 @@ from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.identify.free.base import Coordinate, Free
 from r2s2r_cli.stages.identify.free.catalogue import entries
 from r2s2r_cli.stages.identify.free.mapping import Mapping
+from schemas.identification import FIXED_BY_HAND
 
 if TYPE_CHECKING:
     from r2s2r_cli.artifact import ArtifactData, Group
     from r2s2r_cli.engine import LatchedPid, Link, Parameters, Structure
     from schemas.robot import Robot
 
-FIXED_BY_HAND = 4
-"""Code of `schemas.identification.TRUST`."""
 _COORDINATES = (Coordinate.LINEAR, Coordinate.LOG, Coordinate.LOGIT)
 NARROW = 1e-9
 """A draw stays off its bounds by this part of their distance: on a bound a logarithm has no value."""

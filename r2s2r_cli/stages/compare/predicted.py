@@ -34,8 +34,8 @@ class Model:
 @dataclass(frozen=True)
 class PredictedRun:
     """walk: in closed loop, up to the last interval that both have; real: the same part of the real run. keyframes: by
-    command replay, each interval from its own start, None where no commands were logged. lost: why it could not be
-    simulated, in words; then walk and real are None."""
+    command replay, each interval from its own start, None where no commands were logged. warnings: in words;
+    where it could not be simulated they say why, and walk and real are None."""
 
     run: str
     walk: Walk | None

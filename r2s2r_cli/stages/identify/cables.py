@@ -15,9 +15,7 @@ from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.identify.rounds import cost_near
 from r2s2r_cli.stages.identify.task import Task, free_parameters
 from r2s2r_cli.stages.identify.training import training_windows
-
-FIXED_BY_HAND = 4
-"""Code of `schemas.identification.TRUST`."""
+from schemas.identification import FIXED_BY_HAND
 
 
 def with_cables(task: Task) -> Task:

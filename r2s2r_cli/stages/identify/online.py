@@ -29,13 +29,12 @@ from r2s2r_cli.stages.identify.task import Task, free_parameters, specs_asked
 from r2s2r_cli.stages.identify.trust.identifiability import Trust
 from r2s2r_cli.stages.identify.trusted import Sureness, sureness
 from r2s2r_cli.stages.identify.twice import learned_twice
+from schemas.identification import FIXED_BY_HAND
 
 DRIFT = 0.05
 """Standard deviation of what a run changes: of a logarithmic coordinate, 5 %; else this share of its width."""
 INSIDE = 1e-3
 """Share of its range by which a value on a bound is moved inside, so that a fit can begin there."""
-FIXED = 4
-"""Code of schemas/identification.py for a number that was not free."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +118,7 @@ def specs_of(before: ArtifactData) -> dict[str, str]:
     group = before.groups["parameters"]
     found = {}
     for k, name in enumerate(_names(before)):
-        if int(group["trust"][k]) == FIXED:
+        if int(group["trust"][k]) == FIXED_BY_HAND:
             continue
         mean, sd = float(group["prior_mean"][k]), float(group["prior_sd"][k])
         low, high = (float(end) for end in group["bounds"][k])

@@ -26,6 +26,16 @@ def test_memory_and_clocks_stay(tmp_path: Path) -> None:
     assert all(abs(found[f"drift_board {i}_s"]) < 0.025 for i in range(3))
 
 
+@pytest.mark.parametrize("looks", [3, 7, 300])
+def test_memory_of_a_run_that_few_looks_caught(looks: int) -> None:
+    """The clock of the rig's log goes on in jumps, and a short run is over after a few looks."""
+    t = np.floor(np.linspace(0.0, 30.0, looks) / 8.0) * 8.0
+    grows = np.linspace(50.0, 60.0, looks)
+    found = run.memory(run.Watched(t, grows, grows + 30.0))
+    assert 50.0 <= found["recorder_begin_mb"] < found["recorder_end_mb"] <= 60.0
+    assert found["rig_end_mb"] - found["recorder_end_mb"] == pytest.approx(30.0)
+
+
 def test_the_shift_between_two_clocks_is_found() -> None:
     """Lengths that were shifted by 0.37 s and stamped by a clock that gains 200 ppm are placed to the millisecond."""
     t_true = np.arange(0.0, 60.0, 0.02)

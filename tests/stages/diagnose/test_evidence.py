@@ -1,0 +1,85 @@
+"""Evidence: what is refused before any work, and the negative control that shuffles commands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.diagnose.evidence import Evidence, Run, require_enough
+from r2s2r_cli.stages.identified import nominal
+from r2s2r_cli.stages.identify.data import RunData, Selection
+from r2s2r_cli.stages.segments import Intervals, Segments
+from tests.support.builders import robot
+
+STEPS, FRAMES, ROWS = 4, 40, 200
+
+
+def run_data(name: str = "walk", caps: int = 6) -> RunData:
+    """Four intervals of 1 s; the command of interval k is k / 10 in every winch, its target k / 5."""
+    t, t_command = np.arange(FRAMES) / 10.0, np.arange(ROWS) / 50.0
+    numbers = np.arange(STEPS)
+    intervals = Intervals(
+        numbers * 10, numbers * 10 + 9, numbers * 1.0, numbers + 1.0, np.tile(numbers[:, None] / 5, 6),
+        np.ones(STEPS, bool),
+    )  # fmt: skip
+    segments = Segments(
+        numbers + 1, numbers * 10, numbers * 10 + 9, numbers * 1.0, numbers + 1.0, None, np.ones(STEPS, bool)
+    )
+    place = np.minimum(t_command.astype(int), STEPS - 1)
+    caps_W = np.zeros((FRAMES, caps, 3))
+    return RunData(
+        name, t, caps_W, np.full((caps, 3), 1e-3), caps_W, caps_W, caps_W, caps_W, np.zeros((FRAMES, caps), np.uint8),
+        t_command, np.tile(place[:, None] / 10, 6), np.tile(place[:, None] / 5, 6), intervals, segments,
+    )  # fmt: skip
+
+
+def evidence(*runs: RunData, fit: tuple[Selection, ...], judge: tuple[Selection, ...] = ()) -> Evidence:
+    return Evidence(robot(), nominal(robot()), tuple(Run(run) for run in runs), fit, judge)
+
+
+def test_a_split_through_a_run_is_marked() -> None:
+    one = evidence(run_data(), fit=(Selection("walk", (1, 2)),), judge=(Selection("walk", (3, 4)),))
+    assert one.within_run
+    two = evidence(run_data(), run_data("b"), fit=(Selection("walk", (1, 2)),), judge=(Selection("b", (3, 4)),))
+    assert not two.within_run
+    assert [run.name for run in two.only(two.judge)] == ["b"]
+    require_enough(two)
+
+
+def test_too_little_is_refused() -> None:
+    with pytest.raises(InputError, match="no run"):
+        require_enough(evidence(fit=()))
+    with pytest.raises(InputError, match="too few"):
+        require_enough(evidence(run_data(), fit=(Selection("walk", (1,)),)))
+    with pytest.raises(InputError, match="another robot"):
+        require_enough(evidence(run_data(caps=12), fit=(Selection("walk", (1, 2)),)))
+
+
+def test_shuffled_commands_belong_to_other_intervals() -> None:
+    """Each interval gets the whole command of exactly one interval; what was observed stays."""
+    before = evidence(run_data(), fit=(Selection("walk", (1, 2, 3)),))
+    after = before.shuffled(3)
+    run, own = after.runs[0].caps, before.runs[0].caps
+    assert np.array_equal(run.observed, own.observed)
+    given = run.control[:, 0].reshape(STEPS, -1)
+    assert (np.ptp(given, axis=1) == 0).all()
+    assert sorted((10 * given[:, 0]).round().tolist()) == list(range(STEPS))
+    assert (10 * given[:, 0]).round().tolist() != list(range(STEPS))
+    assert np.array_equal(run.target[:, 0], 2 * run.control[:, 0])
+
+
+def test_a_longer_interval_is_filled() -> None:
+    """Commands are stretched with their interval: no row of another one is left in it."""
+    run = run_data()
+    uneven = replace(
+        run,
+        intervals=replace(run.intervals, t_first=np.array([0.0, 0.5, 2.0, 3.5]), t_last=np.array([0.5, 2.0, 3.5, 4.0])),
+        control=np.tile(np.searchsorted([0.5, 2.0, 3.5], run.t_command, side="right")[:, None] / 10, 6),
+    )
+    given = evidence(uneven, fit=()).shuffled(3).runs[0].caps.control[:, 0]
+    ends = np.searchsorted(run.t_command, [0.0, 0.5, 2.0, 3.5, 4.0])
+    inside = [set(given[a:b].round(3)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    assert all(len(values) == 1 for values in inside)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -37,10 +38,12 @@ def run_data(name: str = "walk", caps: int = 6) -> RunData:
 
 
 def evidence(*runs: RunData, fit: tuple[Selection, ...], judge: tuple[Selection, ...] = ()) -> Evidence:
+    """Of the example robot, nothing identified."""
     return Evidence(robot(), nominal(robot()), tuple(Run(run) for run in runs), fit, judge)
 
 
 def test_a_split_through_a_run_is_marked() -> None:
+    """What is constant over a run helps both sides of such a split."""
     one = evidence(run_data(), fit=(Selection("walk", (1, 2)),), judge=(Selection("walk", (3, 4)),))
     assert one.within_run
     two = evidence(run_data(), run_data("b"), fit=(Selection("walk", (1, 2)),), judge=(Selection("b", (3, 4)),))
@@ -50,6 +53,7 @@ def test_a_split_through_a_run_is_marked() -> None:
 
 
 def test_too_little_is_refused() -> None:
+    """No run, one interval, another robot: before any work."""
     with pytest.raises(InputError, match="no run"):
         require_enough(evidence(fit=()))
     with pytest.raises(InputError, match="too few"):
@@ -81,5 +85,5 @@ def test_a_longer_interval_is_filled() -> None:
     )
     given = evidence(uneven, fit=()).shuffled(3).runs[0].caps.control[:, 0]
     ends = np.searchsorted(run.t_command, [0.0, 0.5, 2.0, 3.5, 4.0])
-    inside = [set(given[a:b].round(3)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    inside = [set(given[a:b].round(3)) for a, b in pairwise(ends)]
     assert all(len(values) == 1 for values in inside)

@@ -12,7 +12,7 @@ from r2s2r_cli.errors import UsageError
 from r2s2r_cli.rig.effects.base import Law, Scene, overrides
 from r2s2r_cli.rig.effects.cables import Cords
 from r2s2r_cli.rig.effects.contact import cap_geoms
-from r2s2r_cli.rig.model.frames import Pose, quaternion, rest_pose, rotation
+from r2s2r_cli.rig.model.frames import Pose, quaternion, rest_pose, rotation, wxyz
 from r2s2r_cli.rig.model.mjcf_text import ground_rotation
 from r2s2r_cli.rig.model.options import STIFF, Options
 from r2s2r_cli.rig.model.sim import MujocoSim, Reading
@@ -81,6 +81,8 @@ class Plant:
         self._mu = np.full(len(self._caps), self.sim.model.geom_friction[self._ground, 0])
         if self._friction:
             self._own_friction()
+        self._hand = np.random.default_rng([world.seed, zlib.crc32(b"put_back")])
+        self._R_WG = ground_rotation(options.ground_normal)
         self._dead = [fault for fault in world.faults if isinstance(fault, MotorDead)]
         self._torn = [fault for fault in world.faults if isinstance(fault, CableTorn)]
         mujoco.mj_forward(self.sim.model, self.sim.data)
@@ -104,6 +106,24 @@ class Plant:
         for _ in range(wanted - self._steps):
             self._step(self._begin + self._steps * self._h, duty)
             self._steps += 1
+
+    def put_back(self) -> None:
+        """Where the world file asks for it: the robot lies at its start again, as it is, at rest, turned at random."""
+        start = self.world.start
+        if not start.put_back:
+            return
+        data, R_WG = self.sim.data, self._R_WG
+        a = self._hand.uniform(-np.pi, np.pi)
+        R_GH = np.array([[np.cos(a), -np.sin(a), 0.0], [np.sin(a), np.cos(a), 0.0], [0.0, 0.0, 1.0]])
+        turn = R_WG @ R_GH @ R_WG.T
+        seen: Reading = self.sim.read()
+        middle = seen.p_WE.mean(axis=0)
+        there = R_WG @ np.array([*start.position_m, (R_WG.T @ middle)[2]])
+        pose = data.qpos.reshape(-1, 7)
+        pose[:, :3] = (seen.p_WR - middle) @ turn.T + there
+        pose[:, 3:] = wxyz(np.array([quaternion(turn @ R) for R in rotation(seen.q_WR)]))
+        data.qvel[:] = 0.0
+        mujoco.mj_forward(self.sim.model, data)
 
     def lengths(self) -> np.ndarray:
         """Distances of cap centres [m], (cable,): what the sensors are stretched by, laws of sensing apart."""

@@ -40,7 +40,7 @@ class Firmware:
         self._units = [InertialUnit(world.inertial, generator(world, f"imu {i}")) for i in range(len(self._boards))]
         self._stretch = StretchSensors(robot, world, generator(world, "sensors"))
         self._stretch.follow(plant.t, plant.sensed())
-        self._duty = np.zeros(self._motors)
+        self._duty, self._moved = np.zeros(self._motors), False
         self._later: list[tuple[float, np.ndarray]] = []
 
     @property
@@ -74,9 +74,13 @@ class Firmware:
             self._set(np.asarray(duty, dtype=float))
 
     def stop(self) -> None:
-        """All PWM to 0, now; commands that are still to come are forgotten."""
+        """All PWM to 0, now; commands that are still to come are forgotten. A robot that has moved is put back where the
+        world file has a hand for it."""
         self._later.clear()
         self._duty = np.zeros(self._motors)
+        if self._moved:
+            self._plant.put_back()
+            self._moved = False
 
     def tick(self, t: float) -> list[BoardSample]:
         """Go on to the rig's time t [s]; what the boards sampled on the way, in order of time.
@@ -112,6 +116,7 @@ class Firmware:
         down = [motor for board in self._boards if board.down(self._plant.t) for motor in board.post.motors]
         whole[down] = np.nan
         self._duty = np.where(np.isfinite(whole), whole, self._duty)
+        self._moved = self._moved or bool(self._duty.any())
 
     def _go(self, t: float) -> None:
         if t > self._plant.t:

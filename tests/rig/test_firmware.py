@@ -378,7 +378,7 @@ def test_the_battery_is_that_of_the_plant() -> None:
 
 
 def test_a_hand_puts_a_robot_that_has_moved_back_to_its_start() -> None:
-    """After a stop it lies at its start: same shape, same heights, at rest, turned; once, and only where it is asked."""
+    """After a stop it lies at its start: same shape and heights, at rest, turned; once, and only where asked."""
     place = [0.3, -0.2]
     firmware, plant = make(start={"settle_s": 0.2, "put_back": True, "position_m": place}, seed=4)
     still = plant.truth().p_WE

@@ -74,8 +74,8 @@ class Firmware:
             self._set(np.asarray(duty, dtype=float))
 
     def stop(self) -> None:
-        """All PWM to 0, now; commands that are still to come are forgotten. A robot that has moved is put back where the
-        world file has a hand for it."""
+        """All PWM to 0, now; commands that are still to come are forgotten. A robot that has moved is put back
+        where the world file has a hand for it."""
         self._later.clear()
         self._duty = np.zeros(self._motors)
         if self._moved:

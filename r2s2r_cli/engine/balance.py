@@ -9,7 +9,9 @@ from torch import Tensor
 
 from r2s2r_cli.engine.body import Bodies, bodies
 from r2s2r_cli.engine.cable import CableRows, cable_rows, rest_lengths, spring_force
+from r2s2r_cli.engine.centred import centred
 from r2s2r_cli.engine.contact import contact_rows
+from r2s2r_cli.engine.hooks import effective
 from r2s2r_cli.engine.parameters import Parameters
 from r2s2r_cli.engine.state import State
 from r2s2r_cli.engine.structure import Structure
@@ -41,6 +43,7 @@ def balance(structure: Structure, theta: Parameters, state: State) -> Balance:
     """
     still = replace(state, v_WB=torch.zeros_like(state.v_WB), w_R=torch.zeros_like(state.w_R))
     with torch.no_grad():
+        theta, still, _ = centred(structure, effective(structure, theta), still)
         rods = bodies(theta, still, axial=structure.axial)
         rows = cable_rows(structure, theta, rods)
         passive = spring_force(structure, theta, rows, rest_lengths(structure, theta, still.rest)).force

@@ -8,9 +8,9 @@ import torch
 from torch import Tensor
 
 from r2s2r_cli.engine.body import Bodies, angular_change
-from r2s2r_cli.engine.hooks import CableTerms
+from r2s2r_cli.engine.hooks import CableTerms, overrides
 from r2s2r_cli.engine.parameters import Parameters
-from r2s2r_cli.engine.state import cable_ends
+from r2s2r_cli.engine.state import State, cable_ends
 from r2s2r_cli.engine.structure import Structure
 
 
@@ -45,20 +45,41 @@ def cable_rows(structure: Structure, theta: Parameters, rods: Bodies) -> CableRo
 
 def rest_lengths(structure: Structure, theta: Parameters, winched: Tensor) -> Tensor:
     """Rest lengths of all cables [m], (B, cable), from those of the winched ones, (B, actuated)."""
+    rest = spread(structure, winched, theta.rest)
+    for effect in overrides(structure, "rest"):
+        rest = effect.rest(theta.of(effect.name), rest)
+    return rest
+
+
+def spread(structure: Structure, winched: Tensor, passive: Tensor) -> Tensor:
+    """Numbers of all cables, (B, cable), from those of the winched, (B, actuated), and of the passive ones."""
     place = {k: i for i, k in enumerate(structure.actuated)}
     offset = structure.n_actuated
     place.update({k: offset + i for i, k in enumerate(structure.passive)})
-    both = torch.cat([winched, theta.rest.expand(len(winched), -1)], dim=1)
+    both = torch.cat([winched, passive.expand(len(winched), -1)], dim=1)
     return both[:, [place[k] for k in range(structure.n_cables)]]
 
 
-def spring_force(structure: Structure, theta: Parameters, rows: CableRows, rest: Tensor) -> CableTerms:
-    """Stretch and spring force, sensor tendons not included. Slack cables have no force."""
+def drawn(structure: Structure, theta: Parameters, state: State) -> Tensor:
+    """How fast the winches shorten the rest lengths [m/s], (B, cable): nothing where they are at their ends."""
+    inward = state.winding > 0
+    stopped = torch.where(inward, state.rest <= theta.rest_min, state.rest >= theta.rest_max)
+    moving = torch.where(stopped, torch.zeros_like(state.winding), state.winding)
+    return spread(structure, moving, torch.zeros_like(theta.rest))
+
+
+def spring_force(
+    structure: Structure, theta: Parameters, rows: CableRows, rest: Tensor, drawn: Tensor | None = None
+) -> CableTerms:
+    """Stretch and spring force, sensor tendons not included. Slack cables have no force. drawn: see CableTerms."""
     stretch = rows.length - rest
-    pull = theta.stiffness * stretch
+    pull, tangent = theta.stiffness * stretch, theta.stiffness
     if structure.cubic:
         pull = stretch * (theta.stiffness + stretch * (theta.stiffness2 + stretch * theta.stiffness3))
-    return CableTerms(stretch, rows.rate, torch.where(stretch > 0, pull, torch.zeros_like(pull)))
+        tangent = tangent + stretch * (2.0 * theta.stiffness2 + stretch * (3.0 * theta.stiffness3))
+    drawn = torch.zeros_like(stretch) if drawn is None else drawn
+    force = torch.where(stretch > 0, pull, torch.zeros_like(pull))
+    return CableTerms(stretch, rows.rate, force, drawn, tangent.expand_as(stretch))
 
 
 def tension_impulse(

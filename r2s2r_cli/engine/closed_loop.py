@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -12,6 +12,7 @@ from r2s2r_cli.engine.batch import common_batch, tensors_of
 from r2s2r_cli.engine.errors import EngineInputError
 from r2s2r_cli.engine.flat import pack_parameters, pack_state, unpack_state
 from r2s2r_cli.engine.hooks import effective
+from r2s2r_cli.engine.late import delay_of, sense
 from r2s2r_cli.engine.link import Link
 from r2s2r_cli.engine.nonfinite import require_finite
 from r2s2r_cli.engine.parameters import Parameters, check_parameters
@@ -71,6 +72,10 @@ def closed_loop(
     check_parameters(structure, theta)
     check_state(structure, state0)
     _check_policy(structure, targets, holds, timeouts)
+    late = delay_of(structure, theta)
+    if late is not None:
+        given = Link() if link is None else link
+        link = replace(given, delay=torch.as_tensor(given.delay).to(late) + late)
     linked = {} if link is None else link.tensors(state0.p_WB)
     batch = common_batch({**tensors_of(state0), **tensors_of(theta), **linked})
     whole = steps_a_tick(pid.period, step)
@@ -94,8 +99,7 @@ def closed_loop(
     for tick in range(most):
         state = unpack_state(structure, s)
         length = cap_lengths(pid.cable_caps, end_caps(wide, state))
-        for effect in structure.effects:
-            length = effect.sensing(wide.of(effect.name), length)
+        length = sense(structure, wide, length, tick * pid.period)
         running = ~at.finished(len(targets))
         u, memory = pid.tick(memory, length, at.target(targets))
         u = torch.where(running[:, None], u, torch.zeros_like(u))

@@ -7,6 +7,7 @@ Six rows a rod, row 3 c + i: cap c in direction i of the ground frame G; i = 2 i
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import torch
@@ -14,7 +15,7 @@ from torch import Tensor
 
 from r2s2r_cli.engine.body import Bodies, angular_change
 from r2s2r_cli.engine.detach import detach_geometry
-from r2s2r_cli.engine.hooks import ContactTerms
+from r2s2r_cli.engine.hooks import ContactTerms, GroundTerms, Values, overrides
 from r2s2r_cli.engine.parameters import Parameters
 from r2s2r_cli.engine.structure import Detach, Structure
 
@@ -28,7 +29,9 @@ class GroundRows:
     mobility: velocity of row a per impulse on row b [1/kg], (B, rod, 6, 6); free: row velocities if nothing were
     touched [m/s], (B, rod, 6); target: normal velocity to reach [m/s], (B, rod, 2); active: the cap would be below the
     ground at the end of the step; toi: share of the step before its impact; friction: (B, rod, 2); between: unit
-    direction from the contact point of the even cap to that of the odd one, (B, rod, 3)."""
+    direction from the contact point of the even cap to that of the odd one, (B, rod, 3). give: what of the mobility is
+    the ground's own, not the rod's [1/kg], (B, rod, 2); None: nothing. gap and target are from a surface that has sunk.
+    """
 
     gap: Tensor
     arm: Tensor
@@ -39,10 +42,17 @@ class GroundRows:
     toi: Tensor
     friction: Tensor
     between: Tensor
+    give: Tensor | None = None
 
 
-def contact_rows(structure: Structure, theta: Parameters, rods: Bodies, v: Tensor, w: Tensor, h: Tensor) -> GroundRows:
-    """The contact problem at the start of the step, with the free velocities v, w that the step would end with."""
+def contact_rows(
+    structure: Structure, theta: Parameters, rods: Bodies, v: Tensor, w: Tensor, h: Tensor,
+    memory: Mapping[str, Values] | None = None,
+) -> GroundRows:  # fmt: skip
+    """The contact problem at the start of the step, with the free velocities v, w that the step would end with.
+
+    memory: own states of the effects, by effect; needed where one of them is a ground that gives way.
+    """
     gap, arm = _geometry(theta, rods)
     arm = detach_geometry(arm, structure.detach == Detach.GEOMETRY)
     mobility = detach_geometry(_mobility(rods, arm), structure.detach == Detach.GEOMETRY)
@@ -56,12 +66,25 @@ def contact_rows(structure: Structure, theta: Parameters, rods: Bodies, v: Tenso
         for effect in structure.effects:
             friction = effect.contact(theta.of(effect.name), terms, friction)
     v0, v1 = before[..., 2::3], free[..., 2::3]
+    surface = None
+    for effect in overrides(structure, "surface"):
+        zero = torch.zeros_like(gap)
+        own = (memory or {})[effect.name]
+        surface = effect.surface(theta.of(effect.name), own, surface or GroundTerms(zero, zero, zero), h)
+    if surface is not None:
+        gap, v0, v1 = gap + surface.sunk, v0 - surface.rising, v1 - surface.rising
     # Predicted, not gap < 0: a cap at rest 1e-12 above the ground must stay active.
     active = gap + h[..., None] * v1 < 0
     falling = torch.where(active & (v1 < 0), -v1, torch.ones_like(v1))
     toi = torch.where(active, torch.relu(gap) / (h[..., None] * falling), torch.zeros_like(gap))
     target = _rebound(theta, v0, v1 - v0, toi)
-    return GroundRows(gap, arm, mobility, free, target, active, toi, friction, _between(theta, rods))
+    between = _between(theta, rods)
+    if surface is None:
+        return GroundRows(gap, arm, mobility, free, target, active, toi, friction, between)
+    target, give = target + surface.rising, surface.give.expand_as(gap)
+    zero = torch.zeros_like(give[..., 0])
+    own = torch.stack([zero, zero, give[..., 0], zero, zero, give[..., 1]], dim=-1)
+    return GroundRows(gap, arm, mobility + torch.diag_embed(own), free, target, active, toi, friction, between, give)
 
 
 def _rebound(theta: Parameters, v0: Tensor, gain: Tensor, toi: Tensor) -> Tensor:
@@ -143,6 +166,8 @@ def pose_velocity(
     stopped = ground.active & (impulse[..., 2::3] > 0)
     missing = torch.where(stopped, missing, torch.zeros_like(missing))
     a, c = ground.mobility[..., 2, 2], ground.mobility[..., 5, 5]
+    if ground.give is not None:
+        a, c = a - ground.give[..., 0], c - ground.give[..., 1]
     b = torch.where(stopped[..., 0] & stopped[..., 1], ground.mobility[..., 5, 2], zero)
     scale = 1.0 / (a * c - b * b)
     first = (c * missing[..., 0] - b * missing[..., 1]) * scale

@@ -38,11 +38,46 @@ class Channel(StrEnum):
 @dataclass(frozen=True)
 class CableTerms:
     """All cables at the start of a step. stretch: beyond the rest length [m], (B, cable); negative: slack.
-    rate: of the length between the attachment points [m/s]. force: of the spring [N], 0 where slack."""
+    rate: of the length between the attachment points [m/s]. force: of the spring [N], 0 where slack. drawn: how fast
+    its winch shortens the rest length [m/s], 0 without a winch and where the winch is at its end. stiffness:
+    of the spring where it is now, tangent [N/m]."""
 
     stretch: Tensor
     rate: Tensor
     force: Tensor
+    drawn: Tensor
+    stiffness: Tensor
+
+
+@dataclass(frozen=True)
+class MotorTerms:
+    """All winches at the start of a step, (B, actuated). u: command as it arrives, -1 to 1. tension [N]; rest: length
+    of the winched cable [m]; wound: how much of it is on the spool, beyond that at its longest [m]."""
+
+    u: Tensor
+    tension: Tensor
+    rest: Tensor
+    wound: Tensor
+
+
+@dataclass(frozen=True)
+class MassTerms:
+    """Of all rods. mass [kg], (B, rod); inertia about the centre of mass [kg m^2], (B, rod, 3, 3); centre: of mass,
+    from the origin of frame B, where the nominal one lies [m], (B, rod, 3)."""
+
+    mass: Tensor
+    inertia: Tensor
+    centre: Tensor
+
+
+@dataclass(frozen=True)
+class GroundTerms:
+    """The surface below each cap, (B, rod, 2). sunk: how far it lies below the plane [m]; rising: its speed upwards if
+    nothing loads it [m/s]; give: how much slower per normal impulse [1/kg]."""
+
+    sunk: Tensor
+    rising: Tensor
+    give: Tensor
 
 
 @dataclass(frozen=True)
@@ -64,6 +99,11 @@ class WorldTerms:
     v_GB: Tensor
     R_GR: Tensor
     w_R: Tensor
+
+
+def overrides(structure: Structure, hook: str) -> tuple[Hooks, ...]:
+    """The effects of a structure that have a hook of their own, in order."""
+    return tuple(effect for effect in structure.effects if getattr(type(effect), hook) is not getattr(Hooks, hook))
 
 
 def effective(structure: Structure, theta: Parameters) -> Parameters:
@@ -103,18 +143,36 @@ class Hooks:
         del x
         return theta
 
+    def mass(self, x: Values, terms: MassTerms) -> MassTerms:
+        """Channel mass: mass, inertia and centre of mass of every rod. States stay those of the origin of frame B, so
+        that no start moves with an effect. Structure.axial demands that the centre stays on the axis."""
+        del x
+        return terms
+
+    def delay(self, x: Values) -> Tensor | None:
+        """Channel command: time from a command to its arrival at the winches [s], (B, 1); None: no say in it. Acts on
+        the commands of `Simulator.rollout` and of closed loops before the step sees them."""
+        del x
+        return None
+
     def command(self, x: Values, z: Values, u: Tensor, h: Tensor) -> tuple[Tensor, Values]:
         """Channel command: what the winches receive of the motor command u (B, actuated)."""
         del x, h
         return u, z
 
-    def motor(self, x: Values, z: Values, rate: Tensor, tension: Tensor, h: Tensor) -> tuple[Tensor, Values]:
-        """Channel motor: winding rate [m/s], + shortens, (B, actuated), of winches under `tension` [N]."""
-        del x, tension, h
+    def motor(self, x: Values, z: Values, rate: Tensor, terms: MotorTerms, h: Tensor) -> tuple[Tensor, Values]:
+        """Channel motor: winding rate [m/s], + shortens, (B, actuated)."""
+        del x, terms, h
         return rate, z
 
+    def rest(self, x: Values, rest: Tensor) -> Tensor:
+        """Channel cable: rest length [m], (B, cable), of all cables from what they are without the effect."""
+        del x
+        return rest
+
     def cable(self, x: Values, z: Values, terms: CableTerms, h: Tensor) -> tuple[Tensor, Values]:
-        """Channel cable: spring force [N], (B, cable), before damping."""
+        """Channel cable: spring force [N], (B, cable), before damping. A slack cable has none, whatever is said here:
+        what makes it taut belongs into `rest`."""
         del x, h
         return terms.force, z
 
@@ -123,17 +181,34 @@ class Hooks:
         del x, terms
         return friction
 
+    def surface(self, x: Values, z: Values, terms: GroundTerms, h: Tensor) -> GroundTerms:
+        """Channel contact: a ground that gives way."""
+        del x, z, h
+        return terms
+
+    def resist(self, x: Values, z: Values, terms: WorldTerms, torque: Tensor, h: Tensor) -> Tensor:
+        """Channel contact: torque of the ground on each rod [N m], rod axes, (B, rod, 3)."""
+        del x, z, terms, h
+        return torque
+
+    def landed(self, x: Values, z: Values, force: Tensor, h: Tensor) -> Values:
+        """Channel contact: own states after the step, from the normal force on each cap within it [N], (B, rod, 2)."""
+        del x, force, h
+        return z
+
     def world(self, x: Values, terms: WorldTerms, force: Tensor, torque: Tensor) -> tuple[Tensor, Tensor]:
         """Channel world: force [N], frame G, and torque [N m], rod axes, on each rod, (B, rod, 3)."""
         del x, terms
         return force, torque
 
-    def sensing(self, x: Values, length: Tensor) -> Tensor:
-        """Channel sensing: cable lengths [m], (B, cable), as the controller reads them."""
-        del x
+    def sensing(self, x: Values, length: Tensor, t: Tensor | float = 0.0) -> Tensor:
+        """Channel sensing: cable lengths [m], (..., cable), as the sensors read them at time t [s] of the run, a number
+        or (..., 1). The controller reads these, and these are recorded."""
+        del x, t
         return length
 
     def observation(self, x: Values, t: Tensor, p_WE: Tensor) -> Tensor:
-        """Channel observation: end caps [m], (B, frame, cap, 3), as the camera sees them at times t [s], (frame,)."""
+        """Channel observation: end caps [m], (B, frame, cap, 3), as the camera sees them at times t [s], (frame,); NaN:
+        not seen."""
         del x, t
         return p_WE

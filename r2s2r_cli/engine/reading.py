@@ -9,7 +9,8 @@ import torch
 from torch import Tensor
 
 from r2s2r_cli.engine.body import angular_change, bodies, gyroscopic
-from r2s2r_cli.engine.cable import cable_rows, pulled, rest_lengths, spring_force, tension_impulse
+from r2s2r_cli.engine.cable import cable_rows, drawn, pulled, rest_lengths, spring_force, tension_impulse
+from r2s2r_cli.engine.centred import centred, weighed
 from r2s2r_cli.engine.contact import contact_rows
 from r2s2r_cli.engine.friction_solve import solve
 from r2s2r_cli.engine.hooks import effective
@@ -34,19 +35,20 @@ def read(structure: Structure, theta: Parameters, state: State, h: float = 1e-3)
     """Tensions and ground forces of a state in frame G, as a step of h seconds would apply them. Effects that act on
     parameters, cable forces and friction are included."""
     dt = state.p_WB.new_full((1, 1), h)
-    theta = effective(structure, theta)
+    theta, state, _ = centred(structure, effective(structure, theta), state)
+    memory = {effect.name: state.of(effect.name) for effect in structure.effects}
     rods = bodies(theta, state, axial=structure.axial)
     rows = cable_rows(structure, theta, rods)
     rest = rest_lengths(structure, theta, state.rest)
-    terms = spring_force(structure, theta, rows, rest)
+    terms = spring_force(structure, theta, rows, rest, drawn(structure, theta, state) if structure.effects else None)
     force = terms.force
     for effect in structure.effects:
-        force, _ = effect.cable(theta.of(effect.name), state.of(effect.name), replace(terms, force=force), dt)
+        force, _ = effect.cable(theta.of(effect.name), memory[effect.name], replace(terms, force=force), dt)
     impulse = tension_impulse(structure, theta, rows, terms, force, dt)
     dv, dw = pulled(structure, rods, rows, impulse)
     v = rods.v + h * theta.gravity[:, None] + dv
     w = rods.w + gyroscopic(theta, rods.inverse_inertia, rods.w, dt) + dw
-    ground = contact_rows(structure, theta, rods, v, w, dt)
+    ground = contact_rows(structure, theta, rods, v, w, dt, memory)
     pushed = solve(structure, ground).unflatten(-1, (2, 3)) / h
     return Reading(rows.length, rest, impulse / h, pushed.flatten(1, 2), ground.gap.flatten(1))
 
@@ -59,7 +61,7 @@ def cap_lengths(cable_caps: tuple[tuple[int, int], ...], p_WE: Tensor) -> Tensor
 
 def energy(structure: Structure, theta: Parameters, state: State) -> Tensor:
     """Kinetic, gravitational and elastic energy [J], (B,); frame G. Effects count as far as they change parameters."""
-    theta = effective(structure, theta)
+    theta, state, _ = centred(structure, effective(structure, theta), state)
     rods = bodies(theta, state, axial=structure.axial)
     kinetic = 0.5 * (theta.mass[..., None] * rods.v * rods.v).sum((-2, -1))
     kinetic = kinetic + 0.5 * torch.einsum(
@@ -90,7 +92,7 @@ def always_stable_step(structure: Structure, theta: Parameters) -> float:
     if structure.n_cables == 0 or structure.cubic or structure.tendons or not structure.axial:
         return 0.0
     with torch.no_grad():
-        theta = effective(structure, theta)
+        theta, _ = weighed(structure, effective(structure, theta))
         ends = cable_ends(structure, theta.mass.device)
         squared = theta.p_BS * theta.p_BS
         across = (squared[..., 0] + squared[..., 1]) / theta.inertia[:, ends, 2, 2]
@@ -105,7 +107,7 @@ def longest_step(structure: Structure, theta: Parameters, state: State) -> float
     if structure.n_cables == 0:
         return float("inf")
     with torch.no_grad():
-        theta = effective(structure, theta)
+        theta, state, _ = centred(structure, effective(structure, theta), state)
         rods = bodies(theta, state, axial=structure.axial)
         rows = cable_rows(structure, theta, rods)
         stretch = torch.relu(rows.length - rest_lengths(structure, theta, state.rest))

@@ -20,10 +20,12 @@ from r2s2r_cli.engine.flat import (
     size,
     state_slots,
     twins,
+    unpack_parameters,
     unpack_state,
 )
 from r2s2r_cli.engine.ground import Ground
 from r2s2r_cli.engine.hooks import effective
+from r2s2r_cli.engine.late import delay_of, observe, shifted
 from r2s2r_cli.engine.native import NativeStep, rollout
 from r2s2r_cli.engine.nonfinite import require_finite
 from r2s2r_cli.engine.parameters import Parameters, check_parameters
@@ -63,10 +65,7 @@ class Trajectory:
 
     def observed(self) -> Tensor:
         """End caps as the camera sees them, (B, frame, cap, 3) [m]: effects of channel observation included."""
-        p_WE = self.end_caps()
-        for effect in self.structure.effects:
-            p_WE = effect.observation(self.theta.of(effect.name), self.t, p_WE)
-        return p_WE
+        return observe(self.structure, self.theta, self.t, self.end_caps())
 
 
 class Simulator:
@@ -113,7 +112,7 @@ class Simulator:
             theta, state0 = ground.parameters(theta), ground.to_ground(state0)
         n = substeps or self.substeps(theta, state0, step)
         s0 = pack_state(self.structure, state0).expand(batch, -1)
-        u = commands.expand(batch, -1, -1)
+        u, hold, _ = self._arriving(theta, commands.expand(batch, -1, -1), step, hold)
         p = pack_parameters(self.structure, theta)
         frames = self.advance(s0, u, p, h=step / n, hold=hold * n, every=every * n)
         require_finite(self.structure, self.kernels.fn, frames, u, p, h=step / n, hold=hold * n, every=every * n)
@@ -157,7 +156,9 @@ class Simulator:
         batch = self._checked_batch(theta, state0, commands, step, hold, every, substeps)
         n = substeps or self.substeps(theta, state0, step)
         s0 = pack_state(self.structure, state0).expand(batch, -1).contiguous()
-        u, p = commands.expand(batch, -1, -1).contiguous(), pack_parameters(self.structure, theta)
+        rows = commands.shape[1]
+        u, hold, by_delay = self._arriving(theta, commands.expand(batch, -1, -1).contiguous(), step, hold)
+        p = pack_parameters(self.structure, theta)
 
         def spread(x: Tensor | None, axes: int) -> Tensor | None:
             return None if x is None else x.expand(batch, *x.shape[-axes:])
@@ -168,6 +169,8 @@ class Simulator:
             size = d_parameters.abs().amax(-1).reshape(-1, d_parameters.shape[-2]).amax(0)
             active = tuple(torch.nonzero(size).flatten().tolist())
         d_s0, d_u, d_p = spread(d_state, 2), spread(d_commands, 3), spread(d_parameters, 2)
+        if by_delay is not None:
+            d_u = self._late_tangents(theta, d_u, d_p, by_delay, u.shape[1] // rows, step)
         run = partial(self.kernels.jvp, threads=self.threads) if self.native else self.kernels.torch_jvp
         frames, tangents = run(
             s0, u, p, ds0=d_s0, du=d_u, dp=d_p, active=active, h=step / n, hold=hold * n, every=every * n
@@ -175,6 +178,36 @@ class Simulator:
         require_finite(self.structure, self.kernels.fn, frames, u, p, h=step / n, hold=hold * n, every=every * n)
         t = torch.arange(frames.shape[1], dtype=frames.dtype, device=frames.device) * (step * every)
         return Trajectory(self.structure, theta, t, unpack_state(self.structure, frames), step, n), tangents
+
+    def _arriving(
+        self, theta: Parameters, commands: Tensor, step: float, hold: int
+    ) -> tuple[Tensor, int, Tensor | None]:
+        """Commands as they arrive at the winches, for how many steps each row is held, and derivatives by the delay;
+        None where no effect delays them."""
+        delay = delay_of(self.structure, theta)
+        if delay is None:
+            return commands, hold, None
+        late, by_delay = shifted(commands.repeat_interleave(hold, dim=1), delay, step)
+        return late, 1, by_delay
+
+    def _late_tangents(
+        self, theta: Parameters, d_u: Tensor | None, d_p: Tensor | None, by_delay: Tensor, hold: int, step: float
+    ) -> Tensor | None:
+        """Tangents (B, row, actuated, D) of the commands that arrive, from those of commands and parameters."""
+        p = pack_parameters(self.structure, theta).detach().expand(len(by_delay), -1).clone().requires_grad_()
+        with torch.enable_grad():
+            delay = delay_of(self.structure, unpack_parameters(self.structure, p))
+            assert delay is not None  # noqa: S101 - `by_delay` is its derivative
+            (gradient,) = torch.autograd.grad(delay.sum(), p)
+        found = None
+        if d_u is not None:
+            held = d_u.repeat_interleave(hold, dim=1).unbind(-1)
+            found = torch.stack([shifted(one, delay.detach(), step)[0] for one in held], dim=-1)
+        if d_p is not None:
+            along = (gradient[:, None] @ d_p)[:, 0]
+            own = by_delay[..., None] * along[:, None, None]
+            found = own if found is None else found + own
+        return found
 
     def _checked_batch(
         self,

@@ -14,8 +14,10 @@ import torch
 from torch import Tensor
 
 from r2s2r_cli.engine.balance import balance
+from r2s2r_cli.engine.cable import rest_lengths
 from r2s2r_cli.engine.errors import EngineInputError
 from r2s2r_cli.engine.flat import pack_parameters, pack_state, unpack_state
+from r2s2r_cli.engine.hooks import effective
 from r2s2r_cli.engine.nonfinite import require_finite
 from r2s2r_cli.engine.parameters import Parameters
 from r2s2r_cli.engine.reading import cap_lengths, read
@@ -73,8 +75,9 @@ def settled(
     _check("lengths", wanted, (structure.n_cables,))
     batch = max(len(p_WE), len(theta.mass), len(wanted))
     p_WE, wanted = p_WE.expand(batch, -1, -1), wanted.expand(batch, -1)
-    state = pose_state(structure, theta, p_WE, along(p_WE, R_WR), rest=p_WE.new_zeros(len(p_WE), structure.n_actuated))
-    state = consistent(structure, theta, roll_relaxed(simulator, theta, lowered(theta, state)))
+    seen = effective(structure, theta)  # as effects make the robot; the step is handed what it was before
+    state = pose_state(structure, seen, p_WE, along(p_WE, R_WR), rest=p_WE.new_zeros(len(p_WE), structure.n_actuated))
+    state = consistent(structure, theta, roll_relaxed(simulator, theta, lowered(seen, state)))
     winched = list(structure.actuated)
     p, h = pack_parameters(structure, theta), step / simulator.substeps(theta, state, step)
     count = max(1, round(SPELL / h))
@@ -86,9 +89,9 @@ def settled(
         frames = simulator.advance(pack_state(structure, state), idle, p, h=h, hold=count, every=count)
         require_finite(structure, simulator.kernels.fn, frames, idle, p, h=h, hold=count, every=count)
         state = unpack_state(structure, frames[:, -1])
-        speed = torch.linalg.vector_norm(cap_velocities(theta, state), dim=-1).max(dim=1).values
-        missing = wanted[:, winched] - cap_lengths(cable_caps, end_caps(theta, state))[:, winched]
-        turned = torch.minimum(torch.maximum(state.rest + missing, theta.rest_min), theta.rest_max)
+        speed = torch.linalg.vector_norm(cap_velocities(seen, state), dim=-1).max(dim=1).values
+        missing = wanted[:, winched] - cap_lengths(cable_caps, end_caps(seen, state))[:, winched]
+        turned = torch.minimum(torch.maximum(state.rest + missing, seen.rest_min), seen.rest_max)
         wrong = (turned - state.rest).abs().amax(dim=1) if winched else torch.zeros_like(speed)
         if bool((speed < still).all()) and bool((wrong < TURNED).all()):
             break
@@ -101,8 +104,8 @@ def settled(
             rest=torch.where(slow[:, None], turned, state.rest),
         )  # fmt: skip
         before = torch.where(peak, torch.zeros_like(kinetic), kinetic)
-    state = _back(theta, resting(state), p_WE)
-    shift = torch.linalg.vector_norm(end_caps(theta, state) - p_WE, dim=-1)
+    state = _back(seen, resting(state), p_WE)
+    shift = torch.linalg.vector_norm(end_caps(seen, state) - p_WE, dim=-1)
     return Settled(state, shift, read(structure, theta, state, h).tension, speed, used)
 
 
@@ -142,12 +145,13 @@ def window_state(
     p_WE = p_WE.expand(batch, -1, -1)
     R_WR = along(p_WE, roma.unitquat_to_rotmat(carried.q_WR).expand(len(p_WE), -1, -1, -1))
     rest = carried.rest.expand(len(p_WE), -1)
-    state = pose_state(structure, theta, p_WE, R_WR, rest=rest)
-    state = lowered(theta, state, only_up=True)
+    seen = effective(structure, theta)
+    state = pose_state(structure, seen, p_WE, R_WR, rest=rest)
+    state = lowered(seen, state, only_up=True)
     if relax_roll:
         state = roll_relaxed(simulator, theta, state)
     state = consistent(structure, theta, state, slack=rest)
-    v, w = (carried.v_WB, carried.w_R) if v_WE is None else _velocities(theta, state, v_WE)
+    v, w = (carried.v_WB, carried.w_R) if v_WE is None else _velocities(seen, state, v_WE)
     memory = {name: x.expand(len(p_WE), *x.shape[1:]) for name, x in carried.extra.items()}
     return replace(
         state, v_WB=v.expand_as(state.v_WB), w_R=w.expand_as(state.w_R),
@@ -168,10 +172,14 @@ def consistent(structure: Structure, theta: Parameters, state: State, slack: Ten
 
     slack: rest lengths that slack cables keep where they are long enough (a winch that paid out).
     """
-    tension = balance(structure, theta, state).tension[:, list(structure.actuated)]
+    winched = list(structure.actuated)
+    tension = balance(structure, theta, state).tension[:, winched]
     reading = read(structure, theta, resting(state))
-    length = reading.length[:, list(structure.actuated)]
-    stretched = length - tension / theta.stiffness[:, list(structure.actuated)]
+    theta = effective(structure, theta)
+    # What effects add to the rest length comes off what the winches have to give.
+    added = rest_lengths(structure, theta, state.rest)[:, winched] - state.rest
+    length = reading.length[:, winched] - added
+    stretched = length - tension / theta.stiffness[:, winched]
     if slack is not None:
         stretched = torch.where(tension > 0, stretched, torch.maximum(slack, length))
     return replace(state, rest=torch.minimum(torch.maximum(stretched, theta.rest_min), theta.rest_max))

@@ -12,10 +12,11 @@ import torch
 from torch import Tensor
 
 from r2s2r_cli.engine.body import Bodies, angular_change, bodies, gyroscopic, moved
-from r2s2r_cli.engine.cable import cable_rows, pulled, rest_lengths, spring_force, tension_impulse
+from r2s2r_cli.engine.cable import cable_rows, drawn, pulled, rest_lengths, spring_force, tension_impulse
+from r2s2r_cli.engine.centred import centred, returned
 from r2s2r_cli.engine.contact import contact_rows, pose_velocity
 from r2s2r_cli.engine.friction_solve import solve
-from r2s2r_cli.engine.hooks import Values, WorldTerms, effective
+from r2s2r_cli.engine.hooks import MotorTerms, Values, WorldTerms, effective, overrides
 from r2s2r_cli.engine.parameters import Parameters
 from r2s2r_cli.engine.rod_contact import collide
 from r2s2r_cli.engine.state import State
@@ -31,13 +32,15 @@ def step(structure: Structure, theta: Parameters, state: State, u: Tensor, h: Te
     """
     theta = effective(structure, theta)
     memory: dict[str, Values] = {effect.name: state.of(effect.name) for effect in structure.effects}
-    rods = bodies(theta, state, axial=structure.axial)
+    theta, about, centre = centred(structure, theta, state)
+    rods = bodies(theta, about, axial=structure.axial)
 
     for effect in structure.effects:
         u, memory[effect.name] = effect.command(theta.of(effect.name), memory[effect.name], u, h)
 
     rows = cable_rows(structure, theta, rods)
-    terms = spring_force(structure, theta, rows, rest_lengths(structure, theta, state.rest))
+    winding_in = drawn(structure, theta, state) if structure.effects else None
+    terms = spring_force(structure, theta, rows, rest_lengths(structure, theta, state.rest), winding_in)
     force = terms.force
     for effect in structure.effects:
         force, memory[effect.name] = effect.cable(
@@ -50,32 +53,37 @@ def step(structure: Structure, theta: Parameters, state: State, u: Tensor, h: Te
     spin = gyroscopic(theta, rods.inverse_inertia, rods.w, h)
     w = rods.w + spin + dw
     if structure.effects:
-        v, w = _pushed_by_the_world(structure, theta, rods, v, w, h)
+        v, w = _pushed_by_the_world(structure, theta, memory, rods, v, w, h)
 
-    ground = contact_rows(structure, theta, rods, v, w, h)
+    ground = contact_rows(structure, theta, rods, v, w, h, memory)
     contact = solve(structure, ground)
     after = collide(structure, theta, rods, ground, contact, v, w, h)
     along, turning = pose_velocity(rods, ground, after.impulse, after.v, after.w, h)
     # The pose turns with the mean of w over what the gyroscopic torque does: angular momentum to second order.
-    p_GB, q_GR = moved(state, along + after.shift, turning + after.turn - 0.5 * spin, h)
+    p_GB, q_GR = moved(about, along + after.shift, turning + after.turn - 0.5 * spin, h)
 
     tension = impulse[:, list(structure.actuated)] / h
     winding = commanded_rate(structure, theta, u, tension)
     for effect in structure.effects:
-        winding, memory[effect.name] = effect.motor(theta.of(effect.name), memory[effect.name], winding, tension, h)
+        load = MotorTerms(torch.clamp(u, -1.0, 1.0), tension, state.rest, theta.rest_max - state.rest)
+        winding, memory[effect.name] = effect.motor(theta.of(effect.name), memory[effect.name], winding, load, h)
+    for effect in overrides(structure, "landed"):
+        force = after.impulse[..., 2::3] / h[..., None]
+        memory[effect.name] = effect.landed(theta.of(effect.name), memory[effect.name], force, h)
     if structure.lag:
         winding = lagged(theta, state.winding, winding, h)
     rest = wound(theta, state.rest, winding, h)
     extra = {f"{name}.{key}": value for name, values in memory.items() for key, value in values.items()}
-    return State(p_GB, q_GR, after.v, after.w, rest, winding, extra)
+    return returned(State(p_GB, q_GR, after.v, after.w, rest, winding, extra), centre)
 
 
 def _pushed_by_the_world(
-    structure: Structure, theta: Parameters, rods: Bodies, v: Tensor, w: Tensor, h: Tensor
+    structure: Structure, theta: Parameters, memory: dict[str, Values], rods: Bodies, v: Tensor, w: Tensor, h: Tensor
 ) -> tuple[Tensor, Tensor]:
     terms = WorldTerms(rods.p, v, rods.R_GR, w)
     force, torque = torch.zeros_like(v), torch.zeros_like(w)
     for effect in structure.effects:
         force, torque = effect.world(theta.of(effect.name), terms, force, torque)
+        torque = effect.resist(theta.of(effect.name), memory[effect.name], terms, torque, h)
     dv = h[..., None] * rods.inverse_mass * force
     return v + dv, w + angular_change(rods.inverse_inertia, h[..., None] * torque)

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from r2s2r_cli.effects import Effect, EffectParameter, with_off_values
 from r2s2r_cli.engine import Channel, LatchedPid, Parameters, Simulator, Structure, closed_loop
-from r2s2r_cli.engine.hooks import CableTerms, ContactTerms, Values, WorldTerms
+from r2s2r_cli.engine.hooks import CableTerms, ContactTerms, MotorTerms, Values, WorldTerms
 from r2s2r_cli.engine.trace_key import trace_key
 from tests.support import parity
 from tests.support.phases import STEP, expanded, phases
@@ -56,9 +56,9 @@ class Everything(Effect):
         filtered = u + (z["command"] - u) * (x["filter_s"] / (x["filter_s"] + h))
         return filtered, {**z, "command": filtered}
 
-    def motor(self, x: Values, z: Values, rate: Tensor, tension: Tensor, h: Tensor) -> tuple[Tensor, Values]:
+    def motor(self, x: Values, z: Values, rate: Tensor, terms: MotorTerms, h: Tensor) -> tuple[Tensor, Values]:
         """Slower by the work done so far."""
-        work = z["work"] + h * torch.abs(rate) * tension
+        work = z["work"] + h * torch.abs(rate) * terms.tension
         return rate / (1.0 + x["heat"] * z["work"]), {**z, "work": work}
 
     def cable(self, x: Values, z: Values, terms: CableTerms, h: Tensor) -> tuple[Tensor, Values]:
@@ -79,7 +79,7 @@ class Everything(Effect):
         c = x["drag"][..., None]
         return force - c * terms.v_GB, torque - 1e-3 * c * (terms.w_R + terms.R_GR[..., 2, :])
 
-    def sensing(self, x: Values, length: Tensor) -> Tensor:
+    def sensing(self, x: Values, length: Tensor, t: Tensor | float = 0.0) -> Tensor:
         """An offset of every sensor."""
         return length + x["offset_m"]
 

@@ -25,3 +25,8 @@ def address(x: Tensor, *index: int) -> int:
     """Address of an element of a contiguous array."""
     offset = sum(i * stride for i, stride in zip(index, x.stride(), strict=False))
     return x.data_ptr() + offset * x.element_size()
+
+
+def places(x: Tensor) -> tuple[int, int]:
+    """Address of the first block of a contiguous array, and how many bytes each is behind the one before."""
+    return x.data_ptr(), x.stride(0) * x.element_size()

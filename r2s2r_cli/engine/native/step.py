@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import torch
@@ -12,7 +14,7 @@ from torch import Tensor
 
 from r2s2r_cli.engine.native import eager, machine
 from r2s2r_cli.engine.native.build import Build, Builder, Kernel
-from r2s2r_cli.engine.native.lanes import address, from_lanes, to_lanes
+from r2s2r_cli.engine.native.lanes import address, from_lanes, places, to_lanes
 from r2s2r_cli.engine.native.packs import Twins
 from r2s2r_cli.engine.native.program import Active
 from r2s2r_cli.engine.native.shapes import Sizes, checked
@@ -118,9 +120,12 @@ class NativeStep:
         frames[:, 0] = state
         n = plan.steps(rows)
 
+        (s_0, s_b), (f_0, f_b), (u_0, u_b), (p_0, p_b) = map(places, (state, frames, inputs, parameters))
+        h = step.data_ptr()
+
         def run(block: int) -> None:
-            arrays = (state, frames, inputs, parameters)
-            kernel(*(address(x, block) for x in arrays), step.data_ptr(), 0, n, plan.hold, plan.every)
+            at = (s_0 + s_b * block, f_0 + f_b * block, u_0 + u_b * block, p_0 + p_b * block)
+            kernel(*at, h, 0, n, plan.hold, plan.every)
 
         if n:
             _spread(run, range(len(state)), plan.threads)
@@ -316,10 +321,29 @@ class NativeStep:
 
 def _spread(run: Callable[[int], None], tasks: Iterable[int], threads: int) -> None:
     """Run all tasks, in so many threads: kernels let go of Python's lock."""
-    if threads == 1:
-        for task in tasks:
+    waiting = list(tasks)
+    helpers = min(threads, len(waiting)) - 1
+    left = iter(waiting)  # one for all: whoever is free takes the next
+
+    def work() -> None:
+        for task in left:
             run(task)
+
+    if helpers < 1:
+        work()
         return
-    with ThreadPoolExecutor(threads) as pool:
-        for _ in pool.map(run, tasks):
-            pass
+    pool = _pool(threads - 1, os.getpid())
+    helped = [pool.submit(work) for _ in range(helpers)]
+    try:
+        work()
+    finally:
+        wait(helped)
+    for one in helped:
+        one.result()
+
+
+@cache
+def _pool(threads: int, process: int) -> ThreadPoolExecutor:
+    """Threads that stay: a rollout of a few steps takes less time than to start them. process: a forked one has none of
+    its parent's threads."""
+    return ThreadPoolExecutor(threads, thread_name_prefix=f"kernels-{process}")

@@ -121,6 +121,9 @@ class PlanSettings(Frozen):
     """Standard deviations that are taken off the mean reward."""
     cycles: Annotated[int, Field(strict=True, ge=1, le=100)] = 6
     """Gaits of each long policy."""
+    reach_m: Annotated[float, Field(strict=True, ge=0)] = 0.0
+    """How far a long policy may take the robot from its start [m]; 0: as far as the camera of the last estimate sees it
+    when it starts in the middle of the picture, and anywhere where no camera saw it."""
     smooth: Annotated[bool, Field(strict=True)] = True
     """Whether returns to rest between gaits are left out where a shortcut leads to the same end."""
     goal_within_m: Annotated[float, Field(strict=True, gt=0, le=10)] = 0.1

@@ -85,7 +85,7 @@ def plan(
         print_config("plan", wanted(here, place, "plan", overrides, {}).settings, console)
         return
     settings = here.config(place, overrides).plan
-    asked = Asked(here, place, tuple(behaviour or ()), tuple(to or ()), seed)
+    asked = Asked(here, place, tuple(behaviour or ()), tuple(to or ()), seed, settings.reach_m)
     asked.check(settings)
     unfinished = checkpoint_of(here.artifact("plan", place))
     if resume and not unfinished.exists():

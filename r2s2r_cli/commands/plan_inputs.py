@@ -28,6 +28,7 @@ class Asked:
     behaviours: tuple[str, ...]
     to: tuple[str, ...]
     seed: int
+    reach_m: float = 0.0
 
     def flags(self) -> dict[str, Any]:
         """What else than settings and inputs decides the result, for the provenance."""
@@ -44,9 +45,26 @@ class Asked:
         from r2s2r_cli.store.header import whole_header
         from r2s2r_cli.store.staleness import artifact_ref
 
-        if self.identified is None:
-            return []
-        return [artifact_ref(self.project, self.identified, whole_header(self.identified))]
+        used = [path for path in (self.identified, self.seen) if path is not None]
+        return [artifact_ref(self.project, path, whole_header(path)) for path in used]
+
+    @cached_property
+    def seen(self) -> Path | None:
+        """The latest estimate, whose camera says how far the robot may go; None where there is none, or where
+        plan.reach_m says it."""
+        if self.reach_m > 0:
+            return None
+        return last_estimate(self.project, self.iteration)
+
+    def reach(self) -> float:
+        """How far long policies may go [m]. Raises ArtifactError."""
+        from r2s2r_cli.stages.plan.view import reach_seen
+        from r2s2r_cli.store.read import read_artifact
+
+        if self.seen is None:
+            return self.reach_m or math.inf
+        found = reach_seen(read_artifact(self.seen, "estimate")[1], self.project.robot())
+        return math.inf if found is None else found
 
     def check(self, settings: PlanSettings) -> None:
         """Find what is wrong with the request before any work. Raises UsageError, InputError, ArtifactError."""
@@ -61,7 +79,7 @@ class Asked:
         names = dict.fromkeys(self.behaviours or BEHAVIOURS)
         rewards = {name: reward_named(name) for name in names}
         goals = {_goal_name(k, len(self.to)): self._goal(text, settings) for k, text in enumerate(self.to)}
-        return Request(self.belief(), rewards, goals, self.seed)
+        return Request(self.belief(), rewards, goals, self.seed, self.reach())
 
     def belief(self) -> Belief:
         """The simulator's numbers. Raises InputError where they are those of another robot, or of robot.toml as it was
@@ -97,6 +115,19 @@ class Asked:
             raise UsageError("this is no place to go to", where="--to", expected="X,Y,HEADING: metres and degrees",
                              received=text, hint="r2s2r plan --to 0.5,1,90") from error  # fmt: skip
         return Goal((x, y), math.radians(heading), settings.goal_within_m, math.radians(settings.goal_within_deg))
+
+
+def last_estimate(project: Project, iteration: Iteration) -> Path | None:
+    """The recorded runs' states of the iteration, or the latest before it; executed ones come after recorded ones."""
+    places = [one for one in project.iterations() if one.number <= iteration.number]
+    for place in reversed(places):
+        # Those of its own plan come after the plan.
+        kinds = (False,) if place.number == iteration.number else (True, False)
+        for executed in kinds:
+            path = place.artifact("estimate", executed=executed)
+            if path.exists():
+                return path
+    return None
 
 
 def _goal_name(number: int, of: int) -> str:

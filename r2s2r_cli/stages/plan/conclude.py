@@ -89,6 +89,9 @@ def _warnings(
         if gaits and gaits[0].mean <= 0:
             said.append(f"{name}: the best gait earns {gaits[0].mean:.3g}: the robot does not move that way")
     for one in policies:
+        if one.goal is None and one.far > request.reach:
+            said.append(f"{one.name}: comes {one.far:.2f} m from its start, and {request.reach:.2f} m are allowed: "
+                        "the camera may lose the robot")  # fmt: skip
         if one.goal is None:
             continue
         missed = float(np.linalg.norm(one.reached.mean(axis=0)[:2] - np.array(one.goal.xy)))

@@ -12,7 +12,7 @@ from r2s2r_cli.stages.plan.long import Walk
 from r2s2r_cli.stages.plan.placement import Reference
 from r2s2r_cli.stages.plan.rewards import Outcomes
 from r2s2r_cli.stages.plan.robust import Primitive
-from r2s2r_cli.stages.plan.route import Goal, Paths
+from r2s2r_cli.stages.plan.route import Goal, Paths, farthest, walked
 from schemas.results_plan import GaitFigures, PolicyFigures
 
 
@@ -31,6 +31,11 @@ class LongPolicy:
     def expected(self) -> np.ndarray:
         """x, y [m] and turn [rad] on paper, (3,)."""
         return np.append(self.path.xy[0, -1], self.path.heading[0, -1])
+
+    @property
+    def far(self) -> float:
+        """How far it comes from its start [m], at the ends of its gaits, with the best numbers."""
+        return float(farthest(walked(self.walk.way))[0])
 
     @property
     def reached(self) -> np.ndarray:

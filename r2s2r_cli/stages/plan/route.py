@@ -102,16 +102,29 @@ SLOWER = 20.0
 
 
 def best_sequences(
-    moves: Moves, length: int, value: Callable[[Paths], np.ndarray], *, beam: int = 400, count: int = 6
+    moves: Moves, length: int, value: Callable[[Paths], np.ndarray], *, beam: int = 400, reach: float = math.inf
 ) -> Paths:
-    """The `count` sequences of `length` moves with the highest value, less RISK times what may go wrong on the way, by
-    beam search on their beginnings."""
+    """The sequence of `length` moves with the highest value, less RISK times what may go wrong on the way, by beam
+    search on their beginnings. reach: how far it may come from its start [m]; then a shorter one may be the best."""
     paths = start_paths()
-    for _ in range(length):
+    found, highest = paths, -math.inf
+    for k in range(length):
         paths = extended(moves, paths)
+        paths = paths.take(np.flatnonzero(farthest(paths) <= reach))
+        if not len(paths.yaw):
+            break
         worth = value(paths) - RISK * moves.risk[paths.picks].sum(axis=1)
-        paths = paths.take(np.argsort(-worth, kind="stable")[:beam])
-    return paths.take(np.arange(min(count, len(paths.yaw))))
+        order = np.argsort(-worth, kind="stable")[:beam]
+        paths = paths.take(order)
+        # Without a limit all have the length that was asked for.
+        if worth[order[0]] > highest if math.isfinite(reach) else k == length - 1:
+            found, highest = paths.take(np.arange(1)), float(worth[order[0]])
+    return found
+
+
+def farthest(paths: Paths) -> np.ndarray:
+    """How far each comes from its start [m], (B,)."""
+    return np.asarray(np.linalg.norm(paths.xy - paths.xy[:, :1], axis=-1).max(axis=1))
 
 
 def different_sequences(moves: Moves, best: Callable[[Moves], Paths | None], most: int) -> list[Paths]:

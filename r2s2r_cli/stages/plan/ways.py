@@ -18,6 +18,7 @@ from r2s2r_cli.stages.plan.route import (
     Paths,
     best_sequences,
     different_sequences,
+    farthest,
     moves_of,
     walked,
     way_to,
@@ -29,7 +30,9 @@ from schemas.config import PlanSettings
 SEQUENCES = 4
 """Sequences of gaits that are tried for each long policy."""
 LOST = -10.0
-"""Worth of a sequence in which the robot gives a target up: less than any other."""
+"""Worth of a sequence in which the robot gives a target up or leaves its area: less than any other."""
+MARGIN = 0.9
+"""Share of its area that a sequence may use on paper: on its way between the ends of its gaits it comes farther."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,7 @@ def ways(
     values: dict[str, Callable[[Paths], np.ndarray]] = dict(LONG)
     tried: list[tuple[str, Paths]] = []
     for name, value in LONG.items():
-        best = partial(best_sequences, length=settings.cycles, value=value, count=1)
+        best = partial(best_sequences, length=settings.cycles, value=value, reach=MARGIN * request.reach)
         tried += [(name, path) for path in different_sequences(moves, best, SEQUENCES)]
     for name, goal in request.goals.items():
         way_to(moves, goal)  # raises where there is none at all
@@ -68,7 +71,9 @@ def ways(
 
     score: dict[str, tuple[float, Paths]] = {}
     for (name, path), walk in zip(tried, walked_along(tried, smooth=False, part="sequences"), strict=True):
-        worth = np.where(walk.lost, LOST, values[name](walked(walk.way)))
+        came = walked(walk.way)
+        away = (farthest(came) > request.reach) & (name not in request.goals)
+        worth = np.where(walk.lost | away, LOST, values[name](came))
         one = float(worth.mean() - settings.spread * worth.std())
         if name not in score or one > score[name][0]:
             score[name] = one, path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,12 +29,14 @@ FEW = 8
 
 @dataclass(frozen=True)
 class Request:
-    """What is to be planned. rewards: behaviours by name; goals: places to go by the name of their policy."""
+    """What is to be planned. rewards: behaviours by name; goals: places to go by the name of their policy; reach: how
+    far a long policy without a goal may take the robot from its start [m]."""
 
     belief: Belief
     rewards: Mapping[str, Reward]
     goals: Mapping[str, Goal] = field(default_factory=dict)
     seed: int = 0
+    reach: float = math.inf
 
 
 Progress = Callable[[str, int, int], None]

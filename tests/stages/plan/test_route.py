@@ -21,6 +21,7 @@ from r2s2r_cli.stages.plan.route import (
     best_sequences,
     different_sequences,
     extended,
+    farthest,
     moves_of,
     start_paths,
     walked,
@@ -96,7 +97,7 @@ def test_the_long_gaits_ask_for_what_their_names_say() -> None:
     moves = simple((0.0, 0.2, 0.0), (0.0, 0.2, ARC), (0.0, 0.0, 0.3), (0.0, 0.0, -0.3))
     for name, pick in (("straight", 0), ("arching", 1), ("turn-counterclockwise", 2), ("turn-clockwise", 3)):
         # How the robot lies at the end does not count for an arc: three of four gaits are asked for.
-        assert best_sequences(moves, 4, LONG[name], count=1).picks[0, :3].tolist() == [pick] * 3
+        assert best_sequences(moves, 4, LONG[name]).picks[0, :3].tolist() == [pick] * 3
 
 
 def test_a_gait_that_may_go_wrong_is_not_worth_a_little_more_way() -> None:
@@ -104,10 +105,10 @@ def test_a_gait_that_may_go_wrong_is_not_worth_a_little_more_way() -> None:
     0.6 m that fails once in ten is worth it."""
     sure, risky = made("a", 0.0, 0.2, 0.0), made("b", 0.0, 0.25, 0.0, worked=0.9)
     moves = moves_of(three_bar(), [sure, risky])
-    assert best_sequences(moves, 4, LONG["straight"], count=1).picks.tolist() == [[0] * 4]
+    assert best_sequences(moves, 4, LONG["straight"]).picks.tolist() == [[0] * 4]
     assert set(way_to(moves, Goal((0.0, 1.0), 0.0, within_m=0.01)).picks[0].tolist()) == {0}
     far = moves_of(three_bar(), [sure, made("c", 0.0, 0.6, 0.0, worked=0.9)])
-    assert best_sequences(far, 4, LONG["straight"], count=1).picks.tolist() == [[1] * 4]
+    assert best_sequences(far, 4, LONG["straight"]).picks.tolist() == [[1] * 4]
 
 
 def test_an_arc_loses_nothing_but_its_length() -> None:
@@ -138,7 +139,7 @@ def test_the_way_is_found_and_is_short() -> None:
 def test_other_sequences_leave_out_what_was_used_most() -> None:
     """The best, then the best without its gait, numbered as in all moves."""
     moves = simple((0.0, 0.1, 0.0), (0.0, 0.3, 0.0), (0.0, 0.2, 0.0))
-    best = partial(best_sequences, length=3, value=LONG["straight"], count=1)
+    best = partial(best_sequences, length=3, value=LONG["straight"])
     assert [path.picks.tolist() for path in different_sequences(moves, best, 5)] == [[[1] * 3], [[2] * 3], [[0] * 3]]
 
 
@@ -157,3 +158,15 @@ def test_gaits_that_may_end_elsewhere_are_left_out() -> None:
     lost = made("c", 0.3, 0, 0, worked=0.85)
     assert [one.name for one in without_rare([good, stray, lost, good])] == ["a"]
     assert [one.name for one in without_rare([stray, lost])] == ["b", "c"]
+
+
+def test_a_sequence_stays_within_reach() -> None:
+    """No place on its way is farther than allowed; a shorter one is then the best, and none where none fits."""
+    reference = three_bar()
+    moves = moves_of(reference, [made("far", 0.0, 0.2, 0.0), made("short", 0.0, 0.05, 0.0)])
+    free = best_sequences(moves, 6, LONG["straight"])
+    assert free.xy[0, -1, 1] == pytest.approx(1.2)
+    near = best_sequences(moves, 6, LONG["straight"], reach=0.5)
+    assert farthest(near)[0] == pytest.approx(0.5)
+    assert near.picks.shape[1] < 6
+    assert best_sequences(moves, 6, LONG["straight"], reach=0.01).picks.shape[1] == 0

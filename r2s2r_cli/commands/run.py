@@ -47,6 +47,7 @@ def run(
         str | None, typer.Option("--camera", metavar="CAMERA", help="realsense[:SERIAL], open3d or rig://HOST:PORT.")
     ] = None,
     random: Annotated[int, typer.Option("--random", metavar="N", help="Targets of the random policy to record.")] = 15,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the random policy, of identify and of plan.")] = 0,
     policy: Annotated[
         list[str] | None,
         typer.Option(
@@ -80,7 +81,7 @@ def run(
     robot: tuple[str, ...] = () if port is None else ("--port", port, "--protocol", protocol.value)
     robot += () if camera is None else ("--camera", camera)
     names = tuple(policy or ()) or ("straight", "arching", "turn-clockwise", "turn-counterclockwise")
-    steps = list(_steps(here, place, tuple(source or ()), robot, random, names, repeats, yes=yes))
+    steps = list(_steps(here, place, tuple(source or ()), robot, (random, seed), names, repeats, yes=yes))
     steps = [step for step in steps if STAGES.index(step.name) <= STAGES.index(until)]
     common = ("--project", str(here.root), "--iteration", str(place.number), *(("--quiet",) if quiet else ()),
               *(() if draw else ("--no-draw",)))  # fmt: skip
@@ -98,23 +99,25 @@ def run(
 
 
 def _steps(
-    project: Project, place: Iteration, source: Sequence[Path], robot: tuple[str, ...], random: int,
-    policies: tuple[str, ...], repeats: int, *, yes: bool,
+    project: Project, place: Iteration, source: Sequence[Path], robot: tuple[str, ...],
+    random: tuple[int, int], policies: tuple[str, ...], repeats: int, *, yes: bool,
 ) -> Iterator[Step]:  # fmt: skip
-    """The stages of this iteration. Without a robot and without logs an iteration learns from the runs before it."""
+    """The stages of this iteration. random: targets of the random policy, and the seed. Without a robot and without logs
+    an iteration learns from the runs before it."""
+    seeded = ("--seed", str(random[1])) if random[1] else ()
     recording, executed = place.artifact("recording"), place.artifact("recording", executed=True)
     earlier = any(one.artifact("estimate").exists() for one in project.iterations() if one.number < place.number)
     if source:
         yield Step("record", ("import", *map(str, source)), recording)
     elif robot and not earlier:
-        yield Step("record", ("record", "--random", str(random), *robot), recording, robot=True)
+        yield Step("record", ("record", "--random", str(random[0]), *seeded, *robot), recording, robot=True)
     elif not earlier and not recording.exists():
         raise UsageError("there is neither a robot nor a log", where="r2s2r run", expected="--port PORT, or log files",
                          received="neither", hint="r2s2r run run.csv")  # fmt: skip
     if source or recording.exists() or not earlier:
         yield Step("estimate", ("estimate",), place.artifact("estimate"))
-    yield Step("identify", ("identify",), place.artifact("identification"))
-    yield Step("plan", ("plan",), place.artifact("plan"))
+    yield Step("identify", ("identify", *seeded), place.artifact("identification"))
+    yield Step("plan", ("plan", *seeded), place.artifact("plan"))
     if robot or executed.exists():
         words = ("execute", *policies, "--repeats", str(repeats), *robot, *(("--yes",) if yes else ()))
         yield Step("execute", words, executed, robot=True)

@@ -1,0 +1,120 @@
+"""Two iterations of Real2Sim2Real on a rig whose friction, motors and tendons nobody knows, seed by seed.
+
+`python examples/13_two_iterations/run.py --out DIR --seeds 0 1 2 3 4`; run again it goes on where it was. What
+comes out and what it means: README.md beside this file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+from table import Row, rows_of, summary  # noqa: E402 - beside this file
+from world import COMMAND, rig, unknown  # noqa: E402
+
+MEASURES = ("com_end_m", "heading_end_rad", "segment_s")
+
+
+def r2s2r(project: Path, *words: str, quiet: bool = True) -> None:
+    """A command that must succeed."""
+    print("$ r2s2r", *words, file=sys.stderr, flush=True)
+    subprocess.run([*COMMAND, *words, *(["--quiet"] if quiet else [])], cwd=project, check=True, stdout=sys.stderr)
+
+
+def prepared(out: Path, seed: int, settings: str) -> Path:
+    """A project with a calibrated robot, and the world that it will meet."""
+    project = out / f"seed-{seed}"
+    if not (project / "calibration.h5").exists():
+        shutil.rmtree(project, ignore_errors=True)
+        out.mkdir(parents=True, exist_ok=True)
+        r2s2r(out, "init", project.name, "--robot", "threebar")
+        with (project / "project.toml").open("a", encoding="utf-8") as file:
+            file.write(settings)
+        (project / "drawn.json").write_text(json.dumps(unknown(project, seed), indent=1), "utf-8")
+        r2s2r(project, "rig", "--robot", "truth.toml", "--world", "world.toml", "--points", "points.csv")
+        r2s2r(project, "calibrate", "--points", "points.csv", "--no-draw")
+    return project
+
+
+def iterate(project: Path, number: int, seed: int, targets: int, policies: Sequence[str], repeats: int) -> None:
+    """One iteration, the robot being the rig."""
+    names = [word for name in policies for word in ("--policy", name)]
+    with rig(project) as robot:
+        r2s2r(project, "run", "--iteration", str(number), *robot, "--random", str(targets), "--seed", str(seed), *names,
+              "--repeats", str(repeats), "--yes", quiet=False)  # fmt: skip
+
+
+def compared(project: Path, number: int, models: dict[str, Path]) -> dict[str, object]:
+    """The executed runs of an iteration beside these simulators and that of robot.toml; kept as comparison-N.json."""
+    words = [word for name, path in models.items() for word in ("--model", f"{name}={path}")]
+    command = [*COMMAND, "compare", "--iteration", str(number), "--of", "execute", *words, "--json", "--force"]
+    done = subprocess.run(command, cwd=project, check=True, stdout=subprocess.PIPE, text=True)
+    report: dict[str, object] = json.loads(done.stdout)["report"]
+    (project / f"comparison-{number}.json").write_text(json.dumps(report, indent=1), "utf-8")
+    return report
+
+
+def papers(project: Path) -> Path:
+    """What the paper's preset (Adam, Key Frame Loss, mask, two parameters) learns from the same runs, in a copy."""
+    other = project.parent / f"{project.name}-paper"
+    found = other / "iterations" / "002" / "30-identify.h5"
+    if not found.exists():
+        shutil.rmtree(other, ignore_errors=True)
+        first = other / "iterations" / "001"
+        first.mkdir(parents=True)
+        for name in ("project.toml", "robot.toml"):
+            shutil.copy(project / name, other)
+        for name in ("10-record.h5", "20-estimate.h5", "50-execute.h5", "51-estimate.h5"):
+            (first / name).hardlink_to(project / "iterations" / "001" / name)
+        (other / "iterations" / "002").mkdir()
+        r2s2r(other, "identify", "--iteration", "2", "--method", "paper", "--no-draw")
+    return found
+
+
+def measured(project: Path, *, paper: bool) -> list[Row]:
+    """The rows of one seed: runs of iteration 1 (iteration 2 learned from them), and new ones of iteration 2."""
+    models = {"refined": project / "iterations" / "002" / "30-identify.h5"}
+    if paper:
+        models["paper"] = papers(project)
+    return [
+        row
+        for number, words in ((1, "the same runs"), (2, "new policies"))
+        for row in rows_of(compared(project, number, models), words)
+    ]
+
+
+def main(
+    out: Path, seeds: Sequence[int], *, targets: int, policies: Sequence[str], repeats: int, paper: bool,
+    say: Callable[[str], None] = print,
+) -> None:  # fmt: skip
+    """Everything, into `out`. say: where the table goes."""
+    settings = "\n[identify]\nstarts = 1\nprofiles = 0\n"
+    found: list[Row] = []
+    for seed in seeds:
+        project = prepared(out, seed, settings)
+        for number in (1, 2):
+            iterate(project, number, seed, targets, policies, repeats)
+        found += measured(project, paper=paper)
+        say(f"after seed {seed}")
+        for line in summary(found):
+            say(line)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("two-iterations"))
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
+    parser.add_argument("--targets", type=int, default=12, help="of the random policy of iteration 1")
+    parser.add_argument("--policies", nargs="+", default=["straight", "turn-counterclockwise"])
+    parser.add_argument("--repeats", type=int, default=2, help="of every policy: they make the floor")
+    parser.add_argument("--no-paper", action="store_true", help="leave the paper's preset out")
+    given = parser.parse_args()
+    main(given.out.resolve(), given.seeds, targets=given.targets, policies=given.policies, repeats=given.repeats,
+         paper=not given.no_paper)  # fmt: skip

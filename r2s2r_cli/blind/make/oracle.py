@@ -1,0 +1,192 @@
+"""How well an effect can be told: noise-free pairs of the rig with it and without it, what nuisances could explain
+projected off.
+
+Every target interval of every gait is simulated again without what is wrong, from the true state at its start and under
+the recorded duties (command replay). The difference of end caps and sensor lengths is whitened with the noise and the
+floor, and projected on the complement of the rig's own sensitivities to friction, motor speed (both common to the set)
+and start pose (x, y and heading of every interval: exact, the floor is the same everywhere). d is the length of what is
+left: with d >= 8 a test at the end of the noise would not miss it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from r2s2r_cli.blind.make.drive import Driven, hidden_plant, put_back
+from r2s2r_cli.blind.make.observe import through
+from r2s2r_cli.blind.make.worlds import DAY_SD_M, OFFSET_SHARE, Hidden
+from schemas.robot import Robot
+
+FLOOR_M, GROWN_M = 0.002, 0.006
+"""Floor of a cap's coordinate [m]: constant over a target interval, and a random walk that has grown to so much at its
+end: what another engine's numerics make of a motion."""
+LENGTH_SD_M, LENGTH_FLOOR_M, LENGTH_GROWN_M = 0.001, 0.001, 0.002
+"""The same of a sensor, whose noise is a count of its converter."""
+LOOK_S = 0.1
+"""Between two instants that are compared."""
+STEP = 0.05
+"""Relative change of friction and speed for their sensitivities."""
+WEAK, CLEAR = 3.0, 8.0
+
+
+@dataclass(frozen=True)
+class Detectable:
+    """d: of all that is wrong together; each: of every planted effect alone. gap_mm: root mean square of the caps'
+    difference at key frames [mm], before projection."""
+
+    d: float
+    each: tuple[float, ...]
+    gap_mm: float
+
+    @property
+    def stratum(self) -> str:
+        """sub-floor, weak or clear."""
+        return "sub-floor" if self.d < WEAK else "weak" if self.d < CLEAR else "clear"
+
+
+@dataclass(frozen=True)
+class _Looks:
+    """Of one interval, every LOOK_S: t [s], (look,); p: end caps as placed [m], (look, cap, 3); length [m], (look,
+    cable)."""
+
+    t: np.ndarray
+    p: np.ndarray
+    length: np.ndarray
+
+
+def detectability(robot: Robot, hidden: Hidden, runs: list[Driven]) -> Detectable:
+    """Of a set whose gaits ran as `runs`. Raises NumericalError as the rig does."""
+    plain = hidden.healthy()
+    base = [_replayed(robot, plain, run, g) for g, run in enumerate(runs)]
+    rub = [_replayed(robot, replace(plain, friction=plain.friction * (1 + STEP)), run, g) for g, run in enumerate(runs)]
+    fast = [_replayed(robot, replace(plain, speed=plain.speed * (1 + STEP)), run, g) for g, run in enumerate(runs)]
+    told = _Told(hidden, base, (rub, fast))
+    whole = [_recorded(hidden, run, g) for g, run in enumerate(runs)]
+    d, gap = told(whole)
+    d = float(np.hypot(d, _lost(hidden, runs)))
+    each = []
+    for one in hidden.planted:
+        alone = replace(hidden, planted=(one,))
+        apart = [_replayed(robot, alone, run, g) for g, run in enumerate(runs)] if len(hidden.planted) > 1 else whole
+        each.append(float(np.hypot(told(apart)[0], _lost(alone, runs))))
+    return Detectable(d, tuple(each), 1e3 * gap)
+
+
+def _lost(hidden: Hidden, runs: list[Driven]) -> float:
+    """Frames that never came, in standard deviations of their number."""
+    world = hidden.world(0, runs[0].gait.position, runs[0].gait.heading)
+    if world.effects.dropout is None:
+        return 0.0
+    return float(np.sqrt(world.seen().clock.lost_share * sum(len(run.t_frame) for run in runs)))
+
+
+class _Told:
+    """The length of a difference from `base` off the nuisances."""
+
+    def __init__(self, hidden: Hidden, base: list[list[_Looks]], varied: tuple[list[list[_Looks]], ...]) -> None:
+        self._hidden, self._base = hidden, base
+        common = [self._white(one) for one in varied]
+        self._common = np.column_stack([np.concatenate([part for part, _ in one]) for one in common])
+        self._own = [_poses(looks) for run in base for looks in run]
+
+    def __call__(self, other: list[list[_Looks]]) -> tuple[float, float]:
+        """d, and the root mean square at key frames [m]."""
+        white = self._white(other)
+        r = np.concatenate([part for part, _ in white])
+        nuisances, at = [], 0
+        for pose, (part, cap_rows) in zip(self._own, white, strict=True):
+            columns = np.zeros((len(r), 3))
+            columns[at : at + cap_rows] = self._caps_white(pose)
+            nuisances.append(columns)
+            at += len(part)
+        J = np.column_stack([self._common, *nuisances])
+        # Columns differ by orders of magnitude: scaled before the rank is decided.
+        J = J / np.maximum(np.linalg.norm(J, axis=0), 1e-12)
+        left = r - J @ np.linalg.lstsq(J, r, rcond=1e-9)[0]
+        last = [(b.p[-1] - a.p[-1]).ravel() for x, y in zip(self._base, other, strict=True)
+                for a, b in zip(x, y, strict=True)]  # fmt: skip
+        return float(np.linalg.norm(left)), float(np.sqrt(3 * np.mean(np.concatenate(last) ** 2)))
+
+    def _white(self, other: list[list[_Looks]]) -> list[tuple[np.ndarray, int]]:
+        """Whitened difference from the base of every interval, and how much of it is caps."""
+        found = []
+        for mine, theirs in zip(self._base, other, strict=True):
+            for a, b in zip(mine, theirs, strict=True):
+                caps = self._caps_white((b.p - a.p).reshape(len(a.t), -1, 1)).ravel()
+                root = _root(len(a.t), LENGTH_SD_M, 0.0, np.hypot(LENGTH_FLOOR_M, DAY_SD_M), LENGTH_GROWN_M)
+                found.append((np.concatenate([caps, np.linalg.solve(root, b.length - a.length).ravel()]), len(caps)))
+        return found
+
+    def _caps_white(self, columns: np.ndarray) -> np.ndarray:
+        """(look, coordinate, k) whitened over looks, as (look * coordinate, k)."""
+        h = self._hidden
+        ar = h.ar1 ** (h.rate_hz * LOOK_S) if h.ar1 else 0.0
+        root = _root(len(columns), h.noise_m, ar, np.hypot(FLOOR_M, OFFSET_SHARE * h.noise_m), GROWN_M)
+        return np.linalg.solve(root, columns.reshape(len(columns), -1)).reshape(-1, columns.shape[2])
+
+
+def _root(n: int, sd: float, ar: float, constant: float, grown: float) -> np.ndarray:
+    """Cholesky factor of the covariance of n values in a row: AR(1) noise, a constant of unknown size, and a random
+    walk from 0 to sd `grown`."""
+    i = np.arange(n)
+    lag = np.abs(np.subtract.outer(i, i))
+    walk = grown**2 * np.minimum.outer(i, i) / max(n - 1, 1)
+    return np.asarray(np.linalg.cholesky(sd**2 * np.where(lag == 0, 1.0, ar**lag) + constant**2 + walk))
+
+
+def _poses(looks: _Looks) -> np.ndarray:
+    """Sensitivity of the caps to x, y [1] and heading [m/rad] at the start, (look, coordinate, 3)."""
+    about = looks.p - looks.p[0].mean(axis=0)
+    turned = np.stack([-about[..., 1], about[..., 0], np.zeros_like(about[..., 0])], axis=-1)
+    x, y = np.zeros_like(about), np.zeros_like(about)
+    x[..., 0], y[..., 1] = 1.0, 1.0
+    return np.stack([one.reshape(len(looks.t), -1) for one in (x, y, turned)], axis=-1)
+
+
+def _recorded(hidden: Hidden, run: Driven, gait: int) -> list[_Looks]:
+    """What really happened, seen by the camera of that world without noise."""
+    camera = hidden.world(gait, run.gait.position, run.gait.heading).seen()
+    late = camera.clock.stamp_delay_s
+    found = []
+    for t in _times(run):
+        at = _between(t - late, run.t_frame, run.p_WE)
+        found.append(_Looks(t, through(camera, t - late, at), _between(t, run.t, run.sensed)))
+    return found
+
+
+def _replayed(robot: Robot, hidden: Hidden, run: Driven, gait: int) -> list[_Looks]:
+    """Every interval of a run in another world, from its true start under its duties."""
+    plant = hidden_plant(robot, hidden, gait, run.gait.position, run.gait.heading)
+    world = hidden.world(gait, run.gait.position, run.gait.heading)
+    camera, late = world.seen(), world.seen().clock.stamp_delay_s
+    found = []
+    for t, moment, first in zip(_times(run), run.moments, run.starts, strict=True):
+        put_back(plant, moment)
+        k, now = int(first), float(run.t[first])
+        p, length = [], []
+        for due in t:
+            while k < len(run.t) and run.t[k] <= due + 1e-9:
+                plant.advance(float(run.t[k]) - now, run.duty[k - 1] if k > first else run.duty[k])
+                now = float(run.t[k])
+                k += 1
+            plant.advance(float(due) - now, run.duty[k - 1])
+            now = float(due)
+            p.append(plant.truth().p_WE)
+            length.append(plant.sensed())
+        caps = _between(np.maximum(t - late, t[0]), t, np.array(p))
+        found.append(_Looks(t, through(camera, t - late, caps), np.array(length)))
+    return found
+
+
+def _times(run: Driven) -> list[np.ndarray]:
+    """Instants that are compared, by interval: from its start, every LOOK_S, and its end [s]."""
+    ends = [*run.t[run.starts[1:]], run.t[-1]]
+    return [np.append(np.arange(a, b - LOOK_S / 2, LOOK_S), b) for a, b in zip(run.t[run.starts], ends, strict=True)]
+
+
+def _between(t: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (known, ...) at times t by straight lines, constant beyond the ends."""
+    flat = values.reshape(len(known), -1)
+    return np.stack([np.interp(t, known, column) for column in flat.T], axis=-1).reshape(len(t), *values.shape[1:])

@@ -1,0 +1,90 @@
+"""A blind set as what a diagnosis is made from: its logs go through import and estimate, as a user's would."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.diagnose.evidence import Evidence, Run
+from r2s2r_cli.stages.estimate import estimate
+from r2s2r_cli.stages.floor.runs import sensed_run
+from r2s2r_cli.stages.identified import nominal
+from r2s2r_cli.stages.identify.data import Selection
+from r2s2r_cli.stages.identify.load import run_data
+from r2s2r_cli.stages.import_ import import_source, merge_runs
+from schemas.estimate import EstimateSettings
+from schemas.robot import Robot
+
+JUDGED = 3
+"""Of so many gaits one is judged on, the last ones; the others are fitted."""
+ROD_TOLERANCE = 0.1
+"""A camera whose scale is wrong is something to be diagnosed, not refused."""
+
+
+def set_names(folder: Path) -> tuple[str, ...]:
+    """Names of the sets of a bank, sorted. Raises InputError where there is none."""
+    found = tuple(sorted(one.parent.name for one in folder.glob("*/robot.toml")))
+    if not found:
+        raise InputError(
+            "there are no blind sets", where=str(folder), expected="folders with robot.toml and gaits/",
+            received="none", hint="r2s2r blind make --out bank",
+        )  # fmt: skip
+    return found
+
+
+def read_set(folder: Path, *, shuffled: int | None = None) -> Evidence:
+    """The evidence of one set. The simulator is that of its robot.toml: nothing was identified before.
+
+    The last third of the gaits is judged, the others are fitted. shuffled: seed with which the commands of the target
+    intervals are exchanged (`Evidence.shuffled`), a negative control; the healthy runs stay. Raises InputError where
+    the folder is no set.
+    """
+    robot = _robot(folder / "robot.toml")
+    runs = _runs(folder / "gaits", robot)
+    healthy = _runs(folder / "commissioning", robot) if (folder / "commissioning").is_dir() else ()
+    if len(runs) < 2:
+        raise InputError(
+            "a set needs two gaits, one of them to judge on", where=str(folder / "gaits"), expected="at least 2 logs",
+            received=str(len(runs)), hint="r2s2r blind make --out bank",
+        )  # fmt: skip
+    judged = max(1, round(len(runs) / JUDGED))
+    evidence = Evidence(
+        robot=robot, model=nominal(robot), runs=runs, fit=_complete(runs[:-judged]), judge=_complete(runs[-judged:]),
+        healthy=healthy,
+    )  # fmt: skip
+    return evidence if shuffled is None else evidence.shuffled(shuffled)
+
+
+def _robot(path: Path) -> Robot:
+    try:
+        return Robot.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, ValidationError) as error:
+        raise InputError(
+            "the robot of a set cannot be read", where=str(path), expected="a robot.toml",
+            received=str(error).splitlines()[0], hint="r2s2r blind make --out bank",
+        ) from error  # fmt: skip
+
+
+def _runs(folder: Path, robot: Robot) -> tuple[Run, ...]:
+    logs = sorted(folder.glob("*.csv"), key=lambda path: (len(path.stem), path.stem))
+    found = []
+    for path in logs:
+        imported = import_source(path, robot=robot, format="trajectory_csv", rod_length_tolerance=ROD_TOLERANCE)
+        recording = merge_runs([imported])
+        states, _ = estimate(recording, robot, EstimateSettings(rod_length_tolerance=ROD_TOLERANCE))
+        # Rows between frames are control ticks: commands as they were sent, not as frames found them.
+        caps = replace(run_data(recording, states, imported.name), sampled=False)
+        lengths = sensed_run(imported.name, recording, imported.name, robot)
+        found.append(Run(caps, lengths, gait=imported.name))
+    return tuple(found)
+
+
+def _complete(runs: tuple[Run, ...]) -> tuple[Selection, ...]:
+    return tuple(
+        Selection(run.name, tuple(i + 1 for i, whole in enumerate(run.caps.intervals.complete.tolist()) if whole))
+        for run in runs
+    )

@@ -1,0 +1,82 @@
+"""Which sets belong to which bank: seeds, sizes of effects, composition. The only place where the banks differ."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from r2s2r_cli.errors import UsageError
+
+
+class Bank(StrEnum):
+    """What a set is for."""
+
+    CALIBRATION = "calibration"
+    """Thresholds and the temperature are set on these; anybody may look at their labels."""
+    BLIND = "blind"
+    """The published figures. Made after everything is frozen, opened by `score` alone."""
+    REGRESSION = "regression"
+    """A few with fixed seeds for the test suite: no evidence of anything."""
+
+
+class Kind(StrEnum):
+    """What is wrong in a world."""
+
+    NONE = "none"
+    SINGLE = "single"
+    PAIR = "pair"
+    OUTSIDE = "outside"
+    """Something that no catalogue has."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """seeds: of the sets. low, high: sizes of effects as factors of their usual size, drawn evenly in the logarithm."""
+
+    seeds: range
+    low: float
+    high: float
+
+
+RANGES = {
+    Bank.CALIBRATION: Range(range(100_000, 200_000), 0.22, 1.6),
+    Bank.BLIND: Range(range(500_000, 900_000), 0.18, 2.1),
+    Bank.REGRESSION: Range(range(1_000, 2_000), 0.9, 1.7),
+}
+SHARES = {Kind.NONE: 0.15, Kind.SINGLE: 0.60, Kind.PAIR: 0.10, Kind.OUTSIDE: 0.15}
+NOISE_M = (0.002, 0.005, 0.010)
+AR1 = (0.0, 0.7)
+RATES_HZ = (10.0, 30.0)
+GAITS = (3, 5, 8)
+TARGETS = 5
+"""Of a gait."""
+
+
+def seeds(bank: Bank, count: int, first: int = 0) -> range:
+    """Seeds of the sets first, first + 1, ... of a bank. Raises UsageError where the bank has no more."""
+    whole = RANGES[bank].seeds
+    if first < 0 or count < 1 or first + count > len(whole):
+        raise UsageError(
+            f"the bank {bank} has no such sets", where="--count", expected=f"1 to {len(whole) - max(first, 0)}",
+            received=f"{count} from {first}", hint="r2s2r blind make --count 24",
+        )  # fmt: skip
+    return whole[first : first + count]
+
+
+def kinds(count: int, rng: np.random.Generator) -> list[Kind]:
+    """Kinds of `count` sets in random order, shares as near `SHARES` as whole numbers allow."""
+    wanted = {kind: share * count for kind, share in SHARES.items()}
+    whole = {kind: int(value) for kind, value in wanted.items()}
+    order = sorted(wanted, key=lambda kind: whole[kind] - wanted[kind])
+    for kind in order[: count - sum(whole.values())]:
+        whole[kind] += 1
+    found = [kind for kind, number in whole.items() for _ in range(number)]
+    return [found[i] for i in rng.permutation(count)]
+
+
+def size(bank: Bank, rng: np.random.Generator) -> float:
+    """A size, as a factor of the usual one: off every grid."""
+    of = RANGES[bank]
+    return float(np.exp(rng.uniform(np.log(of.low), np.log(of.high))))

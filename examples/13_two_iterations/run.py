@@ -14,6 +14,8 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import tomlkit
+
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 from table import Row, rows_of, summary  # noqa: E402 - beside this file
@@ -28,15 +30,17 @@ def r2s2r(project: Path, *words: str, quiet: bool = True) -> None:
     subprocess.run([*COMMAND, *words, *(["--quiet"] if quiet else [])], cwd=project, check=True, stdout=sys.stderr)
 
 
-def prepared(out: Path, seed: int, settings: str) -> Path:
+def prepared(out: Path, seed: int) -> Path:
     """A project with a calibrated robot, and the world that it will meet."""
     project = out / f"seed-{seed}"
     if not (project / "calibration.h5").exists():
         shutil.rmtree(project, ignore_errors=True)
         out.mkdir(parents=True, exist_ok=True)
         r2s2r(out, "init", project.name, "--robot", "threebar")
-        with (project / "project.toml").open("a", encoding="utf-8") as file:
-            file.write(settings)
+        settings = tomlkit.parse((project / "project.toml").read_text("utf-8"))
+        # One fit: the range over starts and the profiles say how far it can be trusted, and take minutes.
+        settings["identify"].update({"starts": 1, "profiles": 0})
+        (project / "project.toml").write_text(tomlkit.dumps(settings), "utf-8")
         (project / "drawn.json").write_text(json.dumps(unknown(project, seed), indent=1), "utf-8")
         r2s2r(project, "rig", "--robot", "truth.toml", "--world", "world.toml", "--points", "points.csv")
         r2s2r(project, "calibrate", "--points", "points.csv", "--no-draw")
@@ -95,10 +99,9 @@ def main(
     say: Callable[[str], None] = print,
 ) -> None:  # fmt: skip
     """Everything, into `out`. say: where the table goes."""
-    settings = "\n[identify]\nstarts = 1\nprofiles = 0\n"
     found: list[Row] = []
     for seed in seeds:
-        project = prepared(out, seed, settings)
+        project = prepared(out, seed)
         for number in (1, 2):
             iterate(project, number, seed, targets, policies, repeats)
         found += measured(project, paper=paper)

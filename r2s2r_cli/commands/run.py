@@ -102,8 +102,8 @@ def _steps(
     project: Project, place: Iteration, source: Sequence[Path], robot: tuple[str, ...],
     random: tuple[int, int], policies: tuple[str, ...], repeats: int, *, yes: bool,
 ) -> Iterator[Step]:  # fmt: skip
-    """The stages of this iteration. random: targets of the random policy, and the seed. Without a robot and without logs
-    an iteration learns from the runs before it."""
+    """The stages of this iteration. random: targets of the random policy, and the seed. Without a robot and without
+    logs an iteration learns from the runs before it."""
     seeded = ("--seed", str(random[1])) if random[1] else ()
     recording, executed = place.artifact("recording"), place.artifact("recording", executed=True)
     earlier = any(one.artifact("estimate").exists() for one in project.iterations() if one.number < place.number)

@@ -30,13 +30,13 @@ class EffectParameter:
     scale: float
     what: str
     per: str = "robot"
-    """robot | rod | cap | cable | actuated: how many there are."""
+    """robot | rod | cap | cable | actuated | sensor (that of each cable): how many there are."""
 
     def count(self, structure: Structure) -> int:
         """How many numbers it has on a robot."""
         return {
             "robot": 1, "rod": structure.n_rods, "cap": 2 * structure.n_rods, "cable": structure.n_cables,
-            "actuated": structure.n_actuated,
+            "actuated": structure.n_actuated, "sensor": structure.n_cables,
         }[self.per]  # fmt: skip
 
 

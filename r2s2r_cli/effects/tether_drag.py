@@ -1,0 +1,48 @@
+"""Drag of a tether.
+
+What it is: a cable to a power supply or a safety line pulls the robot towards its anchor.
+Where it acts: channel world; a force of constant size towards a fixed point, shared equally by the rods.
+Parameters: force_n; anchor_x_m, anchor_y_m, anchor_z_m, place of the anchor.
+What it looks like in data: a drift towards one point of the room, whose direction turns as the robot moves on.
+What it is confused with: ground_slope (whose direction stays).
+Source: statics; diagnosis.md catalogue E3.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from r2s2r_cli.effects.base import Effect, EffectParameter
+from r2s2r_cli.engine.hooks import Channel, Values, WorldTerms
+
+NEAR = 0.02
+"""[m] closer than this to its anchor a tether is slack."""
+
+
+class TetherDrag(Effect):
+    """A force towards a fixed point."""
+
+    name = "tether_drag"
+    channel = Channel.WORLD
+    title = "drag of a tether"
+    own = (
+        EffectParameter("force_n", "N", 0.0, 0.5, off=0.0, scale=0.15, what="of the tether, on the whole robot"),
+        EffectParameter("anchor_x_m", "m", -3.0, 3.0, off=1.0, scale=1.0, what="of the anchor"),
+        EffectParameter("anchor_y_m", "m", -3.0, 3.0, off=0.0, scale=1.0, what="of the anchor"),
+        EffectParameter("anchor_z_m", "m", 0.0, 3.0, off=0.5, scale=0.5, what="of the anchor"),
+    )
+    look_alikes = ("ground_slope",)
+
+    @classmethod
+    def signature(cls) -> str:
+        """What it looks like in data."""
+        return "drift towards one point of the room, whatever the gait"
+
+    def world(self, x: Values, terms: WorldTerms, force: Tensor, torque: Tensor) -> tuple[Tensor, Tensor]:
+        """The pull on every rod."""
+        rods = terms.p_GB.shape[1]
+        anchor = torch.stack([x["anchor_x_m"], x["anchor_y_m"], x["anchor_z_m"]], dim=-1)
+        way = anchor - terms.p_GB
+        distance = torch.sqrt((way * way).sum(-1, keepdim=True) + NEAR * NEAR)
+        return force + x["force_n"][..., None] / rods * way / distance, torque

@@ -26,6 +26,10 @@ FLOOR = GroupSpec(
         AttributeSpec(name="heading_end", type="float", unit="rad", required=False, description="from repeats of the runs"),
         AttributeSpec(name="segment", type="float", unit="s", required=False, description="duration of a target interval, from repeats"),
         AttributeSpec(name="keyframe_cap", type="float", unit="m", required=False, description="from floor.h5"),
+        AttributeSpec(name="path", type="float", unit="m", required=False, description="centre of mass along the run, from repeats of the runs"),
+        AttributeSpec(name="cap", type="float", unit="m", required=False, description="caps along the run, from repeats of the runs"),
+        AttributeSpec(name="gait", type="float", unit="m", required=False,
+                      description="caps at the end of an interval, laid on each other at its start, from repeats of the runs"),
     ),
 )  # fmt: skip
 
@@ -35,6 +39,7 @@ RUN = GroupSpec(
     required=True,
     attributes=(
         AttributeSpec(name="policy", type="str", description="name of the policy"),
+        AttributeSpec(name="iteration", type="int", required=False, description="in which it was run"),
         AttributeSpec(name="robot", type="str", description="name of the robot description"),
     ),
 )  # fmt: skip

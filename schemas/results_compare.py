@@ -20,6 +20,9 @@ class CompareFloor(Frozen):
     heading_end_rad: float | None
     segment_s: float | None
     keyframe_cap_m: float | None
+    path_m: float | None = None
+    cap_m: float | None = None
+    gait_m: float | None = None
 
 
 class CompareRepeatability(Frozen):
@@ -48,6 +51,9 @@ class CompareRun(Frozen):
 
     run: str
     policy: str
+    """With the iteration before it where the run is of an earlier one: `001-straight`."""
+    iteration: int
+    """In which it was run."""
     model: str
     trained_on: bool
     """The simulator's numbers were learned from this run: no claim of accuracy rests on it."""
@@ -61,6 +67,8 @@ class CompareRun(Frozen):
     """In closed loop, at equal shares of each target interval."""
     path_error_m: float | None
     """Of the centre of mass over the ground, the same way."""
+    gait_m: float | None
+    """Of the caps at the end of each target interval, both laid on each other at its start."""
     segment_s: float | None
     """Root mean square difference of the durations of the target intervals."""
     duration_s: Durations | None
@@ -80,17 +88,22 @@ class CompareMeasure(Frozen):
     floor: float | None
     gap: float | None
     """sqrt(max(0, rms^2 - floor^2)); None without a floor."""
+    change: float | None
+    """rms less that of the first simulator, over the runs that both have; None for the first one."""
+    change_lower: float | None
+    change_upper: float | None
+    """Its 95 % interval by bootstrap over runs (None: fewer than two)."""
     runs: int
 
 
 class CompareModel(Frozen):
-    """One simulator over all runs, and over those it was not trained on."""
+    """One simulator over the runs of the iteration, and over those that no simulator of the comparison was trained on."""
 
     model: str
     words: str
     """Where its numbers come from."""
     runs: dict[str, CompareMeasure]
-    """By measure: com_end_m, heading_end_rad, keyframe_cap_m, cap_m, path_m, segment_s."""
+    """By measure: com_end_m, heading_end_rad, keyframe_cap_m, cap_m, path_m, gait_m, segment_s."""
     heldout: dict[str, CompareMeasure]
     srcc_com: float | None
     """Spearman's rank correlation with the robot over gaits: of how far the centre of mass came."""
@@ -99,11 +112,43 @@ class CompareModel(Frozen):
     gaits: int
 
 
+class ComparePolicy(Frozen):
+    """One policy under one simulator, its repeats together: a column of the paper's Table II."""
+
+    policy: str
+    iteration: int
+    model: str
+    """Empty: the real robot."""
+    trained_on: bool
+    runs: int
+    com_m: tuple[float, float] | None
+    """Mean end of the centre of mass, along and across the heading at the start."""
+    turn_rad: float | None
+    com_error_m: float | None
+    """Root mean square over the runs; None for the real robot."""
+    turn_error_rad: float | None
+
+
+class CompareHistory(Frozen):
+    """One simulator over the runs of one iteration, each beside the floor of that iteration's repeats."""
+
+    iteration: int
+    model: str
+    trained_on: bool
+    """It was trained on some of these runs."""
+    runs: dict[str, CompareMeasure]
+
+
 class CompareReport(Frozen):
     """All runs under all simulators."""
 
+    iteration: int
     runs: tuple[CompareRun, ...]
+    """Those of the iteration first, then those of earlier ones."""
     models: tuple[CompareModel, ...]
+    policies: tuple[ComparePolicy, ...]
+    history: tuple[CompareHistory, ...]
+    """The same runs under better and better simulators: by iteration of the runs, then in the order of the simulators."""
     repeatability: tuple[CompareRepeatability, ...]
     floor: CompareFloor
     warnings: tuple[str, ...] = ()

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from r2s2r_cli.artifact import ArtifactData
     from r2s2r_cli.commands.compare_inputs import Asked
     from schemas.results_compare import CompareReport
+    from schemas.robot import Robot
 
 
 class Of(StrEnum):
@@ -46,6 +47,9 @@ def compare(
         Of | None,
         typer.Option("--of", help="Runs of 51-estimate.h5 (execute) or 20-estimate.h5. Default: executed, if any."),
     ] = None,
+    own: Annotated[
+        bool, typer.Option("--own", help="Without the executed runs of earlier iterations, which are compared as well.")
+    ] = False,
     project: ProjectOption = None,
     iteration: IterationOption = None,
     json: JsonOption = False,
@@ -57,7 +61,8 @@ def compare(
     """Compare real runs with the same policies in the simulator: ends, headings, paths, caps, times, ranking of gaits.
 
     Every policy is simulated with the controller in the loop from the real start; key frames are by command replay.
-    Each error stands beside the floor: what a perfect simulator would be found to be wrong by.
+    Each error stands beside the floor: what a perfect simulator would be found to be wrong by. From the second
+    iteration on the executed runs of the earlier ones are compared as well: how the gap went.
 
     Example: r2s2r compare --iteration 2
     """
@@ -69,12 +74,14 @@ def compare(
     here = Project.find(project)
     place = here.iteration(iteration)
     executed = place.artifact("estimate", executed=True).exists() if of is None else of is Of.EXECUTE
-    asked = Asked(here, place, tuple(model or ()), "execute" if executed else "record")
+    asked = Asked(here, place, tuple(model or ()), "execute" if executed else "record", own)
     run = StageRun(
         stage="compare", kind="comparison", project=here, iteration=place, find_inputs=asked.refs,
         report_model=CompareReport, flags=asked.flags(), dry_run=dry_run, force=force,
     )  # fmt: skip
-    result, report = run.run(lambda: _compute(asked, console), (lambda data, said: _draw(data, said)) if draw else None)
+    result, report = run.run(
+        lambda: _compute(asked, console), (lambda data, said: _draw(data, said, here.robot())) if draw else None
+    )
     show_outcome(result, console)
     if report is not None:
         _show(report, console)
@@ -84,30 +91,38 @@ def _compute(asked: Asked, console: Console) -> tuple[ArtifactData, CompareRepor
     from r2s2r_cli.commands.interrupts import loaded
 
     stage = loaded("r2s2r_cli.stages.compare")
-    (runs, left_out), models = asked.runs(), asked.simulators()
+    (runs, left_out), (models, stale) = asked.runs(), asked.simulators()
     settings = asked.project.config(asked.iteration, {}).simulate
     with console.progress("compare, runs", len(runs) * len(models)) as advance:
         data, report = stage.compare(
             runs, models, settings, keyframe_floor_m=asked.keyframe_floor(), cache_dir=asked.project.cache,
             done=lambda: advance(1),
         )  # fmt: skip
-    return data, report.model_copy(update={"warnings": (*left_out, *report.warnings)})
+    return data, report.model_copy(update={"warnings": (*left_out, *stale, *report.warnings)})
 
 
-def _draw(data: ArtifactData, report: CompareReport) -> Iterator[tuple[str, bytes]]:
+def _draw(data: ArtifactData, report: CompareReport, robot: Robot) -> Iterator[tuple[str, bytes]]:
     from r2s2r_cli.views.compare import draw_comparison
+    from r2s2r_cli.views.compare_history import draw_history
     from r2s2r_cli.views.compare_page import comparison_page
+    from r2s2r_cli.views.compare_strip import draw_strips
 
-    pictures = dict(draw_comparison(data))
+    pictures, strips = dict(draw_comparison(data)), dict(draw_strips(data, robot))
     for run, png in pictures.items():
         yield f"-{run}.png", png
-    yield ".html", comparison_page(report, pictures)
+    for run, png in strips.items():
+        yield f"-{run}-frames.png", png
+    history = draw_history(report)
+    if history is not None:
+        yield "-history.png", history
+    yield ".html", comparison_page(report, data, robot, pictures, strips, history)
 
 
 def _show(report: CompareReport, console: Console) -> None:
-    from r2s2r_cli.views.compare_page import comparison_tables
+    from r2s2r_cli.views.compare_tables import comparison_tables, verdict
 
     for table in comparison_tables(report):
         console.table(table.title, table.columns, table.rows)
+    console.data(verdict(report))
     for text in report.warnings:
         console.warn(text)

@@ -1,4 +1,4 @@
-"""What `compare` was asked for: real runs of an iteration, simulators by their names; as inputs and values."""
+"""What `compare` was asked for: real runs of the iterations, simulators by their names; as inputs and values."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from r2s2r_cli.commands.compare_models import learned_names, require_current
 from r2s2r_cli.commands.stage import require_input
-from r2s2r_cli.errors import UsageError
+from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
 
 if TYPE_CHECKING:
-    from r2s2r_cli.artifact import ArtifactData, Group
+    from r2s2r_cli.artifact import ArtifactData
     from r2s2r_cli.stages.compare import Model, RealRun
 
 INITIAL = "initial"
@@ -25,26 +26,38 @@ TRAIN = 1
 @dataclass(frozen=True)
 class Asked:
     """The request of one command line. models: as typed, FILE or NAME=FILE; empty: robot.toml and every identification
-    up to this iteration. of: `record` or `execute`."""
+    up to this iteration. of: `record` or `execute`. own: without the executed runs of earlier iterations."""
 
     project: Project
     iteration: Iteration
     models: tuple[str, ...]
     of: str
+    own: bool = False
 
     def flags(self) -> dict[str, Any]:
         """What else than settings and inputs decides the result, for the provenance."""
-        return {"models": {name: self.project.relative(path) for name, path in self.files.items()}, "of": self.of}
+        models = {name: self.project.relative(path) for name, path in self.files.items()}
+        return {"models": models, "of": self.of, "own": self.own}
 
-    @property
-    def estimate(self) -> Path:
+    @cached_property
+    def places(self) -> tuple[Iteration, ...]:
+        """Iterations whose runs are compared: this one, then earlier ones with executed runs, the first one first."""
+        if self.own or self.of != "execute":
+            return (self.iteration,)
+        earlier = [one for one in self.project.iterations() if one.number < self.iteration.number]
+        return self.iteration, *(one for one in earlier if one.artifact("estimate", executed=True).exists())
+
+    def estimate(self, place: Iteration) -> Path:
         """The states of the real runs."""
-        return self.iteration.artifact("estimate", executed=self.of == "execute")
+        return place.artifact("estimate", executed=self.of == "execute")
 
-    @property
-    def recording(self) -> Path:
+    def recording(self, place: Iteration) -> Path:
         """What they were made of."""
-        return self.iteration.artifact("recording", executed=self.of == "execute")
+        return place.artifact("recording", executed=self.of == "execute")
+
+    def prefix(self, place: Iteration) -> str:
+        """Before the names of its runs: those of other iterations may have the same."""
+        return "" if place == self.iteration else f"{place.number:03d}-"
 
     @property
     def floor(self) -> Path:
@@ -75,61 +88,73 @@ class Asked:
         from r2s2r_cli.store.staleness import artifact_ref
 
         number = self.iteration.number
-        require_input(self.estimate, f"r2s2r estimate --iteration {number}" + " --of execute" * (self.of == "execute"))
+        require_input(
+            self.estimate(self.iteration),
+            f"r2s2r estimate --iteration {number}" + " --of execute" * (self.of == "execute"),
+        )
         for path in self.files.values():
             require_input(path, "r2s2r identify")
-        others = [path for path in (self.recording, self.floor) if path.exists()]
+        states = [self.estimate(place) for place in self.places]
+        others = [path for path in (*map(self.recording, self.places), self.floor) if path.exists()]
         return [
-            artifact_ref(self.project, path, whole_header(path))
-            for path in (self.estimate, *others, *self.files.values())
+            artifact_ref(self.project, path, whole_header(path)) for path in (*states, *others, *self.files.values())
         ]
 
     def runs(self) -> tuple[tuple[RealRun, ...], tuple[str, ...]]:
-        """The real runs, and why others are left out. Raises ArtifactError, InputError."""
+        """The real runs, those of this iteration first, and why others are left out. Raises ArtifactError, and
+        InputError where this iteration has none."""
         from r2s2r_cli.stages.compare import real_runs
         from r2s2r_cli.store.read import read_artifact
 
-        recording = read_artifact(self.recording, "recording")[1] if self.recording.exists() else None
-        return real_runs(self._states, recording, self.project.robot())
+        found: list[RealRun] = []
+        said: list[str] = []
+        for place in self.places:
+            path = self.recording(place)
+            recording = read_artifact(path, "recording")[1] if path.exists() else None
+            try:
+                runs, left_out = real_runs(
+                    self._states[place.number], recording, self.project.robot(), iteration=place.number,
+                    prefix=self.prefix(place),
+                )  # fmt: skip
+            except InputError as error:
+                if place == self.iteration:
+                    raise
+                said.append(f"the runs of iteration {place.number} are left out: {error.what}")
+                continue
+            found += runs
+            said += left_out
+        return tuple(found), tuple(said)
 
-    def simulators(self) -> tuple[Model, ...]:
-        """The simulators, that of robot.toml first. Raises ArtifactError, InputError."""
+    def simulators(self) -> tuple[tuple[Model, ...], tuple[str, ...]]:
+        """The simulators, that of robot.toml first, and what is stale about them. Raises ArtifactError, InputError."""
         from r2s2r_cli.stages.compare import Model
         from r2s2r_cli.stages.identified import identified, nominal
         from r2s2r_cli.store.read import read_artifact
 
         robot = self.project.robot()
-        found = [Model(INITIAL, nominal(robot))]
+        found, said = [Model(INITIAL, nominal(robot))], []
         for name, path in self.files.items():
             header, data = read_artifact(path, "identification")
-            used = {ref.path for ref in header.provenance.inputs}
-            trained: frozenset[str] = frozenset()
-            if self.project.relative(self.estimate) in used:
-                segments = data.groups["segments"]
-                roles = zip(segments["run"].tolist(), segments["role"].tolist(), strict=True)
-                trained = self._own({run.decode() for run, role in roles if role == TRAIN}, segments)
-            found.append(Model(name, identified(data, robot, words=self.project.relative(path)), trained))
-        return tuple(found)
-
-    def _own(self, trained: set[str], segments: Group) -> frozenset[str]:
-        """Of the runs that were trained on, by the names that `identify` gave them, those of this estimate, by theirs.
-
-        There a run of another iteration is called NNN-RUN, and an executed one executed-RUN where both have one name.
-        """
-        known = {run.decode() for run in segments["run"].tolist()}
-        found = set()
-        for run in self._states.runs():
-            plain = {run, f"{self.iteration.number:03d}-{run}"}
-            marked = {f"executed-{name}" for name in plain}
-            if (marked if self.of == "execute" and marked & known else plain) & trained:
-                found.add(run)
-        return frozenset(found)
+            said += [f"simulator {name}: {text}" for text in require_current(self.project, name, path, header)]
+            called = learned_names(self.project, header)
+            segments = data.groups["segments"]
+            roles = zip(segments["run"].tolist(), segments["role"].tolist(), strict=True)
+            trained = {run.decode() for run, role in roles if role == TRAIN}
+            here = frozenset(
+                self.prefix(place) + run
+                for place in self.places
+                for run in self._states[place.number].runs()
+                if called.get((self.project.relative(self.estimate(place)), run)) in trained
+            )
+            found.append(Model(name, identified(data, robot, words=self.project.relative(path)), here))
+        return tuple(found), tuple(said)
 
     @cached_property
-    def _states(self) -> ArtifactData:
+    def _states(self) -> dict[int, ArtifactData]:
+        """The estimates by number of their iteration."""
         from r2s2r_cli.store.read import read_artifact
 
-        return read_artifact(self.estimate, "estimate")[1]
+        return {place.number: read_artifact(self.estimate(place), "estimate")[1] for place in self.places}
 
     def keyframe_floor(self) -> float | None:
         """Of the caps at key frames [m], from floor.h5; None where there is none."""

@@ -30,12 +30,12 @@ def playback_page(page: Page, data: ArtifactData, robot: Robot) -> bytes:
     from jinja2 import Environment, StrictUndefined
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    packed = json.dumps(playback_data(data, robot), separators=(",", ":"), ensure_ascii=True)
-    text = environment.from_string(_file("playback.html")).render(
+    values = json.dumps(playback_data(data, robot), separators=(",", ":"), ensure_ascii=True)
+    text = environment.from_string(template("playback.html")).render(
         page=page,
         encoded=lambda png: base64.b64encode(png).decode(),
-        data=packed.replace("<", "\\u003c"),  # a name must not end the script element
-        scripts="\n".join(_file(name) for name in _SCRIPTS),
+        data=values.replace("<", "\\u003c"),  # a name must not end the script element
+        scripts="\n".join(template(name) for name in _SCRIPTS),
     )
     return text.encode()
 
@@ -46,7 +46,8 @@ def playback_data(data: ArtifactData, robot: Robot) -> dict[str, Any]:
     return {"robot": _robot(robot), "runs": [_run(data, run, robot, share) for run in data.runs()]}
 
 
-def _file(name: str) -> str:
+def template(name: str) -> str:
+    """A file of the templates beside the views."""
     return resources.files("r2s2r_cli.views").joinpath("templates", name).read_text("utf-8")
 
 
@@ -78,15 +79,15 @@ def _run(data: ArtifactData, run: str, robot: Robot, share: float) -> dict[str, 
     return {
         "name": run,
         "title": f"{run}: {facts['policy']}, {facts['control']}",
-        "t": _packed(frames["t"][rows] - frames["t"][0], "<f4"),
+        "t": packed(frames["t"][rows] - frames["t"][0], "<f4"),
         "scale": scale,
-        "p": _packed(np.round(p_WR / scale), "<i2"),
-        "q": _packed(np.round(_INT16 * frames["q_WR"][rows]), "<i2"),
+        "p": packed(np.round(p_WR / scale), "<i2"),
+        "q": packed(np.round(_INT16 * frames["q_WR"][rows]), "<i2"),
         "top": top,
-        "tension": _packed(levels, "u1"),
-        "spare": _packed(spare, "u1"),
-        "contact": _packed(np.packbits(frames["contact"][rows], axis=1, bitorder="little"), "u1"),
-        "control": _packed(np.round(_SIGNED * _control(data.group(run, "commands"), frames["t"][rows], robot)), "i1"),
+        "tension": packed(levels, "u1"),
+        "spare": packed(spare, "u1"),
+        "contact": packed(np.packbits(frames["contact"][rows], axis=1, bitorder="little"), "u1"),
+        "control": packed(np.round(_SIGNED * _control(data.group(run, "commands"), frames["t"][rows], robot)), "i1"),
         "intervals": _intervals(data.group(run, "intervals"), float(frames["t"][0])),
     }
 
@@ -122,5 +123,6 @@ def _intervals(intervals: Group | None, start: float) -> list[dict[str, Any]]:
     return [{"start": float(a) - start, "end": float(b) - start, "target": x.round(4).tolist()} for a, b, x in spans]
 
 
-def _packed(values: np.ndarray, dtype: str) -> str:
+def packed(values: np.ndarray, dtype: str) -> str:
+    """As base64, row after row."""
     return base64.b64encode(np.ascontiguousarray(values.astype(dtype)).tobytes()).decode("ascii")

@@ -72,7 +72,7 @@ def test_the_pictures_and_the_page_show_the_run(walked: Path) -> None:
     folder = walked / "iterations" / "001"
     assert (folder / "60-compare-gait.png").read_bytes().startswith(b"\x89PNG")
     page = (folder / "60-compare.html").read_text()
-    assert "Table II of the paper" in page
+    assert "Table II, runs of iteration 1" in page
     assert "http" not in page.replace("http://www.w3.org", "")
 
 

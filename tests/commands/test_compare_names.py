@@ -1,36 +1,90 @@
-"""Which runs of an estimate a simulator has learned from, whatever `identify` called them."""
+"""Which runs of an estimate a simulator has learned from, whatever `identify` called them; and which one is stale."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from r2s2r_cli.artifact import Group
-from r2s2r_cli.commands.compare_inputs import Asked
+from r2s2r_cli.commands.compare_models import learned_names, require_current
+from r2s2r_cli.errors import InputError
+from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
+from schemas.header import Header, InputRef
+
+SHA = "0" * 64
+
+
+def header(project: Path, *estimates: str, **changed: object) -> Header:
+    """That of an identification from these estimates, in the order in which `identify` read them."""
+    found = read_header(project / "iterations" / "001" / "20-estimate.h5")
+    refs = tuple(InputRef(path=path, kind="estimate", sha256=SHA) for path in estimates)
+    made = found.provenance.model_copy(update={"stage": "identify", "inputs": refs, "robot": {}, **changed})
+    return found.model_copy(update={"provenance": made})
+
+
+@pytest.fixture
+def looped(estimated: Path) -> Project:
+    """The sample estimated in both iterations, recorded and executed."""
+    source = estimated / "iterations" / "001" / "20-estimate.h5"
+    for number in ("001", "002"):
+        for name in ("20-estimate.h5", "51-estimate.h5"):
+            path = estimated / "iterations" / number / name
+            path.parent.mkdir(exist_ok=True)
+            path.write_bytes(source.read_bytes())
+    return Project.find(estimated)
 
 
 @pytest.mark.parametrize(
-    ("of", "trained", "known", "wanted"),
+    ("read", "wanted"),
     [
-        ("record", {"sample"}, ["sample"], {"sample"}),
-        ("record", {"001-sample"}, ["001-sample", "walk"], {"sample"}),
-        ("record", {"executed-sample"}, ["sample", "executed-sample"], set()),
-        ("execute", {"executed-sample"}, ["sample", "executed-sample"], {"sample"}),
-        ("execute", {"sample"}, ["sample", "executed-sample"], set()),
-        ("execute", {"sample"}, ["sample"], {"sample"}),
-        ("execute", {"executed-001-sample"}, ["001-sample", "executed-001-sample"], {"sample"}),
+        (["001/20"], {"001/20": "sample"}),
+        (["001/20", "001/51"], {"001/20": "sample", "001/51": "executed-sample"}),
+        (["001/51"], {"001/51": "sample"}),
+        (["002/51", "001/20", "001/51"],
+         {"002/51": "sample", "001/20": "001-sample", "001/51": "executed-001-sample"}),
     ],
-)
-def test_a_run_is_held_out_only_if_it_was_not_trained_on(
-    estimated: Path, of: str, trained: set[str], known: list[str], wanted: set[str]
+)  # fmt: skip
+def test_runs_are_found_under_the_names_that_identify_gave_them(
+    looped: Project, read: list[str], wanted: dict[str, str]
 ) -> None:
-    """Names of other iterations and of executed runs carry a prefix there."""
-    project = Project.find(estimated)
-    folder = estimated / "iterations" / "001"
-    (folder / "51-estimate.h5").write_bytes((folder / "20-estimate.h5").read_bytes())
-    asked = Asked(project, project.iteration(1), (), of)
-    segments = Group({"run": np.array([name.encode() for name in known])})
-    assert asked._own(trained, segments) == wanted
+    """Those of other iterations carry its number, executed ones a word where the name is taken."""
+    paths = [f"iterations/{name}-estimate.h5" for name in read]
+    found = learned_names(looped, header(looped.root, *paths))
+    assert found == {(f"iterations/{key}-estimate.h5", "sample"): name for key, name in wanted.items()}
+
+
+def test_an_estimate_that_is_gone_is_not_looked_into(looped: Project) -> None:
+    """Its runs cannot be compared either."""
+    found = learned_names(looped, header(looped.root, "iterations/007/20-estimate.h5"))
+    assert found == {}
+
+
+def test_numbers_of_another_robot_or_version_are_refused(looped: Project) -> None:
+    """Exit code 4, what differs, and the command that mends it."""
+    from r2s2r_cli.commands.stage import robot_part
+
+    path = looped.root / "iterations" / "001" / "30-identify.h5"
+    part = robot_part("identify", looped.robot())
+    fresh = header(looped.root, robot=part)
+    assert require_current(looped, "refined", path, fresh) == []
+    other = {**part, "name": "sixbar"}
+    with pytest.raises(InputError) as caught:
+        require_current(looped, "refined", path, header(looped.root, robot=other))
+    assert "refined is stale" in caught.value.what
+    assert "name was 'sixbar', is 'threebar'" in str(caught.value.received)
+    assert caught.value.hint == "r2s2r identify --iteration 1"
+    with pytest.raises(InputError, match="stale") as caught:
+        require_current(looped, "refined", path, header(looped.root, robot=part, stage_version=99))
+    assert "version 99" in str(caught.value.received)
+
+
+def test_changed_inputs_are_told_and_do_not_stop_it(looped: Project) -> None:
+    """Another estimate since does not make it another simulator; of another project nothing can be said."""
+    from r2s2r_cli.commands.stage import robot_part
+
+    part = robot_part("identify", looped.robot())
+    one = header(looped.root, "iterations/001/20-estimate.h5", robot=part)
+    (said,) = require_current(looped, "refined", looped.root / "iterations" / "001" / "30-identify.h5", one)
+    assert "iterations/001/20-estimate.h5 changed" in said
+    assert require_current(looped, "refined", looped.root.parent / "elsewhere.h5", one) == []

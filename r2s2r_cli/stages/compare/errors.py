@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from r2s2r_cli.stages.compare.repeats import gait_ends
 from r2s2r_cli.stages.compare.walk import Walk
 
 
@@ -44,7 +45,7 @@ def run_errors(real: Walk, simulated: Walk) -> RunErrors:
         path=float(np.sqrt(np.mean(np.sum(com**2, axis=-1)))),
         cap=float(np.sqrt(np.mean(rms**2))),
         segment_end=rms[:, -1],
-        gait=_within(real, laid),
+        gait=_within(real, simulated),
         duration_real=real.durations,
         duration_sim=laid.durations,
     )
@@ -59,16 +60,5 @@ def heading_difference(one: Walk, other: Walk) -> float | None:
 
 def _within(real: Walk, simulated: Walk) -> np.ndarray:
     """RMS cap distance at the end of each interval, both laid on each other at its first frame, (interval,) [m]."""
-    found = []
-    for k in range(len(real.intervals)):
-        parts = [_interval(walk, k) for walk in (real, simulated)]
-        end = parts[1].laid_on(parts[0]).p_WE[-1] - parts[0].p_WE[-1]
-        found.append(np.sqrt(np.mean(np.sum(end**2, axis=-1))))
-    return np.array(found)
-
-
-def _interval(walk: Walk, k: int) -> Walk:
-    """Start and end of one interval as a walk of two frames."""
-    begin = int(walk.intervals.first[k])
-    pair = np.stack([walk.p_WE[begin], walk.at_phase[k, -1]])
-    return Walk(np.array([0.0, 1.0]), pair, walk.share, walk.intervals)
+    away = gait_ends(simulated, real) - real.at_phase[:, -1]
+    return np.asarray(np.sqrt(np.mean(np.sum(away**2, axis=-1), axis=-1)))

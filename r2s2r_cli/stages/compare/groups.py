@@ -19,7 +19,8 @@ def comparison_groups(
 ) -> dict[str, Group]:
     """All groups by path."""
     floor = {"com_end": report.floor.com_end_m, "heading_end": report.floor.heading_end_rad,
-             "segment": report.floor.segment_s, "keyframe_cap": report.floor.keyframe_cap_m}  # fmt: skip
+             "segment": report.floor.segment_s, "keyframe_cap": report.floor.keyframe_cap_m,
+             "path": report.floor.path_m, "cap": report.floor.cap_m, "gait": report.floor.gait_m}  # fmt: skip
     groups = {
         "models": Group({
             "name": _texts([model.name for model in models]),
@@ -33,7 +34,7 @@ def comparison_groups(
         mine = [one for one in compared if one.real.name == run.name]
         root = f"runs/{run.name}"
         robot = mine[0].model.numbers.robot.name if mine else ""
-        groups[root] = Group(attributes={"policy": run.policy, "robot": robot})
+        groups[root] = Group(attributes={"policy": run.policy, "robot": robot, "iteration": run.iteration})
         groups[f"{root}/real"] = _real(run)
         groups[f"{root}/simulated"] = _simulated(run, mine)
     return groups

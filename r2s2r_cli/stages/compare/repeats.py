@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.stages.compare.walk import Walk, same_targets
+from r2s2r_cli.stages.measures.align import planar
 from r2s2r_cli.stages.measures.floor import contrast_squares
 
 
@@ -30,11 +31,15 @@ class Repeatability:
 @dataclass(frozen=True)
 class Floors:
     """What a perfect simulator would be found to be wrong by, in a single run: root mean square of the repeats about
-    their mean. com [m], heading [rad], segment: duration of an interval [s]. None: nothing repeats."""
+    their mean. com, path, cap, gait as in `RunErrors` [m]; heading [rad]; segment: duration of an interval [s].
+    None: nothing repeats."""
 
     com: float | None = None
     heading: float | None = None
     segment: float | None = None
+    path: float | None = None
+    cap: float | None = None
+    gait: float | None = None
 
 
 def grouped(walks: Mapping[str, Walk], policies: Mapping[str, str]) -> dict[str, list[str]]:
@@ -60,15 +65,31 @@ def repeatability(walks: Mapping[str, Walk], policies: Mapping[str, str]) -> tup
 def floors(walks: Mapping[str, Walk], policies: Mapping[str, str]) -> Floors:
     """Over all policies with at least two runs; every orthogonal contrast of repeats counts once."""
     com, turn, segment = [], [], []
+    path, cap, gait = [], [], []
     for runs in grouped(walks, policies).values():
         group = [walks[name] for name in runs]
         com.append(contrast_squares(np.array([ended(walk) for walk in group])[:, None, :]))
+        at = np.array([walk.laid_on(group[0]).at_phase for walk in group])
+        caps = at.reshape(len(group), -1, 3)
+        cap.append(contrast_squares(caps))
+        middle = np.einsum("c,ripcx->ripx", group[0].share, at)[..., :2]
+        path.append(contrast_squares(middle.reshape(len(group), -1, 2)))
+        ends = np.array([gait_ends(walk, group[0]) for walk in group])
+        gait.append(contrast_squares(ends.reshape(len(group), -1, 3)))
         turns = [turned(walk) for walk in group]
         if all(one is not None for one in turns):
             turn.append(contrast_squares(np.array(turns, dtype=float)[:, None, None]))
         lasted = np.array([walk.durations for walk in group])
         segment.append(contrast_squares(lasted[:, :, None]))
-    return Floors(*(_rms(one) for one in (com, turn, segment)))
+    return Floors(*(_rms(one) for one in (com, turn, segment, path, cap, gait)))
+
+
+def gait_ends(walk: Walk, onto: Walk) -> np.ndarray:
+    """Caps at the end of each interval, laid on `onto` at the interval's start, (interval, cap, 3) [m]."""
+    return np.array([
+        planar(walk.p_WE[walk.intervals.first[k]], onto.p_WE[onto.intervals.first[k]]).move(walk.at_phase[k, -1])
+        for k in range(len(walk.intervals))
+    ])  # fmt: skip
 
 
 def ended(walk: Walk) -> np.ndarray:

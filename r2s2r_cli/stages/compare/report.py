@@ -1,32 +1,30 @@
-"""The comparison in figures: each run under each simulator, and each simulator over all runs."""
+"""The comparison in figures: each run, each policy and each simulator, and how the gap went over the iterations."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from r2s2r_cli.stages.compare.errors import RunErrors
+from r2s2r_cli.stages.compare.figures import floor_of, measures
 from r2s2r_cli.stages.compare.predicted import Model, PredictedRun
 from r2s2r_cli.stages.compare.ranking import LEAST, ranking
-from r2s2r_cli.stages.compare.repeats import Floors, Repeatability, ended, floors, repeatability, turned
+from r2s2r_cli.stages.compare.repeats import Repeatability, ended, repeatability, turned
 from r2s2r_cli.stages.compare.runs import RealRun, policies_of
 from r2s2r_cli.stages.compare.walk import Walk
-from r2s2r_cli.stages.measures.bootstrap import bootstrap
-from r2s2r_cli.stages.measures.gap import corrected_gap
 from schemas.results_compare import (
     CompareEnd,
     CompareFloor,
-    CompareMeasure,
+    CompareHistory,
     CompareModel,
+    ComparePolicy,
     CompareRepeatability,
     CompareReport,
     CompareRun,
     Durations,
 )
-
-MEASURES = ("com_end_m", "heading_end_rad", "keyframe_cap_m", "cap_m", "path_m", "segment_s")
 
 
 @dataclass(frozen=True)
@@ -47,23 +45,27 @@ class Compared:
 def report_of(
     runs: Sequence[RealRun], models: Sequence[Model], compared: Sequence[Compared], keyframe_floor_m: float | None
 ) -> CompareReport:
-    """See `schemas/results_compare.py`."""
+    """See `schemas/results_compare.py`. runs: those of the iteration first."""
     walks, policies = {run.name: run.walk for run in runs}, policies_of(runs)
-    known = floors(walks, policies)
-    floor = _floor(known, keyframe_floor_m)
+    numbers = list(dict.fromkeys(run.iteration for run in runs))
+    floor = {number: _floor(runs, number, keyframe_floor_m) for number in numbers}
     repeats = {one.policy: _repeatability(one) for one in repeatability(walks, policies)}
+    rows = [_run(one, floor[one.real.iteration], repeats.get(one.real.policy)) for one in compared]
     warnings = [text for one in compared for text in one.predicted.warnings]
-    if known.com is None:
+    if floor[numbers[0]].com_end_m is None:
         warnings.append(
             "no policy was run twice: where the floor of an end is unknown, an error may be the robot's own scatter"
         )
+    seen = {name for model in models for name in model.trained_on}
     return CompareReport(
-        runs=tuple(_run(one, floor, repeats.get(one.real.policy)) for one in compared),
-        models=tuple(_model(model, compared, walks, floor) for model in models),
-        repeatability=tuple(repeats.values()),
-        floor=floor,
-        warnings=tuple(dict.fromkeys(warnings)),
-    )
+        iteration=numbers[0], runs=tuple(rows),
+        models=tuple(_model(model, models[0], compared, rows, seen, floor[numbers[0]]) for model in models),
+        policies=tuple(_policies(runs, models, rows)),
+        history=tuple(
+            _history(number, model, models[0], rows, floor[number]) for number in sorted(numbers) for model in models
+        ),
+        repeatability=tuple(repeats.values()), floor=floor[numbers[0]], warnings=tuple(dict.fromkeys(warnings)),
+    )  # fmt: skip
 
 
 def end_of(walk: Walk) -> CompareEnd:
@@ -72,17 +74,30 @@ def end_of(walk: Walk) -> CompareEnd:
     return CompareEnd(com_m=(float(along), float(across)), turn_rad=turned(walk))
 
 
+def _floor(runs: Sequence[RealRun], iteration: int, keyframe_m: float | None) -> CompareFloor:
+    """From the repeats of that iteration; of a measure that has none there, from the repeats of all iterations."""
+    own, every = (
+        floor_of({run.name: run.walk for run in part}, policies_of(part), keyframe_m)
+        for part in ([run for run in runs if run.iteration == iteration], runs)
+    )
+    known = {name: value for name, value in own.model_dump().items() if value is not None}
+    return every.model_copy(update=known)
+
+
 def _run(one: Compared, floor: CompareFloor, repeats: CompareRepeatability | None) -> CompareRun:
     errors, seen = one.errors, one.predicted
     return CompareRun(
-        run=one.real.name, policy=one.real.policy, model=one.model.name, trained_on=one.trained_on,
-        intervals=0 if seen.real is None else len(seen.real.intervals),
+        run=one.real.name, policy=one.real.policy, iteration=one.real.iteration, model=one.model.name,
+        trained_on=one.trained_on, intervals=0 if seen.real is None else len(seen.real.intervals),
         com_end_error_m=None if errors is None else errors.com_end,
         heading_end_error_rad=None if errors is None else errors.heading_end,
         keyframe_cap_rmse_m=None if seen.keyframes is None else seen.keyframes.rmse_m,
         cap_rmse_m=None if errors is None else errors.cap,
         path_error_m=None if errors is None else errors.path,
-        segment_s=None if errors is None else _segment(errors),
+        gait_m=None if errors is None else float(np.sqrt(np.mean(errors.gait**2))),
+        segment_s=None if errors is None else float(
+            np.sqrt(np.mean((errors.duration_sim - errors.duration_real) ** 2))
+        ),
         duration_s=None if errors is None else Durations(
             real=float(errors.duration_real.sum()), sim=float(errors.duration_sim.sum())
         ),
@@ -92,70 +107,65 @@ def _run(one: Compared, floor: CompareFloor, repeats: CompareRepeatability | Non
     )  # fmt: skip
 
 
-def _segment(errors: RunErrors) -> float:
-    """Root mean square difference of the durations [s]."""
-    return float(np.sqrt(np.mean((errors.duration_sim - errors.duration_real) ** 2)))
-
-
-def _model(model: Model, compared: Sequence[Compared], walks: dict[str, Walk], floor: CompareFloor) -> CompareModel:
-    mine = [one for one in compared if one.model.name == model.name]
+def _model(
+    model: Model, first: Model, compared: Sequence[Compared], rows: Sequence[CompareRun], seen: set[str],
+    floor: CompareFloor,
+) -> CompareModel:  # fmt: skip
+    """Over the runs of the iteration. seen: runs that some simulator was trained on."""
+    number = rows[0].iteration
+    own, others = ([row for row in rows if row.iteration == number and row.model == one.name] for one in (model, first))
+    others = own if model is first else others
+    fresh, fresh_others = ([row for row in side if row.run not in seen] for side in (own, others))
+    mine = [one for one in compared if one.model is model and one.real.iteration == number]
     simulated = {one.real.name: one.predicted.walk for one in mine if one.predicted.walk is not None}
-    policies = policies_of([one.real for one in mine if one.real.name in simulated])
-    ranks = ranking({name: walks[name] for name in simulated}, simulated, policies)
+    known = [one.real for one in mine if one.real.name in simulated]
+    ranks = ranking({run.name: run.walk for run in known}, simulated, policies_of(known))
     return CompareModel(
-        model=model.name, words=model.numbers.words, runs=_measures(mine, floor),
-        heldout=_measures([one for one in mine if not one.trained_on], floor),
+        model=model.name, words=model.numbers.words, runs=measures(own, others, floor),
+        heldout=measures(fresh, fresh if model is first else fresh_others, floor),
         srcc_com=None if ranks is None else ranks.com, srcc_turn=None if ranks is None else ranks.turn,
-        gaits=len(set(policies.values())) if ranks is None else max(ranks.gaits, LEAST),
+        gaits=len({run.policy for run in known}) if ranks is None else max(ranks.gaits, LEAST),
     )  # fmt: skip
 
 
-def _measures(mine: Sequence[Compared], floor: CompareFloor) -> dict[str, CompareMeasure]:
-    """Each measure that is known of at least one run."""
-    found = {}
-    for name in MEASURES:
-        values = [value for one in mine if (value := _value(one, name)) is not None]
-        if values:
-            found[name] = _measure(np.array(values), _floor_for(name, floor))
-    return found
-
-
-def _value(one: Compared, name: str) -> float | None:
-    """One measure of one run."""
-    if name == "keyframe_cap_m":
-        return None if one.predicted.keyframes is None else one.predicted.keyframes.rmse_m
-    if one.errors is None:
-        return None
-    if name == "segment_s":
-        return _segment(one.errors)
-    return {
-        "com_end_m": one.errors.com_end, "heading_end_rad": one.errors.heading_end, "cap_m": one.errors.cap,
-        "path_m": one.errors.path,
-    }[name]  # fmt: skip
-
-
-def _measure(values: np.ndarray, floor: float | None) -> CompareMeasure:
-    mse = float(np.mean(values**2))
-    interval = bootstrap(values**2)
-    return CompareMeasure(
-        rms=float(np.sqrt(mse)), lower=None if interval is None else interval.lower,
-        upper=None if interval is None else interval.upper, floor=floor,
-        gap=None if floor is None else corrected_gap(mse, floor), runs=len(values),
+def _history(
+    iteration: int, model: Model, first: Model, rows: Sequence[CompareRun], floor: CompareFloor
+) -> CompareHistory:
+    own, others = ([row for row in rows if row.iteration == iteration and row.model == one.name]
+                   for one in (model, first))  # fmt: skip
+    return CompareHistory(
+        iteration=iteration, model=model.name, trained_on=any(row.trained_on for row in own),
+        runs=measures(own, own if model is first else others, floor),
     )  # fmt: skip
 
 
-def _floor_for(name: str, floor: CompareFloor) -> float | None:
-    """The floor of a measure. A run is compared with one simulation, so that of the mean over repeats is not lower."""
-    return {
-        "com_end_m": floor.com_end_m, "heading_end_rad": floor.heading_end_rad, "segment_s": floor.segment_s,
-        "keyframe_cap_m": floor.keyframe_cap_m,
-    }.get(name)  # fmt: skip
+def _policies(runs: Sequence[RealRun], models: Sequence[Model], rows: Sequence[CompareRun]) -> Iterator[ComparePolicy]:
+    """The real robot, then every simulator, policy by policy."""
+    for policy in dict.fromkeys(run.policy for run in runs):
+        mine = [row for row in rows if row.policy == policy]
+        once = [row for row in mine if row.model == models[0].name]
+        yield _policy("", once, [row.real_end for row in once])
+        for model in models:
+            part = [row for row in mine if row.model == model.name]
+            yield _policy(model.name, part, [row.end for row in part if row.end is not None])
 
 
-def _floor(known: Floors, keyframe_m: float | None) -> CompareFloor:
-    return CompareFloor(
-        com_end_m=known.com, heading_end_rad=known.heading, segment_s=known.segment, keyframe_cap_m=keyframe_m
-    )
+def _policy(model: str, rows: Sequence[CompareRun], ends: Sequence[CompareEnd]) -> ComparePolicy:
+    turns = [end.turn_rad for end in ends if end.turn_rad is not None]
+    along, across = np.mean([end.com_m for end in ends], axis=0) if ends else (np.nan, np.nan)
+    return ComparePolicy(
+        policy=rows[0].policy, iteration=rows[0].iteration, model=model, runs=len(rows),
+        trained_on=bool(model) and any(row.trained_on for row in rows),
+        com_m=(float(along), float(across)) if ends else None,
+        turn_rad=float(np.mean(turns)) if turns else None,
+        com_error_m=_rms([row.com_end_error_m for row in rows]) if model else None,
+        turn_error_rad=_rms([row.heading_end_error_rad for row in rows]) if model else None,
+    )  # fmt: skip
+
+
+def _rms(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.sqrt(np.mean(np.square(known)))) if known else None
 
 
 def _repeatability(one: Repeatability) -> CompareRepeatability:

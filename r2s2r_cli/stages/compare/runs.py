@@ -22,10 +22,12 @@ from schemas.robot import Robot
 class RealRun:
     """One executed policy. walk: smoothed, up to the first interval that is not complete; intervals: how many there are
     in all. targets: what the controller was given, rest before and after included.
-    data: what a replay of its commands needs; None where the motor commands were not logged."""
+    data: what a replay of its commands needs; None where the motor commands were not logged.
+    iteration: in which it was run."""
 
     name: str
     policy: str
+    iteration: int
     intervals: int
     walk: Walk
     targets: Targets
@@ -33,16 +35,17 @@ class RealRun:
 
 
 def real_runs(
-    estimate: ArtifactData, recording: ArtifactData | None, robot: Robot
+    estimate: ArtifactData, recording: ArtifactData | None, robot: Robot, *, iteration: int, prefix: str = ""
 ) -> tuple[tuple[RealRun, ...], tuple[str, ...]]:
     """The runs of an estimate that allow a comparison, and why others do not, in words.
 
+    prefix: before the names of runs and policies, where those of several iterations are compared.
     Raises InputError where none does.
     """
     found, refused = [], []
     for run in estimate.runs():
         try:
-            found.append(_run(estimate, recording, run, robot))
+            found.append(_run(estimate, recording, run, robot, iteration, prefix))
         except InputError as error:
             refused.append(error)
     if not found and refused:
@@ -66,7 +69,9 @@ def cap_shares(robot: Robot) -> np.ndarray:
     return np.asarray((np.stack([1 - odd, odd], axis=1) * mass[:, None]).reshape(-1) / mass.sum())
 
 
-def _run(estimate: ArtifactData, recording: ArtifactData | None, run: str, robot: Robot) -> RealRun:
+def _run(
+    estimate: ArtifactData, recording: ArtifactData | None, run: str, robot: Robot, iteration: int, prefix: str
+) -> RealRun:
     groups = dict(estimate.streams(run))
     told = str(groups[""].attributes.get("robot", robot.name))
     if told != robot.name:
@@ -75,10 +80,11 @@ def _run(estimate: ArtifactData, recording: ArtifactData | None, run: str, robot
     frames = groups["frames"]
     intervals = _intervals(groups, run, frames)
     return RealRun(
-        name=run, policy=_policy(groups[""], run), intervals=len(groups["intervals"]["first"]),
+        name=prefix + run, policy=prefix + _policy(groups[""], run), iteration=iteration,
+        intervals=len(groups["intervals"]["first"]),
         walk=Walk(frames["t"], frames["p_WE"], cap_shares(robot), intervals),
         targets=_targets(estimate, recording, run, intervals, robot),
-        data=_data(estimate, recording, run),
+        data=_data(estimate, recording, run, prefix + run),
     )  # fmt: skip
 
 
@@ -114,9 +120,9 @@ def _targets(
     return Targets(intervals.target, none, none + robot.pid.step_timeout_s)
 
 
-def _data(estimate: ArtifactData, recording: ArtifactData | None, run: str) -> RunData | None:
+def _data(estimate: ArtifactData, recording: ArtifactData | None, run: str, name: str) -> RunData | None:
     try:
-        return run_data(recording, estimate, run)
+        return run_data(recording, estimate, run, name=name)
     except InputError:
         return None  # without motor commands there is nothing to replay; the closed loop is compared
 

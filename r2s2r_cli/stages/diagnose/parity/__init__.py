@@ -7,3 +7,4 @@ from r2s2r_cli.stages.diagnose.parity.finding import (
     Parity as Parity,
     Suspicion as Suspicion,
 )
+from r2s2r_cli.stages.diagnose.parity.parity import parity as parity

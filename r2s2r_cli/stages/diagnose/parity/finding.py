@@ -1,4 +1,4 @@
-"""What the parity checks say: findings with their size and error, what they speak for, and what is plainly set wrong."""
+"""What the parity checks say: findings with size and error, effects that they speak for, and settings that are wrong."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ class Finding:
     """One quantity that was measured without a simulator.
 
     check: id of the quantity. value, sd: in `unit`. expected, expected_sd: what a robot without effects has: of healthy
-    runs (`differential`), else nominal. z: (value - expected) over both errors, 0 where nothing can be said; p: two-sided
-    chance of it. what: the finding in words. suspicions: strongest first.
+    runs (`differential`), else nominal. z: (value - expected) over both errors, 0 where nothing can be said; p:
+    two-sided chance of it. what: the finding in words. suspicions: strongest first.
     """
 
     check: str

@@ -1,0 +1,48 @@
+"""What a healthy robot shows, and by how much healthy robots differ: the scale on which a finding is a finding.
+
+Spreads are of the rig's healthy runs (MuJoCo, random shapes, noise of 2 to 10 mm), as `changed` between runs of one
+robot on one day and as `built` between a robot and its robot.toml; bias and gain of sensors as built are those of the
+real robot's calibration (docs/guides/calibrate.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Expected:
+    """nominal, built: value and spread (sd) without healthy runs to compare with; changed: spread against these. words:
+    of the quantity, for people, with {element}."""
+
+    unit: str
+    nominal: float
+    built: float
+    changed: float
+    words: str
+
+
+EXPECTED: dict[str, Expected] = {
+    "rod_length": Expected("1", 1.0, 0.003, 0.001, "the length of {element} as seen, over that of robot.toml"),
+    "camera_scale": Expected("1", 1.0, 0.003, 0.0007, "the length of all rods as seen, over that of robot.toml"),
+    "dropout": Expected("1", 0.0, 0.02, 0.01, "the share of frames and caps that are missing or outliers"),
+    "camera_delay": Expected("s", -0.03, 0.025, 0.006, "how much later than the sensors the camera shows a motion"),
+    "sensor_bias": Expected("m", 0.0, 0.002, 0.0004, "how much too long {element} reads in the middle of its travel"),
+    "sensor_gain": Expected("1", 0.0, 0.02, 0.006, "how much too large {element} shows a change of length"),
+    "sensor_drift": Expected("m/s", 0.0, 3e-4, 1.5e-4, "the drift of {element} against the camera"),
+    "slope_x": Expected("rad", 0.0, 0.005, 0.003, "the tilt about x of the plane on which the caps stand"),
+    "slope_y": Expected("rad", 0.0, 0.005, 0.003, "the tilt about y of the plane on which the caps stand"),
+    "slope_change": Expected("rad", 0.0, 0.01, 0.01, "the change of that tilt from run to run"),
+    "cap_height": Expected("m", 0.0, 0.001, 0.0007, "how much higher than the others {element} stands"),
+    "winch_speed": Expected("1", 0.0, 0.15, 0.015, "the logarithm of all winding rates over the nominal"),
+    "winch_rate": Expected("1", 0.0, 0.03, 0.02, "the logarithm of the winding rate of {element} over that of all"),
+    "in_over_out": Expected("1", 0.0, 0.03, 0.02, "the logarithm of the rates reeling in over those paying out"),
+    "latency": Expected("s", 0.03, 0.02, 0.008, "how late ramps start and end"),
+    "lag": Expected("s", 0.03, 0.02, 0.008, "the time constant with which ramps start and run on"),
+    "play": Expected("m", 0.0003, 0.001, 0.0006, "the motion that is lost where a winch reverses"),
+    "sag": Expected("1/s", 0.0, 0.006, 0.004, "the loss of winding speed with time"),
+    "load": Expected("1", 0.0, 0.012, 0.010, "the loss of winding speed with every other motor that runs"),
+    "droop": Expected("1", 0.0, 0.2, 0.15, "the loss of speed reeling in at the usual tension"),
+    "spool": Expected("1/m", 0.7, 1.5, 1.0, "the gain of winding speed with the wound length"),
+}
+"""By check. A sensor's own lag and half a frame show as a latency of about 30 ms on a healthy robot."""

@@ -1,0 +1,42 @@
+"""The list of a bank's sets: what was committed to before any was diagnosed."""
+
+from __future__ import annotations
+
+import json
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from r2s2r_cli.errors import InputError
+
+FORMAT = "r2s2r blind bank 1"
+
+
+def digest(folder: Path) -> str:
+    """SHA-256 of all files of a set, names included."""
+    whole = sha256()
+    for path in sorted(one for one in folder.rglob("*") if one.is_file()):
+        whole.update(f"{path.relative_to(folder).as_posix()}\n".encode())
+        whole.update(sha256(path.read_bytes()).digest())
+    return whole.hexdigest()
+
+
+def index_text(tier: str, bank: str, sets: dict[str, dict[str, str]], made_by: str) -> str:
+    """The text of `index.json`. sets: {"label": commitment, "logs": digest} by name."""
+    return json.dumps({"format": FORMAT, "tier": tier, "bank": bank, "made_by": made_by, "sets": sets}, indent=1,
+                      sort_keys=True) + "\n"  # fmt: skip
+
+
+def read_index(path: Path) -> tuple[dict[str, Any], str]:
+    """The list, and its own SHA-256. Raises InputError where it is none."""
+    try:
+        data = path.read_bytes()
+        found = json.loads(data)
+        if found["format"] != FORMAT:
+            raise ValueError(f"format {found['format']!r}")
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            "the list of the blind sets cannot be read", where=str(path), expected=f"index.json of a bank ({FORMAT})",
+            received=str(error), hint="r2s2r blind make --out bank",
+        ) from error  # fmt: skip
+    return found, sha256(data).hexdigest()

@@ -1,0 +1,97 @@
+"""Sealed labels: salted, committed to by SHA-256 before anything is diagnosed, encrypted, opened by `score` alone.
+
+A bank: `index.json` (names of the sets, the commitment of every label, a digest of every set's logs), `sets/<name>/`,
+`labels/<name>.sealed`. The key is a file that lies elsewhere. Encryption is Fernet of `cryptography` (ADR 13).
+"""
+
+from __future__ import annotations
+
+import hmac
+import json
+import secrets
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from r2s2r_cli.errors import InputError, UsageError
+
+INDEX, SETS, LABELS = "index.json", "sets", "labels"
+_SALT_BYTES = 32
+
+
+def new_key(path: Path) -> bytes:
+    """A new key in a new file that its owner alone may read. Raises UsageError where the file is there already."""
+    from cryptography.fernet import Fernet
+
+    key = Fernet.generate_key()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch(mode=0o600, exist_ok=False)
+    except FileExistsError as error:
+        raise UsageError(
+            "a key is never overwritten: labels that it sealed could not be opened again", where=str(path),
+            expected="no such file", received="a file", hint=f"r2s2r blind make --key {path}.2",
+        ) from error  # fmt: skip
+    path.write_bytes(key + b"\n")
+    return key
+
+
+def read_key(path: Path) -> bytes:
+    """The key of a file. Raises InputError where it is none."""
+    from cryptography.fernet import Fernet
+
+    try:
+        key = path.read_bytes().strip()
+        Fernet(key)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            "the key of the labels cannot be read", where=str(path), expected="the file that `blind make --key` wrote",
+            received=str(error), hint="r2s2r blind score --key FILE",
+        ) from error  # fmt: skip
+    return key
+
+
+def set_name(key: bytes, number: int) -> str:
+    """Name of a bank's set: nobody without the key can tell which number it has."""
+    return hmac.new(key, f"set {number}".encode(), sha256).hexdigest()[:12]
+
+
+def secret(key: bytes, what: str) -> int:
+    """A large number that only the key decides."""
+    return int.from_bytes(hmac.new(key, what.encode(), sha256).digest()[:8], "big")
+
+
+def seal(label: dict[str, Any], key: bytes) -> tuple[bytes, str]:
+    """The encrypted label, and the commitment: SHA-256 of the label with its salt."""
+    from cryptography.fernet import Fernet
+
+    plain = json.dumps({"salt": secrets.token_hex(_SALT_BYTES), "label": label}, sort_keys=True).encode()
+    return Fernet(key).encrypt(plain), sha256(plain).hexdigest()
+
+
+def opened(sealed: bytes, key: bytes, commitment: str, *, where: str) -> dict[str, Any]:
+    """The label. Raises InputError where the key is another, or the label is not the one that was committed to."""
+    from cryptography.fernet import Fernet, InvalidToken
+
+    try:
+        plain = Fernet(key).decrypt(sealed)
+    except InvalidToken as error:
+        raise InputError(
+            "a label cannot be opened with this key", where=where, expected="the key that sealed it",
+            received="another key, or a damaged file", hint="r2s2r blind score --key FILE",
+        ) from error  # fmt: skip
+    found = sha256(plain).hexdigest()
+    if found != commitment:
+        raise InputError(
+            "a label is not the one that was committed to", where=where, expected=commitment, received=found,
+            hint="r2s2r blind make --out bank   # these figures cannot be trusted",
+        )  # fmt: skip
+    label: dict[str, Any] = json.loads(plain)["label"]
+    return label
+
+
+def commitment_of(sealed: bytes, key: bytes) -> str:
+    """What a label sealed earlier was committed to with, for a maker that goes on. Raises as Fernet does."""
+    from cryptography.fernet import Fernet
+
+    return sha256(Fernet(key).decrypt(sealed)).hexdigest()

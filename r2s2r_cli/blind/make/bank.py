@@ -1,0 +1,102 @@
+"""A bank of sets: which worlds, in which order, written as they are done, closed with a list of commitments."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from r2s2r_cli import __version__
+from r2s2r_cli.blind import labels
+from r2s2r_cli.blind.index import digest, index_text
+from r2s2r_cli.blind.make.one import make_set
+from r2s2r_cli.blind.make.worlds import Hidden, hidden
+from r2s2r_cli.blind.seam import each, open_executor
+from r2s2r_cli.blind.split import RANGES, Bank, kinds, seeds
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A bank. first: number of its first set; None: of a blind bank a secret one that the key decides, else 0, so that
+    nobody can make its worlds again who has not the key. commissioning: runs of the healthy robot a set. observed:
+    which draw of the camera's noise. effect: its single sets all have this effect; None: any of the first release.
+    """
+
+    bank: Bank
+    count: int
+    out: Path
+    key: bytes
+    first: int | None = None
+    commissioning: int = 2
+    observed: int = 0
+    effect: str | None = None
+    oracle: bool = True
+
+
+def worlds(asked: Asked) -> tuple[Hidden, ...]:
+    """Of the bank, in the order of its numbers. Raises UsageError where the bank has no such seeds."""
+    first = asked.first
+    if first is None:
+        spare = len(RANGES[asked.bank].seeds) - asked.count
+        first = labels.secret(asked.key, "first") % spare if asked.bank is Bank.BLIND and spare > 0 else 0
+    own = seeds(asked.bank, asked.count, first)
+    drawn = kinds(asked.count, np.random.default_rng([own[0], asked.count]))
+    effects = () if asked.effect is None else (asked.effect,)
+    return tuple(
+        hidden(asked.bank, seed, kind, commissioning=asked.commissioning,
+               effects=effects if kind.value == "single" else ())
+        for seed, kind in zip(own, drawn, strict=True)
+    )  # fmt: skip
+
+
+def make(asked: Asked, *, executor: str = "local", workers: int = 1) -> Iterator[str]:
+    """Names of the sets as they are done; those that are there already are passed over. The list is written last.
+
+    Raises NumericalError where MuJoCo breaks down.
+    """
+    todo = []
+    for number, world in enumerate(worlds(asked)):
+        job = (asked, world, labels.set_name(asked.key, number))
+        if _sealed(asked.out, job[2]).exists():
+            yield job[2]
+        else:
+            todo.append(job)
+    if todo:
+        with open_executor(executor, workers) as pool:
+            for (_, _, name), _ in each(pool, _one, todo, at_once=workers):
+                yield name
+    close(asked)
+
+
+def close(asked: Asked) -> None:
+    """Write the list of the bank, in the order of the names, which says nothing."""
+    sets = {}
+    for number in range(asked.count):
+        name = labels.set_name(asked.key, number)
+        sets[name] = {
+            "label": labels.commitment_of(_sealed(asked.out, name).read_bytes(), asked.key),
+            "logs": digest(asked.out / labels.SETS / name),
+        }
+    text = index_text("B", asked.bank.value, sets, f"r2s2r {__version__}")
+    (asked.out / labels.INDEX).write_text(text, encoding="utf-8")
+
+
+def _one(job: tuple[Asked, Hidden, str]) -> None:
+    asked, world, name = job
+    folder, part = asked.out / labels.SETS / name, asked.out / labels.SETS / f".{name}.part"
+    for old in (folder, part):
+        shutil.rmtree(old, ignore_errors=True)  # of a maker that was interrupted
+    label = make_set(world, part, observed=asked.observed, oracle=asked.oracle)
+    part.rename(folder)
+    sealed, _ = labels.seal(label, asked.key)
+    path = _sealed(asked.out, name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.with_suffix(".part").write_bytes(sealed)
+    path.with_suffix(".part").rename(path)
+
+
+def _sealed(out: Path, name: str) -> Path:
+    return out / labels.LABELS / f"{name}.sealed"

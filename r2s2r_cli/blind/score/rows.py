@@ -1,0 +1,189 @@
+"""The table of the issue: every metric with its target, its sets, its interval, and whether the interval shows it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from r2s2r_cli.blind.score.facts import NONE, UNKNOWN, WEAK, Said, Truth
+from r2s2r_cli.blind.score.wilson import bootstrap, wilson
+from schemas.results_blind import BlindRow, Tier
+
+Pair = tuple[Truth, Said]
+MOTOR_KINDS = frozenset({"motor", "cable", "sensor"})
+"""Elements that share their numbers: motor and sensor i are those of cable i."""
+BINS = 10
+
+
+@dataclass(frozen=True)
+class Metric:
+    """value: of the sets that `chosen` gives, True or False each, or a number, or None where it does not apply."""
+
+    name: str
+    what: str
+    targets: dict[Tier, float | None]
+    chosen: Callable[[Pair], bool | float | None]
+    unit: Literal["share", "m", "number"] = "share"
+    above: bool = True
+    of: Literal["mean", "median"] = "mean"
+
+
+def row(metric: Metric, pairs: Sequence[Pair], tier: Tier) -> BlindRow:
+    """One line of the table."""
+    values = [value for value in map(metric.chosen, pairs) if value is not None]
+    target = metric.targets.get(tier)
+    if not values:
+        return _row(metric, target, None, 0, None)
+    if metric.unit == "share" and all(isinstance(value, bool) for value in values):
+        right = sum(bool(value) for value in values)
+        return _row(metric, target, right / len(values), len(values), wilson(right, len(values)))
+    numbers = np.array(values, dtype=float)
+    value = float(np.median(numbers) if metric.of == "median" else numbers.mean())
+    return _row(metric, target, value, len(numbers), bootstrap(numbers, metric.of))
+
+
+def calibration_error(pairs: Sequence[Pair], tier: Tier) -> BlindRow:
+    """Expected calibration error of the first guess over ten equal steps of probability."""
+    metric = Metric("ece", "calibration error of the first guess's probability, all sets but pairs",
+                    {"A": 0.07, "B": 0.10}, lambda pair: None, above=False)  # fmt: skip
+    told = [(s.probability[0], s.first == t.right) for t, s in pairs if t.right is not None and s.order]
+    if not told:
+        return _row(metric, metric.targets[tier], None, 0, None)
+    p, right = (np.array(column, dtype=float) for column in zip(*told, strict=True))
+    rng = np.random.default_rng(0)
+    drawn = sorted(_ece(p[i], right[i]) for i in rng.integers(0, len(p), (500, len(p))))
+    return _row(metric, metric.targets[tier], _ece(p, right), len(p), (drawn[12], drawn[487]))
+
+
+def coverage(pairs: Sequence[Pair], tier: Tier) -> BlindRow:
+    """How often the 90 % set holds the truth: too often is as wrong as too seldom."""
+    held = [t.right in s.set90 for t, s in pairs if t.right is not None and not s.failed]
+    low, high = (0.87, 0.93) if tier == "A" else (0.85, 0.95)
+    metric = Metric("coverage", f"90 % set holds the truth ({low:.0%} to {high:.0%} asked for), all sets but pairs",
+                    {tier: low}, lambda pair: None)  # fmt: skip
+    if not held:
+        return _row(metric, low, None, 0, None)
+    n, right = len(held), sum(held)
+    found = _row(metric, low, right / n, n, wilson(right, n))
+    a, b = wilson(right, n)
+    inside = low <= right / n <= high
+    return found.model_copy(update={"passed": inside, "shown": (low <= a and b <= high) or b < low or a > high})
+
+
+def _row(
+    metric: Metric, target: float | None, value: float | None, n: int, interval: tuple[float, float] | None
+) -> BlindRow:
+    low, high = interval or (None, None)
+    passed = shown = None
+    if target is not None and value is not None and low is not None and high is not None:
+        passed = value >= target if metric.above else value <= target
+        shown = low >= target or high < target if metric.above else high <= target or low > target
+    finite = [None if x is None or not math.isfinite(x) else x for x in (value, low, high)]
+    return BlindRow(name=metric.name, what=metric.what, target=target, above=metric.above, unit=metric.unit,
+                    value=finite[0], n=n, low=finite[1], high=finite[2], passed=passed, shown=shown)  # fmt: skip
+
+
+def _ece(p: np.ndarray, right: np.ndarray) -> float:
+    place = np.minimum((p * BINS).astype(int), BINS - 1)
+    parts = [(place == k) for k in range(BINS)]
+    return float(sum(abs(p[k].sum() - right[k].sum()) for k in parts) / len(p))
+
+
+def _clear(t: Truth) -> bool:
+    return t.kind == "single" and t.stratum == "clear"
+
+
+def _weak(t: Truth) -> bool:
+    return t.kind == "single" and t.stratum == "weak"
+
+
+def same_element(truth: dict[str, object], said: dict[str, object] | None) -> bool:
+    """Whether an element is the true one; winch, sensor and cable of one number are the same string."""
+    if said is None or said.get("index") != truth["index"]:
+        return False
+    kinds = {truth["kind"], said.get("kind")}
+    return len(kinds) == 1 or kinds <= MOTOR_KINDS
+
+
+def _element(pair: Pair) -> bool | None:
+    t, s = pair
+    return same_element(t.element, s.element) if _clear(t) and t.element is not None else None
+
+
+def _place(pair: Pair) -> float | None:
+    t, s = pair
+    if not (_clear(t) and t.place is not None):
+        return None
+    xy = (s.element or {}).get("xy_m")
+    return math.inf if not xy else math.dist(t.place, (float(xy[0]), float(xy[1])))
+
+
+def _onset(pair: Pair) -> bool | None:
+    t, s = pair
+    return s.onset == t.onset["of_set"] if _clear(t) and t.onset is not None else None
+
+
+def _both(t: Truth) -> bool:
+    return t.kind == "pair" and len(t.each) == 2 and min(t.each) >= WEAK
+
+
+def _own(pair: Pair) -> float | None:
+    t, s = pair
+    return s.own_share if _clear(t) and s.named == t.effects else None
+
+
+def _foretold(pair: Pair) -> float | None:
+    s = pair[1]
+    return None if s.own_share is None or s.predicted is None else abs(s.own_share - s.predicted)
+
+
+METRICS = (
+    Metric("top1_clear", "first guess right, clear single effects", {"A": 0.90, "B": 0.75},
+           lambda p: p[1].first == p[0].right if _clear(p[0]) else None),
+    Metric("top3_clear", "truth among the first three, clear", {"A": 0.98, "B": 0.92},
+           lambda p: p[0].right in p[1].order[:3] if _clear(p[0]) else None),
+    Metric("precision_named", "right where one name is committed to, clear", {"A": 0.95, "B": 0.90},
+           lambda p: p[1].named == p[0].effects if _clear(p[0]) and p[1].named else None),
+    Metric("share_named", "a name is committed to, clear", {"A": 0.85, "B": 0.65},
+           lambda p: bool(p[1].named) if _clear(p[0]) else None),
+    Metric("top1_weak", "first guess right, weak single effects", {"A": 0.65, "B": 0.50},
+           lambda p: p[1].first == p[0].right if _weak(p[0]) else None),
+    Metric("top3_weak", "truth among the first three, weak", {"A": 0.85, "B": 0.75},
+           lambda p: p[0].right in p[1].order[:3] if _weak(p[0]) else None),
+    Metric("channel_clear", "channel right, clear", {"A": 0.95, "B": 0.88},
+           lambda p: p[1].channel == p[0].channel if _clear(p[0]) else None),
+    Metric("element_clear", "element right, clear effects that have one", {"A": 0.90, "B": 0.80}, _element),
+    Metric("place_clear", "distance to the middle of a patch, clear, median", {"A": 0.06, "B": 0.10}, _place, "m",
+           above=False, of="median"),
+    Metric("onset_clear", "target interval in which it begins right, clear effects that begin", {"A": 0.85, "B": 0.75},
+           _onset),
+    Metric("false_alarm", "anything but 'no gap' where nothing is wrong", {"A": 0.05, "B": 0.10},
+           lambda p: p[1].verdict != "no_gap" if p[0].kind == "none" else None, above=False),
+    Metric("sub_floor", "'no gap' where the effect lies under the floor", {"A": 0.90, "B": 0.85},
+           lambda p: p[1].verdict == "no_gap" if p[0].stratum == "sub-floor" else None),
+    Metric("outside_recall", "'unknown' where no catalogue has it, clear", {"A": 0.80, "B": 0.65},
+           lambda p: p[1].verdict == "unknown" if p[0].kind == "outside" and p[0].stratum == "clear" else None),
+    Metric("outside_precision", "no catalogue has it where 'unknown' is said", {"A": 0.85, "B": 0.75},
+           lambda p: p[0].kind == "outside" if p[1].verdict == "unknown" else None),
+    Metric("outside_channel", "channel right where 'unknown' is said rightly", {"A": 0.75, "B": 0.60},
+           lambda p: p[1].channel == p[0].channel if p[0].kind == "outside" and p[1].verdict == "unknown" else None),
+    Metric("pair_top3", "both among the first three, pairs whose parts are at least weak", {"A": 0.75, "B": 0.60},
+           lambda p: set(p[0].effects) <= set(p[1].order[:3]) if _both(p[0]) else None),
+    Metric("pair_exact", "the pair named, parts at least weak", {"A": 0.55, "B": 0.40},
+           lambda p: set(p[1].named) == set(p[0].effects) if _both(p[0]) else None),
+    Metric("set_size", "size of the 90 % set, median", {"A": 2.0, "B": 3.0},
+           lambda p: None if p[1].failed else float(len(p[1].set90)), "number", above=False, of="median"),
+    Metric("own_share", "own share of the floor-corrected gap where the right effect is named, clear, median",
+           {"A": 0.80, "B": 0.60}, _own, of="median"),
+    Metric("foretold", "predicted against realised own share, mean distance", {"A": 0.08, "B": 0.12}, _foretold,
+           above=False),
+)  # fmt: skip
+"""In the order of the table; calibration and coverage are made apart."""
+CONTROL = Metric("shuffled_named", "a name is committed to although the commands were exchanged (negative control)",
+                 {"A": 0.0, "B": 0.0}, lambda p: bool(p[1].named), above=False)  # fmt: skip
+"""The only row where commands were exchanged between target intervals: nothing may be named."""
+CLASSES_LAST = (NONE, UNKNOWN)

@@ -1,0 +1,78 @@
+"""Many independent pieces of work through one seam in the manner of `concurrent.futures.Executor`.
+
+`open_executor("local", 2)` gives processes of this machine; `dask://host:port` the workers of a dask.distributed
+scheduler (extra `cluster`), where the same package is installed and the same folders are mounted.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from typing import TypeVar
+
+from r2s2r_cli.errors import HardwareError, UsageError
+
+LOCAL, DASK = "local", "dask://"
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+@contextmanager
+def open_executor(spec: str, workers: int) -> Iterator[Executor]:
+    """An executor, shut down at the end; what has not begun is given up where an exception leaves the block.
+
+    Raises UsageError for another kind of address or where dask is not installed, HardwareError where no scheduler
+    answers.
+    """
+    if spec == LOCAL:
+        # Fresh interpreters: nothing of this process (loaded modules, threads of torch) goes along.
+        executor: Executor = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+    elif spec.startswith(DASK):
+        executor = _dask(spec)
+    else:
+        raise UsageError(
+            "there is no such executor", where="--executor", expected="local, or dask://host:port", received=spec,
+            hint="r2s2r blind run bank --executor local",
+        )  # fmt: skip
+    try:
+        yield executor
+    except BaseException:
+        executor.shutdown(wait=False, cancel_futures=True)
+        raise
+    executor.shutdown()
+
+
+def each(
+    executor: Executor, work: Callable[[Item], Result], items: Sequence[Item], *, at_once: int
+) -> Iterator[tuple[Item, Result]]:
+    """Items with their results as they come. At most `at_once` are handed out, so that an interruption loses little."""
+    waiting = list(reversed(items))
+    under_way: dict[Future[Result], Item] = {}
+    while waiting or under_way:
+        while waiting and len(under_way) < at_once:
+            item = waiting.pop()
+            under_way[executor.submit(work, item)] = item
+        done = next(as_completed(under_way))
+        yield under_way.pop(done), done.result()
+
+
+def _dask(spec: str) -> Executor:
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise UsageError(
+            "dask.distributed is not installed", where="--executor", expected="the extra `cluster`",
+            received=str(error), hint="pip install 'r2s2r[cluster]'",
+        ) from error  # fmt: skip
+    address = "tcp://" + spec.removeprefix(DASK)
+    try:
+        client = Client(address, timeout="10s")
+    except (OSError, TimeoutError) as error:
+        raise HardwareError(
+            "no dask scheduler answers", where="--executor", expected="a scheduler", received=f"{address}: {error}",
+            hint="dask scheduler --port 8786",
+        ) from error  # fmt: skip
+    executor: Executor = client.get_executor()
+    return executor

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.errors import UsageError
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
 
@@ -84,25 +84,13 @@ class Asked:
     def belief(self) -> Belief:
         """The simulator's numbers. Raises InputError where they are those of another robot, or of robot.toml as it was
         before it was changed."""
-        from r2s2r_cli.commands.stage import robot_part
+        from r2s2r_cli.commands.numbers import read_numbers
         from r2s2r_cli.stages.plan.belief import assumed, identified
-        from r2s2r_cli.store.read import read_artifact
 
         robot = self.project.robot()
         if self.identified is None:
             return assumed(robot)
-        header, data = read_artifact(self.identified, "identification")
-        where = self.project.relative(self.identified)
-        belief = identified(robot, data, where)
-        made, now = header.provenance.robot, robot_part("identify", robot)
-        changed = [name for name in now if made.get(name) != now[name]] if header.provenance.stage == "identify" else []
-        if changed:
-            raise InputError(
-                "the parameters were identified with another version of robot.toml", where=where,
-                expected="robot.toml as it is now", received=f"another {', '.join(changed)}",
-                hint=f"r2s2r identify --iteration {self.iteration.number}",
-            )  # fmt: skip
-        return belief
+        return identified(robot, read_numbers(self.project, self.identified), self.project.relative(self.identified))
 
     def _goal(self, text: str, settings: PlanSettings) -> Goal:
         from r2s2r_cli.stages.plan.route import Goal

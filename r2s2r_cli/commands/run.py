@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -14,12 +15,16 @@ import typer
 
 from r2s2r_cli.commands.record import Protocol
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import ExitCode, Interrupted, UsageError
+from r2s2r_cli.errors import ExitCode, Interrupted, R2S2RError, UsageError
 from r2s2r_cli.options import DrawOption, DryRunOption, IterationOption, ProjectOption, QuietOption
 from r2s2r_cli.store.project import Iteration, Project
 
 STAGES = ("record", "estimate", "identify", "plan", "execute", "estimate-executed", "compare")
 """In their order; `import` takes the place of `record` where logs are given."""
+
+
+_STOPPED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Signals by which somebody stops a command; a child that another one ended has failed."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +94,7 @@ def run(
         words = ("r2s2r", *step.words, "--iteration", str(place.number))
         if step.robot and step.target.exists():
             console.say(f"[{number}/{len(steps)}] {here.relative(step.target)} is there: the robot is not moved again")
+            _warn_of_old(here, step, console)
             continue
         console.say(f"[{number}/{len(steps)}] {shlex.join(words)}")
         if dry_run:
@@ -126,9 +132,24 @@ def _steps(
         yield Step("compare", ("compare",), place.artifact("comparison"))
 
 
+def _warn_of_old(project: Project, step: Step, console: Console) -> None:
+    """Runs whose plan or policies have become others since: they are compared as what they are, and it is said."""
+    from r2s2r_cli.store.header import read_header
+    from r2s2r_cli.store.staleness import input_reasons
+
+    changed = [text for ref in read_header(step.target).provenance.inputs for text in input_reasons(project, ref)]
+    if changed:
+        console.warn(
+            f"{project.relative(step.target)} holds runs of what has changed since: {'; '.join(changed)}. To run the "
+            f"present policies: {shlex.join(['r2s2r', *step.words, '--force'])}"
+        )
+
+
 def _resumed(step: Step) -> tuple[str, ...]:
-    """`--resume` where the stage takes it: without a checkpoint it begins anew, and says so."""
-    return ("--resume",) if step.name in ("identify", "plan") else ()
+    """`--resume` where there is something to go on from."""
+    from r2s2r_cli.store.checkpoint import checkpoint_of
+
+    return ("--resume",) if step.name in ("identify", "plan") and checkpoint_of(step.target).exists() else ()
 
 
 def _carry_out(words: Sequence[str], shown: str) -> None:
@@ -139,6 +160,12 @@ def _carry_out(words: Sequence[str], shown: str) -> None:
             code = child.wait()
         except KeyboardInterrupt:
             code = child.wait()  # it had the same signal, and stops what it does in its own way
+    if code < 0 and -code not in _STOPPED:
+        raise R2S2RError(
+            f"the system ended the process of: {shown}", where="r2s2r run", expected="a stage that ends by itself",
+            received=f"signal {-code}" + "; most often there was too little memory" * (code == -signal.SIGKILL),
+            hint=shlex.join(["r2s2r", *sys.argv[1:]]),
+        )  # fmt: skip
     if code == ExitCode.INTERRUPTED or code < 0:
         raise Interrupted(f"stopped in: {shown}", hint=shlex.join(["r2s2r", *sys.argv[1:]]))
     if code != ExitCode.DONE:

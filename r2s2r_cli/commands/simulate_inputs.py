@@ -75,13 +75,14 @@ class Asked:
         return list(refs.values())
 
     def simulator(self) -> Identified | None:
-        """The identified numbers that were asked for. Raises ArtifactError, InputError."""
+        """The identified numbers that were asked for. Raises ArtifactError; InputError for those of another robot, or
+        of robot.toml as it was before it was changed."""
+        from r2s2r_cli.commands.numbers import read_numbers
         from r2s2r_cli.stages.identified import identified
-        from r2s2r_cli.store.read import read_artifact
 
         if self.model is None:
             return None
-        _, found = read_artifact(self.model, "identification")
+        found = read_numbers(self.project, self.model)
         return identified(found, self.project.robot(), words=self.project.relative(self.model))
 
     def requests(self) -> list[Request]:

@@ -10,7 +10,10 @@ R2S2R  ?= r2s2r
 ITER   ?= 001
 SOURCE ?=
 PORT   ?=
+CAMERA ?=
 RUNS   ?= --random 15 --repeats 3
+POLICIES ?=
+EXECUTE_OPTIONS ?=
 
 # ITER=2 and ITER=002 are the same iteration.
 I := iterations/$(shell printf '%03d' "$$(expr '$(ITER)' + 0)" 2>/dev/null || printf '%s' '$(ITER)')
@@ -19,27 +22,41 @@ I := iterations/$(shell printf '%03d' "$$(expr '$(ITER)' + 0)" 2>/dev/null || pr
 RECORD   := $(I)/10-record.h5
 ESTIMATE := $(I)/20-estimate.h5
 IDENTIFY := $(I)/30-identify.h5
-ARTIFACTS := $(RECORD) $(ESTIMATE) $(IDENTIFY)
+PLAN     := $(I)/40-plan.h5
+EXECUTE  := $(I)/50-execute.h5
+EXECUTED := $(I)/51-estimate.h5
+COMPARE  := $(I)/60-compare.h5
 
-# The iteration before: one without runs of its own learns from those.
-LAST := iterations/$(shell printf '%03d' "$$(expr '$(ITER)' - 1)" 2>/dev/null || printf 'none')
+# The latest iteration before this one that has states: an iteration without runs of its own learns from those.
+LAST := $(shell ls -d iterations/*/20-estimate.h5 iterations/*/51-estimate.h5 2>/dev/null \
+          | sed 's,/[^/]*$$,,' | awk '$$0 < "$(I)"' | sort | tail -n 1)
 FROM := $(ESTIMATE)
+OWN  := $(RECORD) $(ESTIMATE)
 ifeq ($(strip $(SOURCE))$(wildcard $(RECORD)),)
-ifneq ($(wildcard $(LAST)/20-estimate.h5 $(LAST)/51-estimate.h5),)
+ifneq ($(LAST),)
 FROM := $(wildcard $(LAST)/20-estimate.h5 $(LAST)/51-estimate.h5)
-ARTIFACTS := $(IDENTIFY)
+OWN  :=
 endif
 endif
+
+# A plan is executed where there is a robot; runs that were executed are compared, else those of the iteration itself.
+REAL := $(OWN)
+ifneq ($(strip $(PORT))$(wildcard $(EXECUTE)),)
+REAL := $(EXECUTE) $(EXECUTED)
+endif
+ARTIFACTS := $(OWN) $(IDENTIFY) $(PLAN) $(REAL) $(if $(REAL),$(COMPARE))
 
 # What every stage depends on, besides its input. config.toml: settings of this iteration only, where there is one.
 SETTINGS := project.toml robot.toml $(wildcard $(I)/config.toml)
 
 # Raw runs cannot be made again: make must never delete them, whatever fails.
-.PRECIOUS: $(RECORD)
+.PRECIOUS: $(RECORD) $(EXECUTE)
 
 help:
 	@echo 'make iterate ITER=001 SOURCE="a.csv b.csv"   bring the iteration up to date (SOURCE: logs to import, the first time)'
-	@echo 'make iterate ITER=001 PORT=/dev/ttyUSB0     the same with runs of the robot itself (RUNS: which, else 15 random targets, 3 times)'
+	@echo 'make iterate ITER=001 PORT=/dev/ttyUSB0 CAMERA=realsense   the same with the robot itself, which then executes the plan'
+	@echo '                                             (RUNS: what is recorded, else 15 random targets, 3 times; POLICIES: of the plan)'
+	@echo 'make iterate ITER=002 PORT=... CAMERA=...    the next: learns from the runs of the one before'
 	@echo 'make floor                                  how far the robot repeats itself'
 	@echo 'make status                                  what is fresh, what is stale and why'
 	@echo 'make check                                   exit code 3 where something is stale or does not validate'
@@ -52,7 +69,7 @@ $(RECORD): $(SOURCE) $(SETTINGS)
 else ifneq ($(strip $(PORT)),)
 # Nothing stands behind the colon: a robot that has moved is not asked to do it again.
 $(RECORD):
-	"$(R2S2R)" record --iteration $(ITER) $(RUNS) --port "$(PORT)"
+	"$(R2S2R)" record --iteration $(ITER) $(RUNS) --port "$(PORT)" $(if $(CAMERA),--camera "$(CAMERA)")
 else
 $(RECORD):
 	@echo 'error: $@ is not there, and there is neither a log to import nor a robot to record' >&2
@@ -65,6 +82,20 @@ $(ESTIMATE): $(RECORD) $(SETTINGS)
 
 $(IDENTIFY): $(FROM) $(SETTINGS)
 	"$(R2S2R)" identify --iteration $(ITER)
+
+$(PLAN): $(IDENTIFY) $(SETTINGS)
+	"$(R2S2R)" plan --iteration $(ITER)
+
+# Asks before the robot moves (EXECUTE_OPTIONS=--yes does not). Behind the bar: a plan that was made again moves no robot
+# that has done its runs; where they are of an older plan, `status` says so.
+$(EXECUTE): | $(PLAN)
+	"$(R2S2R)" execute --iteration $(ITER) $(POLICIES) --port "$(PORT)" $(if $(CAMERA),--camera "$(CAMERA)") $(EXECUTE_OPTIONS)
+
+$(EXECUTED): $(EXECUTE) $(SETTINGS)
+	"$(R2S2R)" estimate --iteration $(ITER) --of execute
+
+$(COMPARE): $(lastword $(REAL)) $(IDENTIFY) $(SETTINGS)
+	"$(R2S2R)" compare --iteration $(ITER)
 
 floor:
 	"$(R2S2R)" floor

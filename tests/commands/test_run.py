@@ -87,12 +87,14 @@ def test_a_later_iteration_without_a_robot_ends_with_its_plan(estimated: Path, c
     assert stages(Child.calls) == ["identify", "plan"]
 
 
-@pytest.mark.parametrize(("code", "wanted"), [(3, 3), (4, 4), (5, 5), (6, 6), (130, 130), (-9, 130)])
+@pytest.mark.parametrize(("code", "wanted"), [(3, 3), (4, 4), (5, 5), (6, 6), (130, 130), (-15, 130), (-9, 1)])
 def test_the_first_failure_ends_it_with_its_code(estimated: Path, calls: Calls, code: int, wanted: int) -> None:
-    """What comes after is not begun; a killed stage counts as interrupted."""
+    """What comes after is not begun. A stage that somebody ended counts as interrupted, one that the system killed as
+    failed: nobody would look for want of memory else."""
     Child.codes["identify"] = code
     result = invoke("run")
     assert result.exit_code == wanted
+    assert ("memory" in result.stderr) == (code == -9)
     assert stages(Child.calls)[-1] == "identify"
 
 

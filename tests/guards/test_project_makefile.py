@@ -19,8 +19,11 @@ IDENTIFY = "iterations/001/30-identify.h5"
 STAND_IN = """#!/bin/sh
 echo "$@" >> calls.txt
 case "$1" in import|record) f=10-record.h5 ;; estimate) f=20-estimate.h5 ;;
-identify) f=30-identify.h5 ;; *) exit 0 ;; esac
-mkdir -p iterations/$3 && echo "$1" > iterations/$3/$f
+identify) f=30-identify.h5 ;; plan) f=40-plan.h5 ;; execute) f=50-execute.h5 ;; compare) f=60-compare.h5 ;;
+*) exit 0 ;; esac
+[ "$4$5" = "--ofexecute" ] && f=51-estimate.h5
+n=iterations/$(printf '%03d' "$(expr $3 + 0)")
+mkdir -p $n && echo "$1" > $n/$f
 [ "$1" != "$FAIL_IN" ]
 """
 
@@ -56,9 +59,10 @@ def calls(project: Path) -> list[str]:
 
 
 def test_stages_run_in_order_and_then_rest(project: Path) -> None:
-    """`make iterate` imports, estimates, then identifies; a second call has nothing to do."""
+    """`make iterate` imports, estimates, identifies, plans and compares; a second call has nothing to do."""
     assert make(project, "iterate", "SOURCE=a.csv").returncode == 0
-    assert calls(project) == ["import --iteration 001 a.csv", "estimate --iteration 001", "identify --iteration 001"]
+    rest = [f"{stage} --iteration 001" for stage in ("estimate", "identify", "plan", "compare")]
+    assert calls(project) == ["import --iteration 001 a.csv", *rest]
     assert make(project, "-q", "iterate", "SOURCE=a.csv").returncode == 0
 
 
@@ -69,14 +73,17 @@ def test_a_changed_robot_runs_what_depends_on_it(project: Path) -> None:
         os.utime(project / path, (seconds, seconds))
     os.utime(project / "project.toml", (0, 0))
     assert make(project, "iterate").returncode == 0
-    assert calls(project)[3:] == ["estimate --iteration 001", "identify --iteration 001"]
+    assert calls(project)[5:7] == ["estimate --iteration 001", "identify --iteration 001"]
 
 
 def test_an_iteration_without_runs_learns_from_the_one_before(project: Path) -> None:
-    """Without a log of its own iteration 2 only identifies, and again when the estimate before it is a new one."""
+    """Without a log of its own iteration 2 only identifies and plans, and again when the estimate before it is a new one;
+    iteration 3 learns from the same, there being none in between."""
     make(project, "iterate", "SOURCE=a.csv")
     assert make(project, "iterate", "ITER=002").returncode == 0
-    assert calls(project)[3:] == ["identify --iteration 002"]
+    assert calls(project)[5:] == ["identify --iteration 002", "plan --iteration 002"]
+    assert make(project, "iterate", "ITER=003").returncode == 0
+    assert calls(project)[7:] == ["identify --iteration 003", "plan --iteration 003"]
     assert make(project, "-q", "iterate", "ITER=002").returncode == 0
     os.utime(project / ESTIMATE, (4e9, 4e9))
     assert make(project, "-q", "iterate", "ITER=002").returncode == 1
@@ -98,6 +105,33 @@ def test_a_robot_is_recorded_once(project: Path) -> None:
     os.utime(project / RECORD, (0, 0))
     make(project, "iterate", "PORT=/dev/ttyUSB0")
     assert [call for call in calls(project)[1:] if call.startswith("record")] == []
+
+
+def test_a_robot_executes_the_plan_once_and_the_next_iteration_learns_from_it(project: Path) -> None:
+    """With PORT the whole chain; a new plan moves no robot that has done its runs, new runs are estimated and compared,
+    and iteration 2 records nothing, learns from both estimates, and again when the executed one is new."""
+    robot = ("PORT=/dev/ttyUSB0", "CAMERA=realsense", "EXECUTE_OPTIONS=--yes", "POLICIES=straight")
+    assert make(project, "iterate", *robot).returncode == 0
+    assert calls(project) == [
+        "record --iteration 001 --random 15 --repeats 3 --port /dev/ttyUSB0 --camera realsense",
+        "estimate --iteration 001", "identify --iteration 001", "plan --iteration 001",
+        "execute --iteration 001 straight --port /dev/ttyUSB0 --camera realsense --yes",
+        "estimate --iteration 001 --of execute", "compare --iteration 001",
+    ]  # fmt: skip
+    folder = project / "iterations" / "001"
+    os.utime(folder / "40-plan.h5", (4e9, 4e9))
+    assert make(project, "-q", "iterate", *robot).returncode == 0
+    os.utime(folder / "50-execute.h5", (4e9, 4e9))
+    assert make(project, "iterate").returncode == 0, "the runs are there: no robot is needed to look at them"
+    assert calls(project)[7:] == ["estimate --iteration 001 --of execute", "compare --iteration 001"]
+    assert make(project, "iterate", "ITER=2", *robot).returncode == 0
+    assert calls(project)[9:] == [
+        "identify --iteration 2", "plan --iteration 2",
+        "execute --iteration 2 straight --port /dev/ttyUSB0 --camera realsense --yes",
+        "estimate --iteration 2 --of execute", "compare --iteration 2",
+    ]  # fmt: skip
+    os.utime(folder / "51-estimate.h5", (5e9, 5e9))
+    assert make(project, "-q", "iterate", "ITER=002").returncode == 1
 
 
 def test_make_never_deletes_a_recording(project: Path) -> None:

@@ -88,8 +88,8 @@ class Executor:
         return self.mapping.pid(self.values[draw])
 
     def standing(self, p_WE: np.ndarray, draw: np.ndarray, lengths: np.ndarray | None = None) -> Standing:
-        """Robots at rest nearest to poses (B, cap, 3) [m]; lengths: of all cables [m], (B, cable). Raises
-        NumericalError where one does not come to rest."""
+        """Robots at rest nearest to poses (B, cap, 3) [m]; lengths: of all cables [m], (B, cable). Those that do not
+        come to rest are left out. Raises NumericalError where the first does not."""
         import torch
 
         from r2s2r_cli.engine.flat import pack_state
@@ -101,15 +101,18 @@ class Executor:
             self.simulator, theta, torch.as_tensor(p_WE), torch.as_tensor(np.array([rod_frames(p) for p in p_WE])),
             self.cable_caps, lengths=None if lengths is None else torch.as_tensor(lengths), step=self.step,
         )  # fmt: skip
-        fastest = float(found.speed.max())
-        if fastest > RESTLESS:
+        # Not "> RESTLESS": what is no number is not at rest either.
+        restless = ~(found.speed <= RESTLESS)
+        if bool(restless[0]):
             raise NumericalError(
                 "the robot does not come to rest", where="the rest pose of robot.toml", expected="a pose it can hold",
-                received=f"caps still at {1e3 * fastest:.0f} mm/s", hint="r2s2r validate robot.toml",
+                received=f"caps still at {1e3 * float(found.speed[0]):.0f} mm/s",
+                hint="r2s2r validate robot.toml",
             )  # fmt: skip
         s = pack_state(self.structure, found.state)
         depth = int(torch.floor(self.delay.max() / self.period + 1e-9)) + 2
-        return Standing(s, s.new_zeros(len(s), depth, self.structure.n_actuated), index)
+        every = Standing(s, s.new_zeros(len(s), depth, self.structure.n_actuated), index)
+        return every.take(np.flatnonzero(~restless.numpy()))
 
     def caps(self, at: Standing) -> np.ndarray:
         """End caps [m], (B, cap, 3)."""

@@ -45,7 +45,8 @@ Progress = Callable[[str, int, int], None]
 
 class World:
     """The engine with its numbers and starts. best: with the best numbers, start: its robot at rest; executor: with all
-    draws, pairs: its robots from all start poses, the first as `start`; few: some of these."""
+    draws, pairs: its robots from all start poses, the first as `start`; few: some of these. restless: pairs left out
+    because their robot does not come to rest."""
 
     def __init__(
         self, robot: Robot, request: Request, settings: PlanSettings, cache_dir: Path | None, threads: int
@@ -69,4 +70,5 @@ class World:
         self.start: Standing = self.best.standing(np.array(robot.rest_caps_m)[None], np.zeros(1, dtype=int))
         self.reference: Reference = reference_of(self.best.caps(self.start)[0], group)
         self.pairs = start_poses(self.executor, robot, settings.starts, generator)
+        self.restless = len(draws) * settings.starts - len(self.pairs)
         self.few = self.pairs.take(np.unique(np.linspace(0, len(self.pairs) - 1, FEW).round().astype(int)))

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
+import pytest
 import torch
 
+from r2s2r_cli.engine import settle
 from r2s2r_cli.engine.closed_loop import closed_loop
 from r2s2r_cli.engine.flat import pack_state, unpack_state
 from r2s2r_cli.engine.link import Link
+from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.identified import Identified
 from r2s2r_cli.stages.identify.free.catalogue import entries
 from r2s2r_cli.stages.identify.free.mapping import Mapping
@@ -92,3 +98,29 @@ def test_a_sensor_that_reads_too_much_leaves_its_cable_shorter() -> None:
     a, b = subject().cable_caps[1]
     length = np.linalg.norm(p_WE[:, a] - p_WE[:, b], axis=-1)
     assert abs(length[0] - length[1] - 0.02) < 0.003
+
+
+def test_a_draw_that_does_not_come_to_rest_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others stand as they would without it; where the best numbers are restless nothing can be planned."""
+    belief = assumed(subject().robot)
+    made = executor(belief, belief.draws(3, np.random.default_rng(1)))
+    poses, draws = np.repeat(subject().p_WE.numpy(), 3, axis=0), np.arange(3)
+    whole, found = made.standing(poses, draws), settle.settled
+
+    def restless(row: int, speed: float) -> None:
+        def one_moves(*given: Any, **named: Any) -> Any:
+            at = found(*given, **named)
+            moving = at.speed.clone()
+            moving[row] = speed
+            return replace(at, speed=moving)
+
+        monkeypatch.setattr(settle, "settled", one_moves)
+
+    for speed in (0.5, float("nan")):
+        restless(1, speed)
+        left = made.standing(poses, draws)
+        assert left.draw.tolist() == [0, 2]
+        np.testing.assert_array_equal(left.s.numpy(), whole.s[[0, 2]].numpy())
+    restless(0, 0.5)
+    with pytest.raises(NumericalError, match="does not come to rest"):
+        made.standing(poses, draws)

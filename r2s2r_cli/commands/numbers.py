@@ -1,0 +1,32 @@
+"""An identification as another command's input: read, and refused where robot.toml has changed since."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from r2s2r_cli.errors import InputError
+
+if TYPE_CHECKING:
+    from r2s2r_cli.artifact import ArtifactData
+    from r2s2r_cli.store.project import Project
+
+
+def read_numbers(project: Project, path: Path) -> ArtifactData:
+    """The identification at `path`. Raises ArtifactError; InputError where robot.toml was changed since, in a part that
+    the numbers depend on: they would then be mixed with others."""
+    from r2s2r_cli.commands.stage import robot_part
+    from r2s2r_cli.store.read import read_artifact
+
+    header, data = read_artifact(path, "identification")
+    made = header.provenance
+    now = robot_part("identify", project.robot())
+    changed = [name for name in now if made.robot.get(name) != now[name]] if made.stage == "identify" else []
+    if changed:
+        number = path.resolve().parent.name
+        again = f"r2s2r identify --iteration {int(number)}" if number.isdigit() else "r2s2r identify"
+        raise InputError(
+            "the parameters were identified with another version of robot.toml", where=project.relative(path),
+            expected="robot.toml as it is now", received=f"another {', '.join(changed)}", hint=again,
+        )  # fmt: skip
+    return data

@@ -83,8 +83,8 @@ def contact_rows(
         return GroundRows(gap, arm, mobility, free, target, active, toi, friction, between)
     target, give = target + surface.rising, surface.give.expand_as(gap)
     zero = torch.zeros_like(give[..., 0])
-    own = torch.stack([zero, zero, give[..., 0], zero, zero, give[..., 1]], dim=-1)
-    return GroundRows(gap, arm, mobility + torch.diag_embed(own), free, target, active, toi, friction, between, give)
+    softer = torch.diag_embed(torch.stack([zero, zero, give[..., 0], zero, zero, give[..., 1]], dim=-1))
+    return GroundRows(gap, arm, mobility + softer, free, target, active, toi, friction, between, give)
 
 
 def _rebound(theta: Parameters, v0: Tensor, gain: Tensor, toi: Tensor) -> Tensor:

@@ -175,16 +175,6 @@ def with_memory(structure: Structure, state: State) -> State:
     return replace(state, extra=extra)
 
 
-def _effects() -> dict[str, Callable[[], Variant]]:
-    def one(effect: Effect, on: bool) -> Callable[[], Variant]:
-        return lambda: plugged(robot(), effect, on=on)
-
-    named = {f"{effect.name} {'on' if on else 'off'}": one(effect, on) for effect in CATALOGUE for on in (False, True)}
-    named["all effects off"] = lambda: plugged(robot(), *CATALOGUE, on=False)
-    named["all effects on"] = lambda: plugged(robot(), *CATALOGUE, on=True)
-    return named
-
-
 SMALL: dict[str, Callable[[], Variant]] = {
     "pair": pair,
     "pair, every law": lambda: plugged(
@@ -212,7 +202,8 @@ VARIANTS: dict[str, Callable[[], Variant]] = {
     "rod ends": lambda: robot(attachment="rod_end"),
     "sixbar": lambda: robot("sixbar"),
     "no winches": without_winches,
-    **_effects(),
+    "all effects off": lambda: plugged(robot(), *CATALOGUE, on=False),
+    "all effects on": lambda: plugged(robot(), *CATALOGUE, on=True),
 }
 
 

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from schemas.base import Frozen
+from schemas.results_compare import CompareHistory
 
 
 class ErrorResult(Frozen):
@@ -74,6 +75,8 @@ class StatusResult(Frozen):
     """Disk that the whole project takes."""
     next: str
     """The command that brings the project forward; empty where everything is fresh."""
+    history: tuple[CompareHistory, ...] = ()
+    """The gap to the robot over the iterations, as the latest comparison says it."""
 
 
 class NodeInfo(Frozen):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,6 +19,9 @@ from r2s2r_cli.store.project import Iteration, Project, journal_of
 from r2s2r_cli.store.staleness import reasons
 from schemas.header import Header
 from schemas.results import ArtifactState, StatusResult
+
+if TYPE_CHECKING:
+    from schemas.results_compare import CompareReport
 
 
 def status(
@@ -46,6 +49,13 @@ def status(
     ]
     if rows:
         console.table("", ["iteration", "stage", "artifact", "state", "size", "why"], rows)
+    gap = _gap(here)
+    if gap is not None:
+        from r2s2r_cli.views.compare_history import history_table
+
+        shown = history_table(gap)
+        if shown is not None:
+            console.table(shown.title, shown.columns, shown.rows)
     if result.next:
         console.hint(result.next)
     unfit = [a for a in result.artifacts if a.state != "fresh"]
@@ -83,8 +93,24 @@ def survey(project: Project, *, thorough: bool = False) -> StatusResult:
         iterations=len(iterations),
         artifacts=tuple(states),
         bytes=sum(p.stat().st_size for p in project.root.rglob("*") if p.is_file() and not p.is_symlink()),
-        next=again[0] if again else _forward(project),
-    )
+        next=again[0] if again else _forward(project), history=gap.history if (gap := _gap(project)) else (),
+    )  # fmt: skip
+
+
+def _gap(project: Project) -> CompareReport | None:
+    """What the latest comparison says; None where there is none that can be read."""
+    from pydantic import ValidationError
+
+    from schemas.results_compare import CompareReport
+
+    for place in reversed(project.iterations()):
+        path = place.artifact("comparison")
+        if path.exists():
+            try:
+                return CompareReport.model_validate(whole_header(path).provenance.report)
+            except (ArtifactError, ValidationError):
+                return None  # damaged: said above; of an older version: nothing is said of it
+    return None
 
 
 def _state(

@@ -77,7 +77,7 @@ def test_a_changed_robot_runs_what_depends_on_it(project: Path) -> None:
 
 
 def test_an_iteration_without_runs_learns_from_the_one_before(project: Path) -> None:
-    """Without a log of its own iteration 2 only identifies and plans, and again when the estimate before it is a new one;
+    """Without a log of its own iteration 2 only identifies and plans, and again when the estimate before it is new;
     iteration 3 learns from the same, there being none in between."""
     make(project, "iterate", "SOURCE=a.csv")
     assert make(project, "iterate", "ITER=002").returncode == 0

@@ -82,8 +82,8 @@ def _warnings(
         said.append("nothing was identified: the gaits are those of robot.toml's numbers, judged over their priors")
     if world.restless:
         pairs = world.restless + len(world.pairs)
-        said.append(f"{world.restless} of {pairs} start poses with drawn numbers do not come to rest: left out. Numbers "
-                    "with which the robot may not stand say little of gaits")  # fmt: skip
+        said.append(f"{world.restless} of {pairs} start poses with drawn numbers do not come to rest: left out. "
+                    "Numbers with which the robot may not stand say little of gaits")  # fmt: skip
     if len(world.reference.group) == 1:
         said.append("the robot has no symmetry: a gait serves the triangle that it was found on, and no other")
     kept = {name: [one for one in primitives if one.behaviour == name] for name in request.rewards}

@@ -1,0 +1,59 @@
+"""`status` tells how the gap to the robot went, from the latest comparison; and lives with one that says nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from r2s2r_cli.store.write import write_artifact
+from schemas.results_compare import CompareFloor, CompareHistory, CompareMeasure, CompareReport
+from tests.commands.conftest import document, invoke
+from tests.support import builders
+
+NO_FLOOR = CompareFloor(com_end_m=None, heading_end_rad=None, segment_s=None, keyframe_cap_m=None)
+
+
+def measure(rms: float) -> CompareMeasure:
+    """An error of the end beside a floor of 10 mm."""
+    return CompareMeasure(
+        rms=rms, lower=None, upper=None, floor=0.01, gap=(rms**2 - 1e-4) ** 0.5, change=None, change_lower=None,
+        change_upper=None, runs=2,
+    )  # fmt: skip
+
+
+def write(project: Path, number: int, **errors: float) -> None:
+    """60-compare.h5 of an iteration: one error a simulator, over its own runs."""
+    folder = project / "iterations" / f"{number:03d}"
+    folder.mkdir(exist_ok=True)
+    history = [
+        CompareHistory(iteration=number, model=model, trained_on=False, runs={"com_end_m": measure(rms)})
+        for model, rms in errors.items()
+    ]
+    report = CompareReport(
+        iteration=number, runs=(), models=(), policies=(), history=tuple(history), repeatability=(), floor=NO_FLOOR
+    )
+    made = builders.provenance(stage="compare", inputs=(), report=report.model_dump(mode="json"))
+    write_artifact(folder / "60-compare.h5", builders.comparison(), made)
+
+
+def test_the_latest_comparison_is_told(project: Path) -> None:
+    """Its simulators with their errors, in the table and in the document; that of an earlier iteration is not."""
+    write(project, 1, initial=0.333)
+    write(project, 2, initial=0.160, refined=0.030)
+    shown = invoke("status")
+    assert shown.exit_code == 0, shown.stderr
+    assert "160" in shown.stdout + shown.stderr
+    assert "333" not in shown.stdout + shown.stderr
+    told = document("status")["history"]
+    assert [(one["model"], one["runs"]["com_end_m"]["rms"]) for one in told] == [("initial", 0.16), ("refined", 0.03)]
+
+
+@pytest.mark.parametrize("broken", [True, False])
+def test_without_a_report_nothing_is_told(project: Path, broken: bool) -> None:
+    """No comparison, or one that is damaged: the rest of the survey stands."""
+    if broken:
+        write(project, 1, initial=0.333, refined=0.1)
+        path = project / "iterations" / "001" / "60-compare.h5"
+        path.write_bytes(path.read_bytes()[:300])
+    assert document("status")["history"] == []

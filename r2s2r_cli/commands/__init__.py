@@ -10,6 +10,7 @@ from collections.abc import Callable
 import typer
 
 from r2s2r_cli.commands.bench import bench_app
+from r2s2r_cli.commands.blind import blind_app
 from r2s2r_cli.commands.calibrate import calibrate
 from r2s2r_cli.commands.compare import compare
 from r2s2r_cli.commands.doctor import doctor_app
@@ -57,5 +58,6 @@ COMMANDS: dict[str, Callable[..., None]] = {
 GROUPS: dict[str, typer.Typer] = {
     "doctor": doctor_app,
     "bench": bench_app,
+    "blind": blind_app,
 }
 """Subcommands that have subcommands."""

@@ -52,10 +52,13 @@ class Moment:
 
 @dataclass(frozen=True)
 class Driven:
-    """One run. t: control ticks [s], (tick,). target, control: (tick, actuated), +1 reels in; length: as the host read
-    it then [m], (tick, cable). sensed: without the boards' noise [m]. duty: on the drivers, (tick, motor). t_frame:
-    exposures [s], (frame,); p_WE: true end caps then [m], (frame, cap, 3). starts: ticks at which targets begin;
-    moments: the plant then."""
+    """One run.
+
+    t: control ticks [s], (tick,). target, control: (tick, actuated), +1 reels in; length: as the host read it then [m],
+    (tick, cable). sensed: without the boards' noise [m]; caps: true end caps [m], (tick, cap, 3). duty: on the drivers,
+    (tick, motor). t_frame: exposures [s], (frame,); p_WE: true end caps then [m], (frame, cap, 3). starts: ticks at
+    which targets begin; moments: the plant then.
+    """
 
     gait: Gait
     t: np.ndarray
@@ -63,6 +66,7 @@ class Driven:
     control: np.ndarray
     length: np.ndarray
     sensed: np.ndarray
+    caps: np.ndarray
     duty: np.ndarray
     t_frame: np.ndarray
     p_WE: np.ndarray
@@ -145,8 +149,8 @@ class _Log:
     def __init__(self, robot: Robot, firmware: Firmware, plant: Plant) -> None:
         self._firmware, self._plant, self._lengths = firmware, plant, Lengths.of(robot)
         self._latest = np.full(len(robot.sensors), np.nan)
-        self._rows: dict[str, list[np.ndarray]] = {name: [] for name in ("t", "target", "control", "length", "sensed",
-                                                                         "duty", "t_frame", "p_WE")}  # fmt: skip
+        names = ("t", "target", "control", "length", "sensed", "caps", "duty", "t_frame", "p_WE")
+        self._rows: dict[str, list[np.ndarray]] = {name: [] for name in names}
         self._starts: list[int] = []
         self._moments: list[Moment] = []
 
@@ -171,7 +175,7 @@ class _Log:
             self._moments.append(moment(self._plant))
         self._firmware.command(duty, self._plant.t)
         self._add(t=np.array(t), target=target.copy(), control=control.copy(), length=self.length(),
-                  sensed=self._plant.sensed(), duty=self._firmware.duty)  # fmt: skip
+                  sensed=self._plant.sensed(), caps=self._plant.truth().p_WE, duty=self._firmware.duty)  # fmt: skip
 
     def done(self, gait: Gait) -> Driven:
         """The run."""

@@ -156,7 +156,7 @@ def _recorded(hidden: Hidden, run: Driven, gait: int) -> list[_Looks]:
     late = camera.clock.stamp_delay_s
     found = []
     for t in _times(run):
-        at = _between(t - late, run.t_frame, run.p_WE)
+        at = _between(t - late, run.t, run.caps)
         found.append(_Looks(t, through(camera, t - late, at), _between(t, run.t, run.sensed)))
     return found
 

@@ -54,7 +54,7 @@ def score_of(
     found: Sequence[tuple[str, Truth, Said]], *, tier: Any, bank: str, sets: int, index: str,
     warnings: tuple[str, ...] = (), shuffled: bool = False,
 ) -> BlindScoreResult:  # fmt: skip
-    """The table of truths and verdicts by name. shuffled: they are of the negative control, in which nothing is true."""
+    """The table of truths and verdicts by name. shuffled: of the negative control, in which nothing is true."""
     pairs = [(t, s) for _, t, s in found]
     rows = [row(metric, pairs, tier) for metric in ((CONTROL,) if shuffled else METRICS)]
     rows += [] if shuffled else [coverage(pairs, tier), calibration_error(pairs, tier)]

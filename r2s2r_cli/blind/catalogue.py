@@ -1,0 +1,23 @@
+"""The diagnoser that is on trial: `diagnose` with the whole catalogue, as `r2s2r diagnose` runs it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from r2s2r_cli.stages.diagnose.evidence import Evidence
+
+
+def diagnosed(evidence: Evidence, settings: dict[str, Any]) -> dict[str, Any]:
+    """The document of `diagnose --json`.
+
+    settings: fields of `stages.diagnose.diagnose.Settings`, and `cache` (folder of compiled steps), `threads`. Raises
+    as `diagnose` does.
+    """
+    from r2s2r_cli.stages.diagnose.diagnose import Settings, diagnose
+    from r2s2r_cli.stages.diagnose.report import document
+
+    own = dict(settings)
+    cache, threads = own.pop("cache", None), int(own.pop("threads", 1))
+    found = diagnose(evidence, Settings(**own), cache_dir=None if cache is None else Path(cache), threads=threads)
+    return document(found)

@@ -60,9 +60,7 @@ def test_a_single_run_has_no_floor_and_says_so(walked: Path) -> None:
     """Nothing is claimed of an error that may be the robot's own scatter."""
     result = invoke("compare", "--project", str(walked), "--no-draw", "--force")
     assert "no policy was run twice" in result.stderr
-    assert compared(walked)["floor"] == {
-        "com_end_m": None, "heading_end_rad": None, "segment_s": None, "keyframe_cap_m": None,
-    }  # fmt: skip
+    assert set(compared(walked)["floor"].values()) == {None}
 
 
 def test_the_pictures_and_the_page_show_the_run(walked: Path) -> None:

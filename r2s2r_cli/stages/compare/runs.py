@@ -79,6 +79,10 @@ def _run(
                          hint="compare in the project of the robot that was recorded")  # fmt: skip
     frames = groups["frames"]
     intervals = _intervals(groups, run, frames)
+    if not (known := np.isfinite(frames["p_WE"][0]).all(axis=-1)).all():
+        raise InputError(f"run {run} starts nowhere: a simulation has no start", where=f"runs/{run}/frames/p_WE",
+                         expected="every end cap at the first frame", received=f"none of cap {int(np.argmin(known))}",
+                         hint="r2s2r validate")  # fmt: skip
     return RealRun(
         name=prefix + run, policy=prefix + _policy(groups[""], run), iteration=iteration,
         intervals=len(groups["intervals"]["first"]),

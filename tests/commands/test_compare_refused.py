@@ -1,0 +1,97 @@
+"""Runs that cannot be compared: exit code 4 with the reason, nothing written; beside good runs they are left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.stages.compare.runs import real_runs
+from r2s2r_cli.store.write import write_artifact
+from tests.commands.conftest import invoke
+from tests.support import builders
+
+Spoil = Callable[[ArtifactData], None]
+
+
+def walked() -> ArtifactData:
+    """The builders' run, both of its intervals complete."""
+    data = builders.estimate()
+    data.groups["runs/walk/intervals"].datasets["complete"][:] = True
+    return data
+
+
+def rows(data: ArtifactData, name: str, count: int) -> None:
+    """Keep the first rows of every dataset of a group of the run."""
+    group = data.groups[f"runs/walk/{name}"]
+    data.groups[f"runs/walk/{name}"] = Group({k: v[:count] for k, v in group.datasets.items()}, group.attributes)
+
+
+def empty(data: ArtifactData) -> None:
+    """No frame, no target."""
+    for name in ("frames", "intervals", "segments"):
+        rows(data, name, 0)
+
+
+def without_targets(data: ArtifactData) -> None:
+    """A log of a robot that somebody moved by hand."""
+    for name in ("intervals", "segments", "policy"):
+        del data.groups[f"runs/walk/{name}"]
+
+
+def one_segment(data: ArtifactData) -> None:
+    """The robot was stopped in its first shape."""
+    for name in ("intervals", "segments"):
+        rows(data, name, 1)
+
+
+def other_robot(data: ArtifactData) -> None:
+    """Recorded with the six-bar one."""
+    root = data.groups["runs/walk"]
+    data.groups["runs/walk"] = replace(root, attributes={**root.attributes, "robot": "sixbar"})
+
+
+def nowhere(data: ArtifactData) -> None:
+    """Where the robot was at first is not a number."""
+    data.groups["runs/walk/frames"].datasets["p_WE"][0, 2] = np.nan
+
+
+CASES = [
+    (empty, "run walk has no gait to compare", "received: 0"),
+    (without_targets, "run walk has no gait to compare", "received: 0"),
+    (one_segment, "run walk has no gait to compare", "received: 1"),
+    (other_robot, "run walk is of another robot", "received: sixbar"),
+    (nowhere, "run walk starts nowhere", "cap 2"),
+]
+
+
+@pytest.mark.parametrize(("spoil", "what", "received"), CASES, ids=[spoil.__name__ for spoil, _, _ in CASES])
+def test_a_run_that_cannot_be_compared_is_refused(project: Path, spoil: Spoil, what: str, received: str) -> None:
+    """In the project of its robot, as the only run."""
+    data = walked()
+    spoil(data)
+    folder = project / "iterations" / "001"
+    folder.mkdir(parents=True, exist_ok=True)
+    write_artifact(folder / "51-estimate.h5", data, builders.provenance(inputs=()))
+    result = invoke("compare", "--project", str(project))
+    assert result.exit_code == 4, result.stderr
+    assert what in result.stderr and received in result.stderr and "hint:" in result.stderr
+    assert not list(folder.glob("60-*"))
+
+
+@pytest.mark.parametrize(("spoil", "what", "received"), CASES, ids=[spoil.__name__ for spoil, _, _ in CASES])
+def test_beside_good_runs_it_is_left_out_with_the_reason(spoil: Spoil, what: str, received: str) -> None:
+    """The others are compared."""
+    data = walked()
+    spoil(data)
+    good = {path.replace("walk", "good"): group for path, group in walked().groups.items()}
+    runs, said = real_runs(
+        ArtifactData("estimate", {**data.groups, **good}), None, builders.robot(), iteration=3, prefix="003-"
+    )
+    assert [run.name for run in runs] == ["003-good"]
+    assert [run.iteration for run in runs] == [3]
+    assert len(said) == 1 and what in said[0] and received.removeprefix("received: ") in said[0]

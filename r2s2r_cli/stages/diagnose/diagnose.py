@@ -1,0 +1,90 @@
+"""A diagnosis, from values to values: parity, where, which, how much, what next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+
+from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.diagnose.diagnosis import Diagnosis
+from r2s2r_cli.stages.diagnose.evidence import Evidence, require_enough
+from r2s2r_cli.stages.diagnose.much.much import much
+from r2s2r_cli.stages.diagnose.next_gait import GaitLibrary, next_gait
+from r2s2r_cli.stages.diagnose.parity import Parity
+from r2s2r_cli.stages.diagnose.parity.parity import parity
+from r2s2r_cli.stages.diagnose.prepare import refit
+from r2s2r_cli.stages.diagnose.which.calibration import Calibration, calibration
+from r2s2r_cli.stages.diagnose.which.numbers import Model
+from r2s2r_cli.stages.diagnose.which.replay import Replayer
+from r2s2r_cli.stages.diagnose.which.which import compare_effects
+from r2s2r_cli.stages.identify.start import Filter
+
+Told = Callable[[str, int, int], None]
+"""Called with the part of the work, how much of it is done, and how much there is."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a diagnosis is made. effects: only these are considered; None: the whole catalogue. step [s]: of the engine.
+    members: of the filter that makes start states. seed: of all that is drawn. with_parity, with_where, with_much: parts
+    that can be left out. calibration: None, that of the package."""
+
+    effects: tuple[str, ...] | None = None
+    step: float = 1e-3
+    members: int = 32
+    seed: int = 0
+    with_parity: bool = True
+    with_where: bool = True
+    with_much: bool = True
+    calibration: Calibration | None = None
+    library: GaitLibrary = field(default_factory=GaitLibrary)
+
+
+def silent(part: str, done: int, total: int) -> None:
+    """No progress."""
+
+
+def diagnose(
+    evidence: Evidence, settings: Settings | None = None, progress: Told = silent, *, cache_dir: Path | None = None,
+    threads: int = 2,
+) -> Diagnosis:  # fmt: skip
+    """Where the gap lies, which effect causes it, how far it shrinks, and what to run next.
+
+    Nothing of the judged intervals is looked at before everything else is decided. Raises InputError where there is too
+    little to diagnose or a setting contradicts the data, NumericalError where nothing can be simulated.
+    """
+    settings = settings or Settings()
+    require_enough(evidence)
+    progress("parity", 0, 1)
+    said: Parity | None = parity(evidence) if settings.with_parity else None
+    if said is not None and said.mismatches:
+        first = said.mismatches[0]
+        raise InputError(first.what, where=first.kind, expected=first.expected, received=first.received, hint=first.hint)
+    progress("parity", 1, 1)
+    belief = Filter(members=settings.members, seed=settings.seed)
+    model = Model(evidence.model)
+    replayer = Replayer(model, step=settings.step, cache_dir=cache_dir, threads=threads)
+    fitted = refit(evidence, replayer, belief=belief, told=progress)
+    compared = compare_effects(
+        fitted.arena, fitted.base, floor_m=fitted.floor.rmse, calibration=settings.calibration or calibration(),
+        starts={} if said is None else said.starts(), suspected=() if said is None else tuple(said.suspected()),
+        effects=settings.effects, seed=settings.seed, told=progress,
+    )  # fmt: skip
+    found = None
+    shrunk = None
+    if settings.with_much and evidence.judge:
+        shrunk = much(evidence, compared, floor_m=fitted.floor.rmse, belief=belief, seed=settings.seed, told=progress)
+    after = next_gait(evidence, compared, settings.library, told=progress)
+    sd = compared.refit.sd
+    return Diagnosis(
+        robot=evidence.robot.name, floor=fitted.floor, parity=said, where=found, which=compared.which, much=shrunk,
+        next_gait=after, refit={
+            name: (float(value), float(sd[k]))
+            for k, (name, value) in enumerate(zip(compared.arena.names, compared.base.z, strict=True))
+        },
+        within_run=evidence.within_run, rollouts=replayer.rollouts, warnings=(*fitted.warnings, *compared.which.warnings),
+    )  # fmt: skip
+
+

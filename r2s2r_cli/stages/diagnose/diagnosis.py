@@ -1,0 +1,40 @@
+"""All that a diagnosis found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from r2s2r_cli.stages.diagnose.evidence import FloorGiven
+from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage
+from r2s2r_cli.stages.diagnose.next_gait import NextGait
+from r2s2r_cli.stages.diagnose.parity import Parity
+from r2s2r_cli.stages.diagnose.where import Where
+from r2s2r_cli.stages.diagnose.which.found import Which
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """parity, where: None where they were left out (an ablation). refit: numbers of the refit nominal model by name, as
+    (value, sd). rollouts: simulated stretches. warnings: for people."""
+
+    robot: str
+    floor: FloorGiven
+    parity: Parity | None
+    where: Where | None
+    which: Which
+    much: Shrinkage | None
+    next_gait: NextGait | None
+    refit: dict[str, tuple[float, float]]
+    within_run: bool
+    rollouts: int
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def channel(self) -> str | None:
+        """Where the cause acts: of the named effect, else of the probe that explains most."""
+        best = self.which.best
+        if self.which.verdict in ("effect", "pair", "ambiguous") and best is not None:
+            return best.channel
+        if self.which.verdict == "unknown" and self.where is not None:
+            return self.where.channel
+        return None

@@ -1,0 +1,90 @@
+"""Shrinkage on judged intervals: stale nominal, refit, refit + effect, and a black box that may do anything."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.stages.measures.bootstrap import DRAWS
+from r2s2r_cli.stages.measures.gap import corrected_gap, own_share
+
+LEVEL = 0.90
+
+
+@dataclass(frozen=True)
+class Shrinkage:
+    """Key-frame cap RMSE [m] over judged segments, each from its own causal start by command replay.
+
+    names: of the judged segments, `RUN:3`; squared: by model (nominal, refit, effect, ceiling), mean squared 3-D
+    distance of the caps (segment,) [m^2]. effects: whose effect it is, best guess where nothing was committed to. share:
+    own share of the effect, None at the floor; ci90 by bootstrap over segments; predicted: the same from intervals that
+    were left out of the fit, before the judged ones were looked at, with its interval. within_run: judged segments share
+    their run with fitted ones.
+    """
+
+    effects: tuple[str, ...]
+    names: tuple[str, ...]
+    squared: dict[str, np.ndarray]
+    floor: float
+    share: float | None
+    ci90: tuple[float, float] | None
+    predicted: float | None
+    predicted_ci90: tuple[float, float] | None
+    within_run: bool
+    missing: tuple[str, ...] = ()
+
+    def rmse(self, model: str) -> float | None:
+        """Of one of the models [m]; None where it was not judged."""
+        known = self.squared.get(model)
+        return None if known is None or not len(known) else float(np.sqrt(np.mean(known)))
+
+    def gap(self, model: str) -> float | None:
+        """Its floor-corrected gap [m]."""
+        known = self.squared.get(model)
+        return None if known is None or not len(known) else corrected_gap(float(np.mean(known)), self.floor)
+
+    @property
+    def refit_share(self) -> float | None:
+        """What refitting alone took off the stale nominal's gap."""
+        nominal, refit = self.squared.get("nominal"), self.squared.get("refit")
+        return None if nominal is None or refit is None else own_share(nominal, refit, self.floor)
+
+    @property
+    def closable(self) -> float | None:
+        """Own share of the black box: what could have been closed."""
+        refit, ceiling = self.squared.get("refit"), self.squared.get("ceiling")
+        return None if refit is None or ceiling is None else own_share(refit, ceiling, self.floor)
+
+
+def share_with_interval(
+    before: np.ndarray, after: np.ndarray, floor: float, *, groups: Sequence[str] = (), seed: int = 0
+) -> tuple[float | None, tuple[float, float] | None]:
+    """Own share of squared errors (segment,) and its 90 % interval by bootstrap over segments, in two levels where
+    `groups` (runs) are several: runs first, then segments within them."""
+    known = np.isfinite(before) & np.isfinite(after)
+    before, after = before[known], after[known]
+    value = own_share(before, after, floor) if len(before) else None
+    if value is None or len(before) < 2:
+        return value, None
+    rng = np.random.default_rng(seed)
+    names = [g for g, keep in zip(groups, known, strict=True) if keep] if len(groups) else []
+    runs = [np.flatnonzero([name == g for g in names]) for name in dict.fromkeys(names)]
+    drawn = []
+    for _ in range(DRAWS // 4):
+        rows = _rows(rng, runs, len(before))
+        G, H = (corrected_gap(float(np.mean(one[rows])), floor) for one in (before, after))
+        if G > 0:
+            drawn.append((G - H) / G)
+    if len(drawn) < DRAWS // 8:
+        return value, None
+    low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return value, (float(low), float(high))
+
+
+def _rows(rng: np.random.Generator, runs: Sequence[np.ndarray], count: int) -> np.ndarray:
+    if len(runs) < 2:
+        return rng.integers(0, count, count)
+    picked = [runs[i] for i in rng.integers(0, len(runs), len(runs))]
+    return np.concatenate([rng.choice(one, len(one)) for one in picked])

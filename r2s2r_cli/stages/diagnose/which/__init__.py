@@ -1,0 +1,1 @@
+"""Stage 2 of a diagnosis: which unmodelled effect explains the gap, against its rivals."""

@@ -1,0 +1,52 @@
+"""From gains to probabilities: one temperature and a few offsets, learned from sets whose truth was known."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+
+import numpy as np
+
+FILE = "calibration.json"
+"""Beside this module; made by the calibration run of the blind trials, and frozen before any blind set exists."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """temperature [nats]: of the softmax over names. equivalent, unknown [nats]: what `none` gains where the
+    equivalence test finds no gap, and what `unknown` must exceed. commit: probability from which one name is given.
+    conformal: names whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many
+    it rests on, 0 for the defaults."""
+
+    temperature: float = 8.0
+    equivalent: float = 6.0
+    unknown: float = 25.0
+    commit: float = 0.5
+    conformal: float = 0.05
+    words: str = "uncalibrated: a temperature by hand"
+    sets: int = 0
+
+    def probabilities(self, scores: Mapping[str, float]) -> dict[str, float]:
+        """Softmax of scores [nats] by name."""
+        names = list(scores)
+        x = np.array([scores[name] for name in names]) / self.temperature
+        x = np.where(np.isfinite(x), x, -1e9)
+        p = np.exp(x - x.max())
+        return dict(zip(names, (p / p.sum()).tolist(), strict=True))
+
+    def within(self, probabilities: Mapping[str, float]) -> tuple[str, ...]:
+        """The 90 % set, most probable first; never empty."""
+        order = sorted(probabilities, key=lambda name: -probabilities[name])
+        kept = [name for name in order if probabilities[name] >= self.conformal]
+        return tuple(kept or order[:1])
+
+
+def calibration() -> Calibration:
+    """The one of the package, or the defaults, which say so."""
+    place = resources.files(__package__).joinpath(FILE)
+    if not place.is_file():
+        return Calibration()
+    known = json.loads(place.read_text(encoding="utf-8"))
+    return Calibration(**{name: known[name] for name in Calibration.__dataclass_fields__ if name in known})

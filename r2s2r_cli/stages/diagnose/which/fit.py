@@ -1,0 +1,218 @@
+"""Hypotheses fitted together: nuisances and the numbers of an effect, all from the same start with the same budget.
+
+Derivatives by the nuisances are exact at the nominal point; those by an effect are secants where the fit is, because
+many effects have no derivative where they are off. Both follow the fit by Broyden's rank-one update.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.candidates import Candidate
+from r2s2r_cli.stages.diagnose.which.robust import minus_log, weight
+
+ITERATIONS = 6
+LENGTHS = (1.0, 0.5, 0.2, 0.05)
+"""Shares of a step that are tried together."""
+SECANT = 0.25
+"""Of a number's scale: length of a secant."""
+LEAST_GAIN = 0.3
+"""[nats] A fit that gains less in a step has ended."""
+PRIOR_SCALES = 2.0
+"""Prior sd of an effect's number, in its scale."""
+MOVED = 0.02
+"""Of the scale: an effect that ends nearer to where it started has not moved."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """What a fit is of. parts: no effect (the refit nominal model), one, or two."""
+
+    parts: tuple[Candidate, ...] = ()
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Ids of the effects."""
+        return tuple(part.effect for part in self.parts)
+
+    @property
+    def label(self) -> str:
+        """`cap_friction, cap 3`, or `none`."""
+        return " + ".join(part.label for part in self.parts) or "none"
+
+    def stack(self, name: str) -> np.ndarray:
+        """A field of all parts, one after the other."""
+        return np.concatenate([getattr(part, name) for part in self.parts]) if self.parts else np.zeros(0)
+
+    @property
+    def spread(self) -> list[tuple[int, ...]]:
+        """Of each of its numbers the places among those of the model."""
+        return [places for part in self.parts for places in part.spread]
+
+
+@dataclass
+class Fit:
+    """A hypothesis on its way. z (p + q,): nuisances; x (k,): the effect's numbers. residual (M,): white; jacobian
+    (M, p + q + k). cost: robust, with priors. start (k,): where it began. on_bound: numbers that ended on a bound."""
+
+    hypothesis: Hypothesis
+    z: np.ndarray
+    x: np.ndarray
+    residual: np.ndarray
+    jacobian: np.ndarray
+    cost: float
+    start: np.ndarray
+    damping: float = 1e-3
+    ended: bool = False
+
+    @property
+    def moved(self) -> bool:
+        """Whether the effect's numbers left their start; a fit that never did says nothing of the size."""
+        scale = self.hypothesis.stack("scale")
+        return bool(np.any(np.abs(self.x - self.start) > MOVED * scale)) if len(self.x) else True
+
+    @property
+    def on_bound(self) -> tuple[str, ...]:
+        """Names of the effect's numbers that ended on a bound."""
+        names = [name for part in self.hypothesis.parts for name in part.names]
+        low, high = self.hypothesis.stack("lower"), self.hypothesis.stack("upper")
+        at = np.isclose(self.x, low, rtol=0, atol=1e-9) | np.isclose(self.x, high, rtol=0, atol=1e-9)
+        return tuple(name for name, bound in zip(names, at, strict=True) if bound)
+
+
+class Fits:
+    """All fits of one arena, moved on together."""
+
+    def __init__(self, arena: Arena) -> None:
+        self.arena = arena
+        self.sizes = arena.sizes
+
+    def cost(self, hypothesis: Hypothesis, z: np.ndarray, x: np.ndarray, residual: np.ndarray) -> np.ndarray:
+        """Robust cost with priors, (k,), at z (k, p + q), x (k, n), residuals (k, M); inf where not finite."""
+        away = z - self.arena.mean
+        prior = 0.5 * np.einsum("ki,ij,kj->k", away, self.arena.precision, away)
+        if x.shape[1]:
+            sd = PRIOR_SCALES * hypothesis.stack("scale")
+            prior = prior + 0.5 * np.sum(((x - hypothesis.stack("off")) / sd) ** 2, axis=1)
+        data = minus_log(self.arena.squares(residual), self.sizes).sum(axis=1)
+        return np.where(np.isfinite(data), data, np.inf) + prior
+
+    def values(self, hypothesis: Hypothesis, z: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Values of the model (k, n)."""
+        found = self.arena.values(z)
+        for k, places in enumerate(hypothesis.spread):
+            found[:, list(places)] = x[:, k : k + 1]
+        return found
+
+    def begin(self, hypothesis: Hypothesis, z: np.ndarray, x: np.ndarray, residual: np.ndarray) -> Fit:
+        """A fit at a point of which the residual (M,) is known; derivatives by the effect are those towards off."""
+        k = len(x)
+        jacobian = np.concatenate([self.arena.by_nuisance, np.zeros((len(residual), k))], axis=1)
+        cost = float(self.cost(hypothesis, z[None], x[None], residual[None])[0])
+        return Fit(hypothesis, z.copy(), x.copy(), residual, jacobian, cost, x.copy())
+
+    def run(
+        self, fits: Sequence[Fit], *, iterations: int = ITERATIONS, told: Callable[[int, int], None] | None = None
+    ) -> None:
+        """Move all fits on until they gain nothing any more. All get the same number of iterations."""
+        self._secants(fits)
+        for iteration in range(iterations):
+            going = [fit for fit in fits if not fit.ended]
+            if not going:
+                break
+            steps = [self._step(fit) for fit in going]
+            points = []
+            for fit, step in zip(going, steps, strict=True):
+                for length in LENGTHS:
+                    points.append(self._moved(fit, length * step))
+            residuals = self._evaluate([(fit.hypothesis, *point) for fit, point in _spread(going, points)])
+            for i, fit in enumerate(going):
+                rows = slice(i * len(LENGTHS), (i + 1) * len(LENGTHS))
+                self._take(fit, points[rows], residuals[rows])
+            if told is not None:
+                told(iteration + 1, iterations)
+
+    def _step(self, fit: Fit) -> np.ndarray:
+        """The damped step (p + q + k,)."""
+        H, g = self.normal(fit)
+        scale = np.sqrt(np.maximum(np.diag(H), 1e-12))
+        A = H / np.outer(scale, scale) + fit.damping * np.eye(len(H))
+        return np.asarray(-np.linalg.solve(A, g / scale) / scale)
+
+    def normal(self, fit: Fit, keep: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Re-weighted normal matrix and gradient, with priors; keep (stretch,) bool: of these stretches only."""
+        w = weight(self.arena.squares(fit.residual[None])[0], self.sizes)
+        n = fit.jacobian.shape[1]
+        H, g = np.zeros((n, n)), np.zeros(n)
+        for k, white in enumerate(self.arena.white):
+            if keep is not None and not keep[k]:
+                continue
+            J = fit.jacobian[white.rows]
+            H += w[k] * J.T @ J
+            g += w[k] * J.T @ fit.residual[white.rows]
+        p = len(fit.z)
+        H[:p, :p] += self.arena.precision
+        g[:p] += self.arena.precision @ (fit.z - self.arena.mean)
+        if len(fit.x):
+            sd = PRIOR_SCALES * fit.hypothesis.stack("scale")
+            H[p:, p:] += np.diag(sd**-2.0)
+            g[p:] += (fit.x - fit.hypothesis.stack("off")) / sd**2
+        return H, g
+
+    def _moved(self, fit: Fit, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        p = len(fit.z)
+        z = np.clip(fit.z + step[:p], self.arena.lower, self.arena.upper)
+        x = np.clip(fit.x + step[p:], fit.hypothesis.stack("lower"), fit.hypothesis.stack("upper"))
+        return z, x
+
+    def _evaluate(self, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]]) -> np.ndarray:
+        values = np.concatenate([self.values(h, z[None], x[None]) for h, z, x in points])
+        return self.arena.residuals(values, np.array([z for _, z, _ in points]))
+
+    def _take(self, fit: Fit, points: Sequence[tuple[np.ndarray, np.ndarray]], residuals: np.ndarray) -> None:
+        """Go to the best point, if it is better, and mend the derivatives by what was seen."""
+        z, x = np.array([point[0] for point in points]), np.array([point[1] for point in points])
+        costs = self.cost(fit.hypothesis, z, x, residuals)
+        best = int(np.argmin(costs))
+        gain = fit.cost - float(costs[best])
+        if not gain > 0:
+            fit.damping *= 100.0
+            fit.ended = fit.damping > 10.0
+            return
+        by = np.concatenate([z[best] - fit.z, x[best] - fit.x])
+        scale = np.concatenate([1.0 / np.sqrt(np.diag(self.arena.precision)), fit.hypothesis.stack("scale")])
+        unit = by / scale
+        if unit @ unit > 0:
+            missing = residuals[best] - fit.residual - fit.jacobian @ by
+            fit.jacobian = fit.jacobian + np.outer(missing, unit / scale / (unit @ unit))
+        fit.z, fit.x, fit.residual, fit.cost = z[best], x[best], residuals[best], float(costs[best])
+        fit.damping = max(1e-6, fit.damping / 3.0 if best < 2 else fit.damping * 3.0)
+        fit.ended = gain < LEAST_GAIN
+
+    def _secants(self, fits: Sequence[Fit]) -> None:
+        """Derivatives by the effects' numbers where the fits are: secants away from the nearer bound."""
+        points, where = [], []
+        for fit in fits:
+            scale = SECANT * fit.hypothesis.stack("scale")
+            room = fit.hypothesis.stack("upper") - fit.x
+            by = np.where(room > scale, scale, -scale)
+            for i in range(len(fit.x)):
+                x = fit.x.copy()
+                x[i] += by[i]
+                points.append((fit.hypothesis, fit.z, x))
+                where.append((fit, i, by[i]))
+        if not points:
+            return
+        for (fit, i, by), residual in zip(where, self._evaluate(points), strict=True):
+            column = (residual - fit.residual) / by
+            fit.jacobian[:, len(fit.z) + i] = np.where(np.isfinite(column), column, 0.0)
+
+
+def _spread(
+    fits: Sequence[Fit], points: Sequence[tuple[np.ndarray, np.ndarray]]
+) -> list[tuple[Fit, tuple[np.ndarray, np.ndarray]]]:
+    return [(fits[i // len(LENGTHS)], point) for i, point in enumerate(points)]

@@ -1,0 +1,161 @@
+"""The numbers of a diagnosis: nuisances that are always fitted again, and those of every effect; the engine reads them.
+
+One simulator has all effects of the catalogue plugged in, so that one machine code serves every hypothesis. At its off
+value an effect is not there, to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from r2s2r_cli.stages.identified import Identified
+from r2s2r_cli.stages.identify.free.base import Coordinate, Free
+from r2s2r_cli.stages.identify.free.mapping import Mapping, Observation
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from r2s2r_cli.engine import Parameters
+
+NUMERICS = ("rolling_resistance", "soft_ground")
+"""Effects that another engine's contact looks like. They are nuisances too, near their off values."""
+NUMERICS_SHARE = 0.15
+"""Of the scale of such an effect: how far from off an engine's numerics alone put it."""
+MOST = 1.0
+"""Of a logarithm: no nuisance that is a factor leaves e^-1 .. e^1."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """One number. kind: `factor`, the field times exp(x), `shift`, the field plus x within 0..1, or `own`, of an effect.
+    field: of Parameters; index: which of its numbers, () for all. off: where it changes nothing. sd: of its prior as a
+    nuisance, from what the nominal model has; scale: of an effect's number, how far from off it usually is."""
+
+    name: str
+    unit: str
+    kind: str
+    field: str
+    index: tuple[int, ...]
+    off: float
+    lower: float
+    upper: float
+    sd: float
+    scale: float
+    what: str
+
+    @property
+    def words(self) -> str:
+        """For people, without what it is of: `friction`."""
+        return self.name.replace("_", " ")
+
+
+NUISANCES = (
+    Number("friction", "log", "factor", "friction", (), 0.0, -MOST, MOST, 0.3, 0.3, "friction of all caps"),
+    Number("motor_speed_in", "log", "factor", "speed_in", (), 0.0, -MOST, MOST, 0.15, 0.15, "speed of all winches in"),
+    Number("motor_speed_out", "log", "factor", "speed_out", (), 0.0, -MOST, MOST, 0.15, 0.15, "speed of all winches out"),
+    Number("restitution", "1", "shift", "restitution", (), 0.0, -1.0, 1.0, 0.1, 0.1, "restitution"),
+    Number("stiffness", "log", "factor", "stiffness", (), 0.0, -MOST, MOST, 0.15, 0.15, "stiffness of all cables"),
+)  # fmt: skip
+"""Of the robot, fitted again in every hypothesis alike. The last stands for how an engine pulls its cables taut."""
+
+
+class Model:
+    """The nominal simulator with all effects at hand: values (n,) or (k, n) of `numbers` -> Parameters.
+
+    It stands where a `Mapping` does (predict.py, start.py). nuisances: places of those that are always fitted;
+    values0 (n,): the nominal simulator.
+    """
+
+    def __init__(self, nominal: Identified, effects: Sequence[str] | None = None) -> None:
+        """effects: those plugged in, by default the whole catalogue. Raises InputError as `Mapping`."""
+        from r2s2r_cli.effects import CATALOGUE
+
+        own = nominal.mapping
+        names = tuple(effect.name for effect in CATALOGUE if effects is None or effect.name in effects)
+        self.robot = nominal.robot
+        self.effects = tuple(effect for effect in CATALOGUE if effect.name in names)
+        self._nominal, self._values = own, nominal.values
+        self._mapping = Mapping(own.robot, own.frees, names, fixed=own.fixed, structure=own.structure)
+        self.structure = self._mapping.structure
+        self._base = self._mapping.theta(nominal.values)
+        numbers = list(NUISANCES)
+        for effect in self.effects:
+            for one in effect.own:
+                count = one.count(self.structure)
+                for i in range(count):
+                    label = "" if one.per == "robot" else f".{self._label(one.per, i)}"
+                    numerics = NUMERICS_SHARE * one.scale if effect.name in NUMERICS else 0.0
+                    numbers.append(
+                        Number(f"{effect.name}.{one.name}{label}", one.unit, "own", f"{effect.name}.{one.name}", (i,),
+                               one.off, one.lower, one.upper, numerics, one.scale, one.what)
+                    )  # fmt: skip
+        self.numbers = tuple(numbers)
+        self.names = tuple(number.name for number in numbers)
+        self.place = {name: k for k, name in enumerate(self.names)}
+        given = {number.field: self._base.extra[number.field] for number in numbers if number.kind == "own"}
+        self.values0 = np.array(
+            [float(given[n.field][0, n.index[0]]) if n.kind == "own" else n.off for n in numbers]
+        )
+        self.nuisances = tuple(
+            k for k, n in enumerate(numbers)
+            if n.kind != "own" or (n.sd > 0 and self.values0[k] == n.off)
+        )  # fmt: skip
+        self.frees = tuple(
+            Free(n.name, n.unit, float(v), n.lower, n.upper, Coordinate.LINEAR, n.sd or n.scale, n.what)
+            for n, v in zip(numbers, self.values0, strict=True)
+        )
+
+    def theta(self, values: np.ndarray | Tensor) -> Parameters:
+        """Parameters at values (n,) or (k, n): batch 1 or k; differentiable."""
+        import torch
+
+        x = torch.as_tensor(values, dtype=torch.float64) if not isinstance(values, torch.Tensor) else values
+        x = x if x.ndim == 2 else x[None]
+        changed: dict[str, Tensor] = {}
+        for k, number in enumerate(self.numbers):
+            value = x[:, k : k + 1]
+            if number.kind == "own":
+                changed.setdefault(number.field, []).append(value)  # type: ignore[arg-type, attr-defined]
+                continue
+            own = getattr(self._base, number.field)
+            by = value.reshape(-1, *[1] * (own.ndim - 1))
+            changed[number.field] = own * by.exp() if number.kind == "factor" else (own + by).clamp(0.0, 1.0)
+        named = {name: torch.cat(one, dim=1) if isinstance(one, list) else one for name, one in changed.items()}
+        return self._base.with_values(named)
+
+    def packed(self, values: np.ndarray | Tensor) -> Tensor:
+        """The flat parameter vector, (NP,) of values (n,), (k, NP) of (k, n)."""
+        from r2s2r_cli.engine.flat import pack_parameters
+
+        flat = pack_parameters(self.structure, self.theta(values))
+        return flat if values.ndim == 2 else flat[0]
+
+    def jacobian(self, values: np.ndarray | Tensor) -> Tensor:
+        """d packed / d values, (NP, n), at values (n,)."""
+        import torch
+
+        return torch.func.jacfwd(self.packed)(torch.as_tensor(values, dtype=torch.float64).detach())
+
+    def observation(self, values: np.ndarray | Tensor | None = None) -> Observation:
+        """What lies between the simulated robot and the log: as identified, and later by an effect's delay."""
+        from r2s2r_cli.engine import delay_of
+
+        own = self._nominal.observation(self._values)
+        late = None if values is None else delay_of(self.structure, self.theta(values))
+        return own if late is None else replace(own, command_delay=own.command_delay + float(late[0, 0]))
+
+    def pid(self, values: object = None) -> object:
+        """The controller, as identified."""
+        del values
+        return self._nominal.pid(self._values)
+
+    def off(self, effect: str) -> tuple[int, ...]:
+        """Places of the numbers of an effect."""
+        return tuple(k for k, number in enumerate(self.numbers) if number.field.split(".")[0] == effect)
+
+    def _label(self, per: str, index: int) -> int:
+        return self.robot.actuated[index] if per == "actuated" else index

@@ -1,0 +1,100 @@
+"""Rivals of the named effects: nothing is wrong, and something without a name; and how far chance carries the best."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.fit import Fit
+from r2s2r_cli.stages.diagnose.which.robust import minus_log
+from r2s2r_cli.stages.diagnose.which.score import Score
+from r2s2r_cli.stages.diagnose.which.screen import Response
+from r2s2r_cli.stages.measures.bootstrap import upper_bound
+
+EQUIVALENT = 1.25
+"""Of the floor: a refit model whose error surely stays below that leaves no gap (design.md, Measures)."""
+WIDER = (1.5, 2.0, 3.0, 5.0, 8.0)
+"""Factors on the floor: how large an error without a name may be."""
+DRAWS = 1000
+
+
+@dataclass(frozen=True)
+class NoGap:
+    """The equivalence test. rmse: of the refit model at the ends of stretches left out [m]; upper: its upper 90 %
+    bound, None for fewer than two stretches; floor [m]; equivalent: the bound is below 1.25 floor."""
+
+    rmse: float
+    upper: float | None
+    floor: float
+
+    @property
+    def equivalent(self) -> bool:
+        """Whether there is no gap above the floor. Not found is not absent: this is a claim of its own."""
+        return self.upper is not None and self.upper < EQUIVALENT * self.floor
+
+
+def no_gap(refit: Score, floor_m: float) -> NoGap:
+    """Of the refit nominal model."""
+    squared = refit.squared[np.isfinite(refit.squared)]
+    rmse = float(np.sqrt(squared.mean())) if len(squared) else float("inf")
+    return NoGap(rmse, upper_bound(squared, level=0.90) if len(squared) else None, floor_m)
+
+
+def unnamed(arena: Arena, base: Fit, raw: Score) -> tuple[float, float]:
+    """Gain of an error of free form over the refit nominal model [nats], and by how much the floor must grow for it.
+
+    Its form is a random walk along each stretch, as the floor's is (a Kennedy-O'Hagan discrepancy); it predicts no
+    gait from another, so it is worth only what its size says.
+    """
+    own, known = arena.floor_m, raw.total
+    best, factor = 0.0, 1.0
+    values = arena.values(base.z[None])
+    for wider in WIDER:
+        arena.whiten(floor_m=wider * own)
+        squares = arena.squares(arena.residuals(values, base.z[None]))[0]
+        density = -minus_log(squares, arena.sizes) - 0.5 * np.array([white.logdet for white in arena.white])
+        gain = float(density.sum()) - known
+        if gain > best:
+            best, factor = gain, wider
+    arena.whiten(floor_m=own)
+    return best, factor
+
+
+def chance(
+    arena: Arena, responses: Sequence[Response], groups: np.ndarray, *, level: float = 0.95, seed: int = 0
+) -> float:
+    """What the best of all candidates gains in held-out density by chance alone, at most, with this probability [nats].
+
+    The parametric bootstrap of the linearised problem: white residuals are drawn, every candidate has one direction,
+    and its length is fitted without a group and judged on it.
+    """
+    known = [one for one in responses if one.testable]
+    if not known:
+        return 0.0
+    names = np.unique(groups)
+    grams = []
+    for name in names:
+        rows = np.concatenate([
+            np.arange(arena.white[k].rows.start, arena.white[k].rows.stop) for k in np.flatnonzero(groups == name)
+        ])  # fmt: skip
+        D = np.stack([one.direction[rows] for one in known], axis=1).astype(float)
+        grams.append(D.T @ D)
+    rng = np.random.default_rng(seed)
+    drawn, length = [], []
+    for gram in grams:
+        value, vector = np.linalg.eigh(gram)
+        root = vector * np.sqrt(np.maximum(value, 0.0))
+        drawn.append(rng.standard_normal((DRAWS, len(known))) @ root.T)
+        length.append(np.diag(gram))
+    b, G = np.array(drawn), np.array(length)  # (group, draw, candidate), (group, candidate)
+    size2 = np.array([one.seen**2 * max(1.0 - one.absorbed, 1e-9) for one in known])
+    prior = 1.0 / np.maximum(size2, 1e-9)
+    gain = np.zeros((DRAWS, len(known)))
+    for g in range(len(names)):
+        without = G.sum(axis=0) - G[g] + prior
+        a = (b.sum(axis=0) - b[g]) / without
+        gain += a * b[g] - 0.5 * a**2 * G[g] - 0.5 * np.log1p(G[g] / without)
+    return float(np.quantile(gain.max(axis=1), level))

@@ -1,0 +1,85 @@
+"""The whole catalogue at a glance: finite responses of every effect and element, with what nuisances explain taken off."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.candidates import Candidate
+from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
+from r2s2r_cli.stages.diagnose.which.robust import minus_log, weight
+
+LEAST_RESPONSE = 1.0
+"""Whitened length below which a response is nothing: the effect cannot be seen in these gaits."""
+CHUNK = 64
+"""Responses kept at a time: whitened residuals of a long evidence are large."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """One candidate in the screening.
+
+    gain: robust log likelihood over the refit nominal model at its best try, nuisances fitted linearly [nats]; size
+    (k,): of that try; start_z (p + q,): nuisances there. seen: whitened length of its largest response; absorbed:
+    share of its square that the nuisances explain; direction (M,): that response per unit length, nuisances taken off.
+    """
+
+    candidate: Candidate
+    gain: float
+    size: np.ndarray
+    start_z: np.ndarray
+    seen: float
+    absorbed: float
+    direction: np.ndarray
+
+    @property
+    def testable(self) -> bool:
+        """Whether these gaits would show it at all."""
+        return self.seen >= LEAST_RESPONSE
+
+
+def screen(arena: Arena, base: Fit, candidates: Sequence[Candidate]) -> tuple[Response, ...]:
+    """Responses of all candidates at the sizes they are tried at, best gain first. base: the refit nominal model."""
+    fits = Fits(arena)
+    rows = [(i, size) for i, one in enumerate(candidates) for size in one.tries]
+    weights = weight(arena.squares(base.residual[None])[0], arena.sizes)
+    by_row = np.concatenate([np.full(w.rows.stop - w.rows.start, k) for w, k in zip(arena.white, weights, strict=True)])
+    Jn = base.jacobian[:, : len(base.z)]
+    normal = (Jn * by_row[:, None]).T @ Jn + arena.precision
+    pull = arena.precision @ (base.z - arena.mean)
+    Q, _ = np.linalg.qr(Jn)
+    best: dict[int, tuple[float, np.ndarray, np.ndarray]] = {}
+    shown: dict[int, tuple[float, float, np.ndarray]] = {}
+    for first in range(0, len(rows), CHUNK):
+        some = rows[first : first + CHUNK]
+        values = np.concatenate([
+            fits.values(Hypothesis((candidates[i],)), base.z[None], size[None]) for i, size in some
+        ])  # fmt: skip
+        residuals = arena.residuals(values, np.repeat(base.z[None], len(some), axis=0))
+        for (i, size), residual in zip(some, residuals, strict=True):
+            if not np.isfinite(residual).all():
+                continue
+            response = residual - base.residual
+            length = float(np.linalg.norm(response))
+            left = response - Q @ (Q.T @ response)
+            kept = float(np.linalg.norm(left))
+            if length > shown.get(i, (0.0, 0.0, residual))[0]:
+                share = 1.0 - (kept / length) ** 2 if length > 0 else 0.0
+                shown[i] = (length, share, left / max(kept, 1e-12))
+            by = -np.linalg.solve(normal, Jn.T @ (by_row * residual) + pull)
+            z = np.clip(base.z + by, arena.lower, arena.upper)
+            after = residual + Jn @ (z - base.z)
+            data = float(minus_log(arena.squares(after[None]), arena.sizes).sum())
+            away = z - arena.mean
+            gain = base.cost - data - 0.5 * float(away @ arena.precision @ away)
+            if i not in best or gain > best[i][0]:
+                best[i] = (gain, size, z)
+    found = []
+    for i, one in enumerate(candidates):
+        length, share, direction = shown.get(i, (0.0, 0.0, np.zeros(len(base.residual))))
+        gain, size, z = best.get(i, (-np.inf, one.off, base.z))
+        found.append(Response(one, gain, size, z, length, share, direction.astype(np.float32)))
+    return tuple(sorted(found, key=lambda one: -one.gain))

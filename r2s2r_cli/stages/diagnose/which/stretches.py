@@ -1,0 +1,129 @@
+"""Target intervals as what hypotheses are scored on: end caps and cable lengths at about 10 frames a second."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from r2s2r_cli.stages.diagnose.evidence import Run
+from r2s2r_cli.stages.identify.data import Selection
+from r2s2r_cli.stages.identify.windows import Window, window
+
+if TYPE_CHECKING:
+    from r2s2r_cli.engine import State
+
+APART_S = 0.08
+"""Frames nearer than this are averaged: errors of a simulator last longer, and half the frames say as much."""
+LEAST_NOISE_M = 5e-4
+LENGTH_NOISE_M = 1e-3
+"""Least noise of a length sensor: its calibration is no better."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """One target interval of a run, with a start state of its own.
+
+    order: 0, 1, ... through the evidence. window: with the thinned frames (F,). caps: (F, cap, 3) [m]; noise: sd of
+    them, (F, cap, 3). length: of the sensors (F, sensor) [m], NaN where not read, or None; length_sd: (F, sensor).
+    sensors: cable of each sensor. t0: of the run's first command, from which drifts count [s].
+    """
+
+    run: str
+    gait: str
+    interval: int
+    order: int
+    window: Window
+    caps: np.ndarray
+    noise: np.ndarray
+    length: np.ndarray | None
+    length_sd: np.ndarray | None
+    sensors: tuple[int, ...]
+
+    @property
+    def t(self) -> np.ndarray:
+        """Stamps of the frames [s], (F,)."""
+        return self.window.run.t[self.window.frames]
+
+    @property
+    def name(self) -> str:
+        """`RUN:3`."""
+        return f"{self.run}:{self.interval}"
+
+
+def stretches(
+    runs: Sequence[Run], part: Sequence[Selection], states: Mapping[tuple[str, int], State], *, whole: bool = False
+) -> tuple[Stretch, ...]:
+    """The intervals of a part of the split. whole: also what comes after a tip-over inside an interval."""
+    named = {run.name: run for run in runs}
+    found: list[Stretch] = []
+    for one in part:
+        run = named[one.run]
+        for number in one.intervals:
+            whole_window = window(run.caps, (number,), states[one.run, number], whole=whole)
+            if len(whole_window.frames) >= 2:
+                found.append(_stretch(run, number, whole_window, len(found)))
+    return tuple(found)
+
+
+def _stretch(run: Run, number: int, own: Window, order: int) -> Stretch:
+    caps = run.caps
+    groups = _groups(caps.t[own.frames])
+    rows = [own.frames[group] for group in groups]
+    t = np.array([caps.t[row].mean() for row in rows])
+    observed = np.array([caps.observed[row].mean(axis=0) for row in rows])
+    share = np.array([1.0 / np.sqrt(len(row)) for row in rows])
+    noise = np.maximum(caps.noise, LEAST_NOISE_M)[None] * share[:, None, None]
+    length = length_sd = None
+    sensors: tuple[int, ...] = ()
+    if run.lengths is not None:
+        length, length_sd = _lengths(run, t, caps.t[[own.first, *own.frames]])
+        sensors = tuple(run.lengths.cable.tolist())
+    thin = replace(
+        caps, t=np.concatenate([caps.t[[own.first]], t]), observed=np.concatenate([caps.observed[[own.first]], observed])
+    )
+    made = replace(
+        own, run=thin, first=0, frames=np.arange(1, len(t) + 1), key=np.arange(len(t)) == len(t) - 1,
+        place=np.zeros(len(t), dtype=int),
+    )  # fmt: skip
+    return Stretch(
+        caps.name, run.gait or caps.name, number, order, made, observed, noise, length, length_sd, sensors
+    )
+
+
+def _groups(t: np.ndarray) -> list[np.ndarray]:
+    """Neighbouring frames that lie within APART_S, the last one alone: it is the key frame."""
+    found: list[list[int]] = []
+    for k in range(len(t) - 1):
+        if found and t[k] - t[found[-1][0]] < APART_S:
+            found[-1].append(k)
+        else:
+            found.append([k])
+    return [np.array(group) for group in found] + [np.array([len(t) - 1])]
+
+
+def _lengths(run: Run, t: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean readings within half a frame of every time, NaN where there is none; and their sd (F, sensor)."""
+    sensed = run.lengths
+    assert sensed is not None  # noqa: S101
+    half = max(APART_S, float(np.median(np.diff(frames))) if len(frames) > 1 else APART_S) / 2
+    sd = noise_of(sensed.length)
+    mean = np.full((len(t), sensed.length.shape[1]), np.nan)
+    count = np.zeros_like(mean)
+    for row, at in enumerate(t):
+        near = np.abs(sensed.t - at) <= half
+        seen = np.isfinite(sensed.length[near])
+        count[row] = seen.sum(axis=0)
+        total = np.where(seen, sensed.length[near], 0.0).sum(axis=0)
+        mean[row] = np.where(count[row] > 0, total / np.maximum(count[row], 1), np.nan)
+    return mean, np.maximum(sd / np.sqrt(np.maximum(count, 1)), LENGTH_NOISE_M)
+
+
+def noise_of(length: np.ndarray) -> np.ndarray:
+    """Sd of a sensor's readings (sensor,) [m], from second differences: what moves smoothly drops out of them."""
+    bend = length[2:] - 2 * length[1:-1] + length[:-2]
+    with np.errstate(all="ignore"):
+        size = np.nanmedian(np.abs(bend), axis=0) / 0.6745 / np.sqrt(6.0)
+    return np.where(np.isfinite(size), size, LENGTH_NOISE_M)

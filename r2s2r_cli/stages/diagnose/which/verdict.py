@@ -1,0 +1,224 @@
+"""From scores to a verdict: what is committed to, what is only possible, and what these gaits cannot tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.calibration import Calibration
+from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
+from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked, Screened, Shift, Which
+from r2s2r_cli.stages.diagnose.which.rivals import NoGap
+from r2s2r_cli.stages.diagnose.which.score import Score
+from r2s2r_cli.stages.diagnose.which.screen import Response
+
+PAIR = 3.0
+"""[nats] beyond chance that a second effect must add."""
+NINETY = 1.645
+INDISTINCT = 3.0
+"""[nats] Two hypotheses nearer than this cannot be told apart."""
+SHIFTED = 1.0
+"""Posterior sd by which an effect moves a nuisance before it is worth saying."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """All that was computed. scores: of fits, without their groups; responses: of the screening, best first."""
+
+    arena: Arena
+    base: Fit
+    refit: Score
+    fits: tuple[Fit, ...]
+    scores: tuple[Score, ...]
+    responses: tuple[Response, ...]
+    chance: float
+    no_gap: NoGap
+    wider: float
+    unexplained: float
+    groups: np.ndarray
+    calibration: Calibration
+
+
+def concluded(m: Material) -> Which:
+    """The verdict."""
+    order = sorted(range(len(m.fits)), key=lambda i: -m.scores[i].total)
+    singles = [i for i in order if len(m.fits[i].hypothesis.parts) == 1]
+    gains = {i: m.scores[i].total - m.refit.total for i in order}
+    best: dict[str, int] = {}
+    for i in singles:
+        best.setdefault(m.fits[i].hypothesis.effects[0], i)
+    names = {name: gains[i] for name, i in best.items()}
+    calibration = m.calibration
+    none = m.chance + (calibration.equivalent if m.no_gap.equivalent else 0.0)
+    table = {**names, NONE: none, UNKNOWN: m.unexplained - calibration.unknown}
+    probability = calibration.probabilities(table)
+    pair, pair_gain = _pair(m, order, gains, best)
+    ranking = [_ranked(m, best[name], gains[best[name]], probability[name], singles, gains) for name in names]
+    ranking += [
+        Ranked(NONE, 0.0, probability[NONE], rmse=m.no_gap.rmse, misfit=_misfit(m.refit)),
+        Ranked(UNKNOWN, m.unexplained, probability[UNKNOWN]),
+    ]
+    ranking.sort(key=lambda one: (-one.probability, -one.gain))
+    verdict, effects, p = _verdict(ranking, calibration, pair)
+    top = best.get(effects[0]) if effects else None
+    return Which(
+        verdict=verdict, effects=effects, probability=p, set90=calibration.within(probability), ranking=tuple(ranking),
+        screened=tuple(
+            Screened(r.candidate.effect, r.candidate.element, r.gain, r.absorbed, r.seen) for r in m.responses
+        ),
+        no_gap=m.no_gap, chance=m.chance, wider=m.wider, unexplained=m.unexplained,
+        confusable=_confusable(m, [best[name] for name in sorted(names, key=lambda n: -names[n])[:4]]),
+        not_testable=_not_testable(m.responses), shifts=() if top is None else _shifts(m, m.fits[top]),
+        within=_left_out(m), calibrated=calibration.words, warnings=_warnings(m, [best[name] for name in names]),
+    )  # fmt: skip
+
+
+def _verdict(
+    ranking: list[Ranked], calibration: Calibration, pair: tuple[str, ...] | None
+) -> tuple[str, tuple[str, ...], float]:
+    first = ranking[0]
+    if first.probability < calibration.commit:
+        return "ambiguous", (), first.probability
+    if first.effect == NONE:
+        return "no_gap", (), first.probability
+    if first.effect == UNKNOWN:
+        return "unknown", (), first.probability
+    if pair is not None and first.effect in pair:
+        return "pair", pair, first.probability
+    return "effect", (first.effect,), first.probability
+
+
+def _pair(
+    m: Material, order: list[int], gains: dict[int, float], best: dict[str, int]
+) -> tuple[tuple[str, ...] | None, float]:
+    """The pair that predicts most, where each of its effects is needed beside the other."""
+    for i in order:
+        effects = m.fits[i].hypothesis.effects
+        if len(effects) == 2:
+            alone = max((gains[best[name]] for name in effects if name in best), default=0.0)
+            more = gains[i] - max(alone, max((gains[k] for k in best.values()), default=0.0))
+            return (effects, gains[i]) if more > m.chance + PAIR else (None, gains[i])
+    return None, 0.0
+
+
+def _ranked(
+    m: Material, i: int, gain: float, probability: float, singles: list[int], gains: dict[int, float]
+) -> Ranked:
+    fit, score = m.fits[i], m.scores[i]
+    part = fit.hypothesis.parts[0]
+    sd = score.sd[len(fit.z) :]
+    low = np.maximum(fit.x - NINETY * sd, part.lower)
+    high = np.minimum(fit.x + NINETY * sd, part.upper)
+    others = [
+        (m.fits[k].hypothesis.parts[0].element, gains[k]) for k in singles
+        if k != i and m.fits[k].hypothesis.effects == fit.hypothesis.effects
+    ]  # fmt: skip
+    return Ranked(
+        effect=part.effect, gain=gain, probability=probability, channel=part.channel, element=_element(m, fit),
+        size=dict(zip(part.names, fit.x.tolist(), strict=True)),
+        ci90={n: (float(a), float(b)) for n, a, b in zip(part.names, low, high, strict=True)},
+        units=dict(zip(part.names, part.units, strict=True)), moved=fit.moved, on_bound=fit.on_bound,
+        rmse=float(np.sqrt(np.nanmean(score.squared))), misfit=_misfit(score),
+        others=tuple((element, g) for element, g in others if element is not None),
+    )  # fmt: skip
+
+
+def _element(m: Material, fit: Fit) -> object:
+    """The element; an effect of the ground with a place in its numbers sits there."""
+    from r2s2r_cli.stages.diagnose.parity.finding import Element
+
+    part = fit.hypothesis.parts[0]
+    if part.element is not None:
+        return part.element
+    own = {name.rsplit(".", 1)[-1]: float(v) for name, v in zip(part.names, fit.x, strict=True)}
+    place = [own.get(key) for key in ("x_m", "y_m")]
+    if None not in place:
+        return Element("place", None, (float(place[0] or 0.0), float(place[1] or 0.0)))
+    kind = {"observation": "camera", "world": "world"}.get(part.channel)
+    del m
+    return Element(kind) if kind else None
+
+
+def _misfit(score: Score) -> float:
+    return float(np.median(score.misfit))
+
+
+def _confusable(m: Material, rows: list[int]) -> tuple[tuple[str, str, float], ...]:
+    """Half the squared whitened distance between what two fits predict, the nuisances and the second one's size
+    fitted to the first [nats]; the smaller of both ways."""
+    responses = {}
+    for i in rows:
+        fit = m.fits[i]
+        J = fit.jacobian
+        p = len(fit.z)
+        Q, _ = np.linalg.qr(J[:, :p])
+        solver = Fits(m.arena)
+        off = fit.hypothesis.stack("off")[None]
+        without = m.arena.residuals(solver.values(fit.hypothesis, fit.z[None], off), fit.z[None])[0]
+        response = fit.residual - without
+        responses[i] = (response - Q @ (Q.T @ response), J[:, p:] - Q @ (Q.T @ J[:, p:]))
+    found = []
+    for a, i in enumerate(rows):
+        for j in rows[a + 1 :]:
+            found.append((
+                m.fits[i].hypothesis.effects[0], m.fits[j].hypothesis.effects[0],
+                min(_distance(responses[i][0], responses[j]), _distance(responses[j][0], responses[i])),
+            ))  # fmt: skip
+    return tuple(sorted(found, key=lambda one: one[2]))
+
+
+def _distance(of: np.ndarray, other: tuple[np.ndarray, np.ndarray]) -> float:
+    basis = np.concatenate([other[0][:, None], other[1]], axis=1)
+    if not np.isfinite(of).all() or not np.isfinite(basis).all():
+        return float("nan")
+    size, *_ = np.linalg.lstsq(basis, of, rcond=None)
+    left = of - basis @ size
+    return 0.5 * float(left @ left)
+
+
+def _not_testable(responses: tuple[Response, ...]) -> tuple[str, ...]:
+    seen: dict[str, bool] = {}
+    for one in responses:
+        seen[one.candidate.effect] = seen.get(one.candidate.effect, False) or one.testable
+    return tuple(sorted(name for name, testable in seen.items() if not testable))
+
+
+def _shifts(m: Material, fit: Fit) -> tuple[Shift, ...]:
+    found = []
+    for k in range(len(m.arena.engine)):
+        name, sd = m.arena.names[k], max(float(m.refit.sd[k]), 1e-9)
+        refit, beside = float(m.base.z[k]), float(fit.z[k])
+        if abs(beside - refit) > SHIFTED * sd:
+            number = m.arena.model.numbers[m.arena.engine[k]]
+            if number.kind == "factor":
+                told = f"{100 * np.expm1(refit):+.0f} % without the effect, {100 * np.expm1(beside):+.0f} % beside it"
+            else:
+                told = f"{refit:.3g} {number.unit} without the effect, {beside:.3g} {number.unit} beside it"
+            words = f"refitting had been hiding {fit.hypothesis.effects[0]} in {number.what}: {told}"
+            found.append(Shift(name, refit, beside, sd, words))
+    return tuple(found)
+
+
+def _left_out(m: Material) -> str:
+    count = len(np.unique(m.groups))
+    if len(set(m.arena.gait.tolist())) > 1:
+        return f"leave one gait out, {count} gaits"
+    runs = {one.run for one in m.arena.many}
+    return f"leave one run out, {count} runs" if len(runs) > 1 else f"leave one interval out, {count} intervals of one run"
+
+
+def _warnings(m: Material, rows: list[int]) -> tuple[str, ...]:
+    said = []
+    for i in rows:
+        fit = m.fits[i]
+        if not fit.moved:
+            said.append(f"the fit of {fit.hypothesis.label} never left its start: its size says nothing")
+        if fit.on_bound:
+            said.append(f"{', '.join(fit.on_bound)} ended on a bound: another size, or another effect")
+    if m.wider > 1.0:
+        said.append(
+            f"what the best effect leaves is {m.wider:g} times the floor: scores count an error of that size as possible"
+        )
+    return tuple(said)

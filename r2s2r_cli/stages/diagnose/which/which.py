@@ -1,0 +1,197 @@
+"""Stage 2 of a diagnosis: which effect. Refit nominal + effect against refit nominal, on gaits that were left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.calibration import Calibration
+from r2s2r_cli.stages.diagnose.which.candidates import candidates
+from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
+from r2s2r_cli.stages.diagnose.which.found import Which
+from r2s2r_cli.stages.diagnose.which.rivals import WIDER, chance, no_gap
+from r2s2r_cli.stages.diagnose.which.robust import minus_log
+from r2s2r_cli.stages.diagnose.which.score import Score, groups_of, scores
+from r2s2r_cli.stages.diagnose.which.screen import Response, screen
+from r2s2r_cli.stages.diagnose.which.verdict import Material, concluded
+
+FITTED = 6
+"""Effects that are fitted, of those that the screening ranks highest."""
+ELEMENTS = 2
+"""Elements of each that are fitted."""
+PLACES = 8
+"""Of a patch on the floor, to begin with."""
+SECOND = 3
+"""Iterations after the floor was widened."""
+
+Told = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What the later stages go on from: the arena, the refit nominal model, the fits best first, their scores."""
+
+    arena: Arena
+    base: Fit
+    fits: tuple[Fit, ...]
+    refit: Score
+    scores: tuple[Score, ...]
+    which: Which
+
+
+def compare_effects(
+    arena: Arena, base: Fit, *, floor_m: float, calibration: Calibration, starts: Mapping[str, Mapping[str, float]],
+    suspected: Sequence[str] = (), effects: Sequence[str] | None = None, seed: int = 0, told: Told,
+) -> Compared:  # fmt: skip
+    """All effects against the refit nominal model `base` of this arena. floor_m: key-frame RMSE with nothing wrong.
+
+    starts, suspected: of the parity stage: sizes to begin with, and effects that are fitted whatever the screening
+    says. effects: only these. Raises NumericalError where nothing can be simulated.
+    """
+    known = [
+        one for one in candidates(arena.model, starts, touched(arena)) if effects is None or one.effect in effects
+    ]
+    told("screening", 0, 1)
+    responses = screen(arena, base, known)
+    told("screening", 1, 1)
+    groups = groups_of(arena)
+    picked = _picked(responses, suspected)
+    fits = _fitted(arena, base, picked, told)
+    wider, unexplained = _widened(arena, fits[0] if fits else base)
+    if wider > 1.0:
+        arena.whiten(floor_m=wider * arena.floor_m)
+        base, *fits = _again(arena, [base, *fits])
+    told("left out", 0, 1)
+    refit, *own = scores(arena, [base, *fits], groups)
+    pairs = _pairs(arena, base, fits, own, responses)
+    if pairs:
+        fits, own = [*fits, *pairs], [*own, *scores(arena, pairs, groups)]
+    told("left out", 1, 1)
+    material = Material(
+        arena=arena, base=base, refit=refit, fits=tuple(fits), scores=tuple(own), responses=responses,
+        chance=chance(arena, responses, groups, seed=seed), no_gap=no_gap(refit, floor_m), wider=wider,
+        unexplained=unexplained, groups=groups, calibration=calibration,
+    )  # fmt: skip
+    which = concluded(material)
+    order = np.argsort([-score.total for score in own], kind="stable")
+    return Compared(
+        arena, base, tuple(fits[i] for i in order), refit, tuple(own[i] for i in order), which
+    )
+
+
+def touched(arena: Arena) -> np.ndarray:
+    """Places (n, 2) [m] where caps stood on the ground, far from each other, PLACES at most."""
+    seen = []
+    for one in arena.many:
+        for frame in one.caps[[0, -1]]:
+            seen.append(frame[np.argsort(frame[:, 2])[:3], :2])
+    points = np.concatenate(seen)
+    kept = [points[0]]
+    while len(kept) < min(PLACES, len(points)):
+        away = np.min(np.linalg.norm(points[:, None] - np.array(kept)[None], axis=-1), axis=1)
+        kept.append(points[int(np.argmax(away))])
+    return np.array(kept)
+
+
+def _picked(responses: Sequence[Response], suspected: Sequence[str]) -> list[Response]:
+    """The best elements of the best effects, and of those that were suspected."""
+    testable = [one for one in responses if one.testable]
+    best = list(dict.fromkeys(one.candidate.effect for one in testable))
+    names = [*best[:FITTED], *(name for name in suspected[:2] if name in best[FITTED:])]
+    found: list[Response] = []
+    for name in names:
+        found += [one for one in testable if one.candidate.effect == name][:ELEMENTS]
+    return found
+
+
+def _fitted(arena: Arena, base: Fit, picked: Sequence[Response], told: Told) -> list[Fit]:
+    """Fits of the picked candidates from several sizes and signs, the best of each, best first."""
+    fits = Fits(arena)
+    points: list[tuple[Hypothesis, np.ndarray, np.ndarray]] = []
+    for response in picked:
+        one = response.candidate
+        for share in (1.0, 0.3, -1.0):
+            x = np.clip(one.off + share * (response.size - one.off), one.lower, one.upper)
+            if share == 1.0 or np.any(np.abs(x - one.off) > 1e-6):
+                points.append((Hypothesis((one,)), response.start_z if share == 1.0 else base.z, x))
+    if not points:
+        return []
+    begun = _begun(arena, fits, points)
+    told("fits", 0, 1)
+    fits.run(begun, told=lambda done, total: told("fits", done, total))
+    return _best_of(begun)
+
+
+def _begun(arena: Arena, fits: Fits, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]]) -> list[Fit]:
+    values = np.concatenate([fits.values(h, z[None], x[None]) for h, z, x in points])
+    residuals = arena.residuals(values, np.array([z for _, z, _ in points]))
+    return [
+        fits.begin(h, z, x, residual)
+        for (h, z, x), residual in zip(points, residuals, strict=True) if np.isfinite(residual).all()
+    ]  # fmt: skip
+
+
+def _best_of(fits: Sequence[Fit]) -> list[Fit]:
+    """Of every hypothesis the fit of least cost, best first."""
+    best: dict[str, Fit] = {}
+    for fit in fits:
+        label = fit.hypothesis.label
+        if label not in best or fit.cost < best[label].cost:
+            best[label] = fit
+    return sorted(best.values(), key=lambda fit: fit.cost)
+
+
+def _widened(arena: Arena, best: Fit) -> tuple[float, float]:
+    """By how much the floor must grow to explain what the best fit leaves, and what that gains [nats]."""
+    own = arena.floor_m
+    values = Fits(arena).values(best.hypothesis, best.z[None], best.x[None])
+    found: dict[float, float] = {}
+    for factor in (1.0, *WIDER):
+        arena.whiten(floor_m=factor * own)
+        squares = arena.squares(arena.residuals(values, best.z[None]))[0]
+        density = -minus_log(squares, arena.sizes) - 0.5 * np.array([white.logdet for white in arena.white])
+        found[factor] = float(density.sum())
+    arena.whiten(floor_m=own)
+    factor = max(found, key=lambda one: found[one])
+    return factor, found[factor] - found[1.0]
+
+
+def _again(arena: Arena, old: Sequence[Fit]) -> list[Fit]:
+    """The fits with the arena's new covariance, each from where it was."""
+    fits = Fits(arena)
+    begun = _begun(arena, fits, [(fit.hypothesis, fit.z, fit.x) for fit in old])
+    for new, fit in zip(begun, old, strict=True):
+        new.start = fit.start
+    fits.run(begun, iterations=SECOND)
+    return begun
+
+
+def _pairs(
+    arena: Arena, base: Fit, fits: Sequence[Fit], own: Sequence[Score], responses: Sequence[Response]
+) -> list[Fit]:
+    """The best single effect with each other one that was fitted: where one effect leaves something, two may not."""
+    if len(fits) < 2:
+        return []
+    order = np.argsort([-score.total for score in own], kind="stable")
+    first = fits[order[0]]
+    others = [fits[i] for i in order[1:] if fits[i].hypothesis.effects != first.hypothesis.effects]
+    seen: set[str] = set()
+    points = []
+    for other in others:
+        if other.hypothesis.effects[0] in seen:
+            continue
+        seen.add(other.hypothesis.effects[0])
+        both = Hypothesis((*first.hypothesis.parts, *other.hypothesis.parts))
+        z = np.clip(first.z + other.z - base.z, arena.lower, arena.upper)
+        points.append((both, z, np.concatenate([first.x, other.x])))
+        points.append((both, first.z, np.concatenate([first.x, 0.5 * (other.x + other.hypothesis.stack("off"))])))
+    del responses
+    fits_of = Fits(arena)
+    begun = _begun(arena, fits_of, points)
+    fits_of.run(begun, iterations=SECOND + 1)
+    return _best_of(begun)[:3]
+
+

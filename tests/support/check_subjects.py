@@ -15,6 +15,7 @@ from r2s2r_cli.checks.subjects import Content, InputState, Journals, Links, Poli
 from r2s2r_cli.stages.init.robots import robot_toml
 from schemas.header import Header, InputRef, Provenance
 from schemas.robot import Robot
+from tests.support import builders
 from tests.support.identified import identification as identified
 
 FRAMES, SAMPLES = 6, 25
@@ -251,6 +252,11 @@ def identification() -> Content:
     return Content(identified(robot()))
 
 
+def plan() -> Content:
+    """Two gaits of one behaviour, one long policy of them."""
+    return Content(builders.plan())
+
+
 def content() -> Content:
     """A whole recording of one run."""
     run = recording()
@@ -336,6 +342,6 @@ def put(place: Any, number: Any) -> Callable[[np.ndarray], None]:
 SOUND: Mapping[str, Callable[[], object]] = {
     "reading": Reading, "links": links, "journals": lambda: Journals(()), "recording": recording, "estimate": estimate,
     "simulation": simulation, "calibration": calibration,
-    "identification": identification, "content": content, "policy": policy, "robot": robot,
+    "identification": identification, "plan": plan, "content": content, "policy": policy, "robot": robot,
 }  # fmt: skip
 """One sound subject of every sort."""

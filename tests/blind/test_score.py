@@ -1,0 +1,101 @@
+"""The table of the trials: closed forms, and that nobody passes it who does not look."""
+
+import math
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.blind.score import score_of
+from r2s2r_cli.blind.score.facts import said_of, truth_of
+from r2s2r_cli.blind.score.rows import same_element
+from r2s2r_cli.blind.score.wilson import Z95, bootstrap, wilson
+from schemas.results_blind import BlindRow, BlindScoreResult
+from tests.support import blind_bank
+
+LABELS = blind_bank.bank()
+
+
+def scored(answer: blind_bank.Answer, **options: bool) -> tuple[BlindScoreResult, dict[str, BlindRow]]:
+    """The table of a reference diagnoser, and its rows by name."""
+    result = score_of(
+        blind_bank.answered(LABELS, answer), tier="B", bank="test", sets=len(LABELS), index="0", **options
+    )
+    return result, {row.name: row for row in result.rows}
+
+
+@pytest.mark.parametrize("answer", [blind_bank.always, blind_bank.by_chance])
+def test_who_does_not_look_fails(answer: blind_bank.Answer) -> None:
+    """Always friction, or any answer: neither names the cause, and both cry wolf."""
+    _, rows = scored(answer)
+    for name in ("top1_clear", "top3_clear", "precision_named", "channel_clear", "element_clear", "false_alarm",
+                 "sub_floor", "outside_recall", "coverage", "ece"):  # fmt: skip
+        assert rows[name].passed is False, name
+
+
+def test_who_knows_passes() -> None:
+    """The same labels, answered rightly: every target is reached, so none is out of reach."""
+    _, rows = scored(blind_bank.right)
+    assert {name for name, row in rows.items() if row.passed is False} == set()
+    assert rows["top1_clear"].value == 1.0 and rows["place_clear"].value == 0.0 and rows["onset_clear"].value == 1.0
+
+
+def test_figures_count_the_sets_they_say() -> None:
+    """Counted again from the labels: clear singles, those under the floor, the share that is always friction."""
+    result, rows = scored(blind_bank.always)
+    clear = [one for one in LABELS if one["kind"] == "single" and one["d"] >= 8]
+    friction = sum(one["effects"][0]["id"] == "friction_field" for one in clear)
+    assert rows["top1_clear"].n == len(clear) and rows["top1_clear"].value == pytest.approx(friction / len(clear))
+    assert rows["sub_floor"].n == sum(one["d"] is not None and one["d"] < 3 for one in LABELS)
+    assert rows["place_clear"].n == friction and rows["place_clear"].value == pytest.approx(0.3)
+    assert sum(map(sum, result.confusion)) == sum(
+        one["kind"] == "none" or (one["d"] >= 8 and one["kind"] != "pair") for one in LABELS
+    )
+    told = next(one for one in result.recall if one.effect == "friction_field")
+    assert told.clear == told.top1 == told.named == friction
+
+
+def test_wilson_solves_its_equation() -> None:
+    """Its ends are where the share found lies z standard deviations away (Wilson 1927), and it stays within 0 .. 1."""
+    for right, n in ((8, 10), (0, 7), (7, 7), (188, 250)):
+        for end in wilson(right, n):
+            assert (right / n - end) ** 2 == pytest.approx(Z95**2 * end * (1 - end) / n, abs=1e-14)
+            assert 0.0 <= end <= 1.0
+
+
+def test_not_shown_where_the_interval_holds_the_target() -> None:
+    """80 per cent of few sets is no proof of 75; of many it is."""
+    few, many = wilson(8, 10), wilson(800, 1000)
+    assert few[0] < 0.75 < few[1] and many[0] > 0.75
+    _, rows = scored(blind_bank.right)
+    for row in rows.values():
+        if row.target is not None and row.low is not None and row.high is not None and row.name != "coverage":
+            assert row.shown is not (row.low < row.target < row.high)
+
+
+def test_an_infinite_distance_is_no_number_in_between() -> None:
+    """Whoever names no place is infinitely far: a median of such stays infinite."""
+    low, high = bootstrap(np.array([0.1, math.inf, math.inf]), "median")
+    assert low == 0.1 and high == math.inf
+
+
+def test_elements_of_one_string_are_the_same() -> None:
+    """Winch, sensor and cable share their numbers; a cap or a rod of that number is something else."""
+    truth = {"kind": "motor", "index": 4}
+    assert same_element(truth, {"kind": "cable", "index": 4}) and not same_element(truth, {"kind": "cap", "index": 4})
+    assert not same_element(truth, {"kind": "motor", "index": 3}) and not same_element(truth, None)
+
+
+def test_a_set_that_failed_is_a_miss_everywhere() -> None:
+    """It counts among the clear ones, and under what was not named."""
+    label = next(one for one in LABELS if one["kind"] == "single" and one["d"] > 8)
+    found = [("a", truth_of(label), said_of({"failed": "no memory", "diagnosis": {}}))]
+    result = score_of(found, tier="B", bank="test", sets=1, index="0")
+    rows = {row.name: row for row in result.rows}
+    assert result.failed == 1 and rows["top1_clear"].value == 0.0 and rows["share_named"].value == 0.0
+    assert result.misses[0].why == "the diagnosis broke off"
+
+
+def test_of_shuffled_commands_only_the_control_is_told() -> None:
+    """Nothing is true there, so nothing else can be scored."""
+    result, rows = scored(blind_bank.always, shuffled=True)
+    assert list(rows) == ["shuffled_named"] and rows["shuffled_named"].passed is False and len(result.rows) == 1

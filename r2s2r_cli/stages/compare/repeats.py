@@ -42,31 +42,43 @@ class Floors:
     gait: float | None = None
 
 
-def grouped(walks: Mapping[str, Walk], policies: Mapping[str, str]) -> dict[str, list[str]]:
-    """Names of the runs of each policy that at least two runs have and that have the same targets."""
-    found: dict[str, list[str]] = {}
-    for name in walks:
-        group = found.setdefault(policies[name], [])
-        whole = len(walks[name].intervals)
-        if not group or same_targets(walks[group[0]].intervals, walks[name].intervals) == whole == len(
-            walks[group[0]].intervals
-        ):
-            group.append(name)
-    return {policy: runs for policy, runs in found.items() if len(runs) > 1}
+SAME_START_M = 0.03
+"""Runs whose first frames, laid on each other, differ by more than this (RMS of the caps) started on another side of
+the robot or in another shape: they repeat nothing. Rest shapes differ by 5 to 20 mm within the controller's tolerance."""
+
+
+def grouped(walks: Mapping[str, Walk], policies: Mapping[str, str]) -> list[list[str]]:
+    """Names of runs that repeat each other: same policy, same targets, same shape at the start; groups of two or more."""
+    found: list[list[str]] = []
+    for name, walk in walks.items():
+        for group in found:
+            if policies[group[0]] == policies[name] and _repeats(walks[group[0]], walk):
+                group.append(name)
+                break
+        else:
+            found.append([name])
+    return [group for group in found if len(group) > 1]
+
+
+def _repeats(one: Walk, other: Walk) -> bool:
+    if same_targets(one.intervals, other.intervals) < max(len(one.intervals), len(other.intervals)):
+        return False
+    away = planar(other.p_WE[0], one.p_WE[0]).move(other.p_WE[0]) - one.p_WE[0]
+    return float(np.sqrt(np.mean(np.sum(away**2, axis=-1)))) < SAME_START_M
 
 
 def repeatability(walks: Mapping[str, Walk], policies: Mapping[str, str]) -> tuple[Repeatability, ...]:
-    """Of every policy with at least two runs."""
+    """Of every group of runs that repeat each other."""
     return tuple(
-        _of(policy, [walks[name] for name in runs], tuple(runs)) for policy, runs in grouped(walks, policies).items()
+        _of(policies[runs[0]], [walks[name] for name in runs], tuple(runs)) for runs in grouped(walks, policies)
     )
 
 
 def floors(walks: Mapping[str, Walk], policies: Mapping[str, str]) -> Floors:
-    """Over all policies with at least two runs; every orthogonal contrast of repeats counts once."""
+    """Over all runs that repeat each other; every orthogonal contrast of repeats counts once."""
     com, turn, segment = [], [], []
     path, cap, gait = [], [], []
-    for runs in grouped(walks, policies).values():
+    for runs in grouped(walks, policies):
         group = [walks[name] for name in runs]
         com.append(contrast_squares(np.array([ended(walk) for walk in group])[:, None, :]))
         at = np.array([walk.laid_on(group[0]).at_phase for walk in group])

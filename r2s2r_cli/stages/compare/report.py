@@ -49,12 +49,14 @@ def report_of(
     walks, policies = {run.name: run.walk for run in runs}, policies_of(runs)
     numbers = list(dict.fromkeys(run.iteration for run in runs))
     floor = {number: _floor(runs, number, keyframe_floor_m) for number in numbers}
-    repeats = {one.policy: _repeatability(one) for one in repeatability(walks, policies)}
-    rows = [_run(one, floor[one.real.iteration], repeats.get(one.real.policy)) for one in compared]
+    repeats = [_repeatability(one) for one in repeatability(walks, policies)]
+    by_run = {run: one for one in repeats for run in one.runs}
+    rows = [_run(one, floor[one.real.iteration], by_run.get(one.real.name)) for one in compared]
     warnings = [text for one in compared for text in one.predicted.warnings]
     if floor[numbers[0]].com_end_m is None:
         warnings.append(
-            "no policy was run twice: where the floor of an end is unknown, an error may be the robot's own scatter"
+            "no policy was run twice from the same shape on the same side: where the floor of an end is unknown, "
+            "an error may be the robot's own scatter"
         )
     seen = {name for model in models for name in model.trained_on}
     return CompareReport(
@@ -64,7 +66,7 @@ def report_of(
         history=tuple(
             _history(number, model, models[0], rows, floor[number]) for number in sorted(numbers) for model in models
         ),
-        repeatability=tuple(repeats.values()), floor=floor[numbers[0]], warnings=tuple(dict.fromkeys(warnings)),
+        repeatability=tuple(repeats), floor=floor[numbers[0]], warnings=tuple(dict.fromkeys(warnings)),
     )  # fmt: skip
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -100,6 +102,27 @@ def test_repeatability_and_floor_are_those_of_the_scatter() -> None:
     assert np.linalg.norm(one.com_mean) == pytest.approx(0.2)
     assert floors(walks, policies).com == pytest.approx(0.02)
     assert floors(walks, policies).heading == pytest.approx(0.0, abs=1e-12)
+
+
+def test_runs_that_start_on_another_side_repeat_nothing() -> None:
+    """Same policy and targets, but the robot lay otherwise: what it did then is no scatter. Two of a kind repeat each
+    other."""
+    tilted = walk(0.1)
+    upside_down = replace(tilted, p_WE=tilted.p_WE * [1, 1, -1] + [0, 0, 0.14])
+    walks = {"run-1": walk(0.1), "run-2": upside_down, "run-3": walk(0.12)}
+    policies = dict.fromkeys(walks, "run")
+    (one,) = repeatability(walks, policies)
+    assert one.runs == ("run-1", "run-3")
+    assert floors(walks, policies).com == pytest.approx(0.04 / np.sqrt(2))
+
+
+def test_floors_along_the_run_are_those_of_the_errors() -> None:
+    """Two repeats that differ by d in an error measure have a floor of d / sqrt 2 in it: that of one of them."""
+    walks = {"run-1": walk(0.1), "run-2": walk(0.12)}
+    errors, known = run_errors(*walks.values()), floors(walks, dict.fromkeys(walks, "run"))
+    for name in ("path", "cap"):
+        assert getattr(known, name) == pytest.approx(getattr(errors, name) / np.sqrt(2))
+    assert known.gait == pytest.approx(np.sqrt(np.mean(errors.gait**2) / 2))
 
 
 def test_a_single_run_has_no_floor() -> None:

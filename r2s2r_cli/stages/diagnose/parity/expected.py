@@ -37,12 +37,13 @@ EXPECTED: dict[str, Expected] = {
     "winch_speed": Expected("1", 0.0, 0.15, 0.015, "the logarithm of all winding rates over the nominal"),
     "winch_rate": Expected("1", 0.0, 0.03, 0.02, "the logarithm of the winding rate of {element} over that of all"),
     "in_over_out": Expected("1", 0.0, 0.03, 0.02, "the logarithm of the rates reeling in over those paying out"),
-    "latency": Expected("s", 0.03, 0.02, 0.008, "how late ramps start and end"),
+    "latency": Expected("s", 0.0, 0.015, 0.008, "how late ramps start and end beyond the usual lag"),
     "lag": Expected("s", 0.03, 0.02, 0.008, "the time constant with which ramps start and run on"),
-    "play": Expected("m", 0.0003, 0.001, 0.0006, "the motion that is lost where a winch reverses"),
+    "play": Expected("m", 0.0, 0.001, 0.0006, "the motion that is lost where a winch reverses"),
     "sag": Expected("1/s", 0.0, 0.006, 0.004, "the loss of winding speed with time"),
     "load": Expected("1", 0.0, 0.012, 0.010, "the loss of winding speed with every other motor that runs"),
     "droop": Expected("1", 0.0, 0.2, 0.15, "the loss of speed reeling in at the usual tension"),
     "spool": Expected("1/m", 0.7, 1.5, 1.0, "the gain of winding speed with the wound length"),
 }
-"""By check. A sensor's own lag and half a frame show as a latency of about 30 ms on a healthy robot."""
+"""By check. A sensor's own lag and half a control tick show as a lag of about 30 ms on a healthy robot; what latency
+and play are measured beyond."""

@@ -43,9 +43,10 @@ def heights(runs: Sequence[Series], robot: Robot) -> Heights | None:
         standing = (np.linalg.norm(caps.v_WE, axis=-1) < STILL_M_PER_S) & (np.abs(over) < near)
         standing &= np.isfinite(one.p_WE).all(axis=-1)
         frame, cap = np.nonzero(standing)
-        interval = np.searchsorted(caps.intervals.first, np.arange(len(one.t)), side="right")
         p = one.p_WE[frame, cap]
-        rows.append(np.column_stack([np.full(len(cap), number), interval[frame], cap, p[:, :2], p[:, 2] - radius[cap]]))
+        rows.append(
+            np.column_stack([np.full(len(cap), number), one.interval[frame], cap, p[:, :2], p[:, 2] - radius[cap]])
+        )
     table = np.concatenate(rows) if rows else np.zeros((0, 6))
     # One point an interval and cap: what a tracker has wrong stays over an interval.
     names, place = np.unique(table[:, [0, 1, 2]], axis=0, return_inverse=True)
@@ -69,7 +70,9 @@ def heights(runs: Sequence[Series], robot: Robot) -> Heights | None:
         normal = (x * weight[:, None]).T @ x / sigma**2 + np.diag(prior)
         beta = np.linalg.solve(normal, (x * weight[:, None]).T @ mean[:, 2] / sigma**2)
         rest = mean[:, 2] - x @ beta
-        sigma = max(1.4826 * float(np.median(np.abs(rest))) * np.sqrt(len(mean) / max(len(mean) - n - 4, 1)), LEAST_SD_M)
+        sigma = max(
+            1.4826 * float(np.median(np.abs(rest))) * np.sqrt(len(mean) / max(len(mean) - n - 4, 1)), LEAST_SD_M
+        )
         weight = np.minimum(1.0, 1.345 * sigma / np.maximum(np.abs(rest), 1e-12))
     cov = np.linalg.inv(normal)
     average = np.eye(len(radius)) - 1.0 / len(radius)
@@ -92,7 +95,7 @@ def _lowest(runs: Sequence[Series], radius: np.ndarray) -> np.ndarray:
         low = np.argsort(caps[..., 2] - radius, axis=1)[:, :3]
         p = np.take_along_axis(caps, low[..., None], axis=1).reshape(-1, 3)
         rows.append(np.column_stack([p[:, :2], np.ones(len(p)), p[:, 2] - radius[low.ravel()]]))
-        group.append(np.zeros(len(p)))
+        group.append(np.repeat(1000 * len(rows) + one.interval, 3))
     table = np.concatenate(rows)
     beta, _ = regression(table[:, 3], table[:, :3], np.concatenate(group))
     return np.nan_to_num(beta)

@@ -37,7 +37,7 @@ def sensor_parity(runs: Sequence[Series]) -> SensorParity | None:
     cables = usable[0].seen.shape[1]
     later = _later(usable)
     shift = later.value if np.isfinite(later.value) else 0.0
-    group = np.concatenate([np.full(len(one.t), i) for i, one in enumerate(usable)])
+    group = np.concatenate([1000 * i + one.interval for i, one in enumerate(usable)])
     since = np.concatenate([one.t - one.t[0] for one in usable])
     sensed = np.concatenate([_moved(one, shift) for one in usable])
     seen = np.concatenate([one.seen for one in usable])

@@ -34,11 +34,12 @@ def parity(evidence: Evidence, *, level: float = 0.05) -> Parity:
     if wrong:
         return Parity((), tuple(wrong), tuple(missing), bool(evidence.healthy), level)
     healthy = evidence.healthy or None
-    first = quantities(runs, robot, speed)
     base = None if healthy is None else quantities(healthy, robot, speed)
+    lag = EXPECTED["lag"].nominal if base is None else base.lag
+    first = quantities(runs, robot, speed, lag=lag)
     scale = _scale(first, base)
     if scale != 1.0:
-        first = quantities(runs, robot, speed, scale=scale)
+        first = quantities(runs, robot, speed, lag=lag, scale=scale)
     missing += list(first.missing)
     if base is None:
         missing.append("healthy runs: findings are against robot.toml, so what it has wrong counts as well")
@@ -63,11 +64,13 @@ def _finding(key: Key, value: Measured, base: Quantities | None, found: Quantiti
         return None
     scale = EXPECTED[check]
     expected, differential = Measured(scale.nominal, scale.built), False
-    if base is not None and key in base.of and math.isfinite(base.of[key].value) and math.isfinite(base.of[key].sd):
+    if base is not None and check == "lag":
+        expected, differential = Measured(base.lag, scale.changed), True
+    elif base is not None and key in base.of and math.isfinite(base.of[key].value) and math.isfinite(base.of[key].sd):
         expected, differential = _posterior(expected, base.of[key], scale.changed), True
     difference = value.value - expected.value
     error = math.sqrt(value.sd**2 + expected.sd**2)
-    z = difference / error
+    z = float(difference / error)
     element = Element(kind, index)
     suspected = suspicions(check, difference, index)
     if check in LAWS:
@@ -81,7 +84,7 @@ def _finding(key: Key, value: Measured, base: Quantities | None, found: Quantiti
     what = f"{scale.words.format(element=element.words())} is {value.value:.4g} {scale.unit}".removesuffix(" 1")
     what += f", {expected.value:.4g} {against}"
     return Finding(
-        check, element, value.value, value.sd, scale.unit, expected.value, expected.sd, differential, z,
+        check, element, float(value.value), float(value.sd), scale.unit, float(expected.value), float(expected.sd), differential, z,
         math.erfc(abs(z) / math.sqrt(2)), what, suspected,
     )  # fmt: skip
 

@@ -13,7 +13,7 @@ from r2s2r_cli.stages.diagnose.parity.lengths import sensor_parity
 from r2s2r_cli.stages.diagnose.parity.rods import lost, rod_scales
 from r2s2r_cli.stages.diagnose.parity.series import Measured, Series, combined, series
 from r2s2r_cli.stages.diagnose.parity.taut import only, taut
-from r2s2r_cli.stages.diagnose.parity.winch import ramps
+from r2s2r_cli.stages.diagnose.parity.winch import Ramps, ramps
 from r2s2r_cli.stages.diagnose.parity.winch_fit import WinchFit, fit_winches
 from schemas.robot import Robot
 
@@ -23,18 +23,22 @@ Key = tuple[str, str, int | None]
 
 @dataclass(frozen=True)
 class Quantities:
-    """of: measured numbers. gain: of every winch law, in nats. missing: what could not be looked at. about: length at
+    """of: measured numbers. gain: of every winch law, in nats, over winches that have the
+    lag they were said to have. lag: that they have [s]. missing: what could not be looked at. about: length at
     which every sensor's bias was taken [m], (cable,)."""
 
     of: dict[Key, Measured]
     gain: dict[str, float]
+    lag: float
     missing: tuple[str, ...]
     about: np.ndarray
 
 
-def quantities(runs: Sequence[Run], robot: Robot, speed: float, *, scale: float | None = None) -> Quantities:
-    """Of runs, all together. speed: nominal, of the winches at full command [m/s]. scale: of the camera, where it is
-    known already; None: as the rods show it."""
+def quantities(
+    runs: Sequence[Run], robot: Robot, speed: float, *, lag: float | None = None, scale: float = 1.0
+) -> Quantities:
+    """Of runs, all together. speed: nominal, of the winches at full command [m/s]. lag: of healthy winches and sensors
+    [s], None: of these runs. scale: of the camera, as it is known already."""
     plain = tuple(series(run, robot) for run in runs)
     found: dict[Key, Measured] = {}
     missing = []
@@ -44,8 +48,7 @@ def quantities(runs: Sequence[Run], robot: Robot, speed: float, *, scale: float 
     shown = combined(scales)
     found["camera_scale", "camera", None] = shown
     found["dropout", "camera", None] = lost(plain)
-    factor = scale if scale is not None else 1.0
-    all_of = plain if factor == 1.0 else tuple(series(run, robot, factor) for run in runs)
+    all_of = plain if scale == 1.0 else tuple(series(run, robot, scale) for run in runs)
     sensors = sensor_parity(all_of)
     about = np.full(len(robot.cables), np.nan)
     if sensors is None:
@@ -67,26 +70,30 @@ def quantities(runs: Sequence[Run], robot: Robot, speed: float, *, scale: float 
         found["slope_change", "camera", None] = _change(all_of, robot)
         for k, one in enumerate(stand.cap):
             found["cap_height", "cap", k] = one
-    fitted = _winches(all_of, robot, speed)
+    data = _ramps(all_of, robot, speed)
+    fitted = None if data is None else fit_winches(data, len(robot.actuated), speed, given={"lag": lag or 0.0})
+    own = lag or 0.0
+    if data is not None and fitted is not None and lag is None:
+        own = max(fitted.laws["lag"].size, 0.0)
+        fitted = fit_winches(data, len(robot.actuated), speed, given={"lag": own})
     if fitted is None:
         missing.append("winches: no cable was seen to wind long enough while it was taut")
-        return Quantities(found, {}, tuple(missing), about)
-    found.update(_rates(fitted, speed, sensors is not None, found))
+        return Quantities(found, {}, own, tuple(missing), about)
+    found.update(_rates(fitted, speed))
     for name, law in fitted.laws.items():
         found[name, "motor", None] = Measured(law.size, law.sd)
-    return Quantities(found, {name: law.gain for name, law in fitted.laws.items()}, tuple(missing), about)
+    return Quantities(found, {name: law.gain for name, law in fitted.laws.items()}, own, tuple(missing), about)
 
 
-def _winches(runs: tuple[Series, ...], robot: Robot, speed: float) -> WinchFit | None:
+def _ramps(runs: tuple[Series, ...], robot: Robot, speed: float) -> Ramps | None:
+    """Of sensors, where there are any, else of cap distances; None without any."""
     rest = np.array([cable.rest_length_m if cable.kind == "passive" else np.nan for cable in robot.cables], dtype=float)
     heard = tuple(one for one in runs if one.has_sensors)
     data = ramps(heard or runs, robot.actuated, rest, seen=not heard)
-    if not len(data):
-        return None
-    return fit_winches(only(data, taut(data, speed)), len(robot.actuated), speed)
+    return only(data, taut(data, speed)) if len(data) else None
 
 
-def _rates(fitted: WinchFit, speed: float, by_sensor: bool, found: dict[Key, Measured]) -> dict[Key, Measured]:
+def _rates(fitted: WinchFit, speed: float) -> dict[Key, Measured]:
     """Logarithms of rates over the nominal: of every winch against the median of all, of all, of in over out."""
     made: dict[Key, Measured] = {}
     size, sd = np.log(fitted.rate / speed), fitted.rate_sd / fitted.rate
@@ -96,7 +103,7 @@ def _rates(fitted: WinchFit, speed: float, by_sensor: bool, found: dict[Key, Mea
     if not np.isfinite(values).any():
         return made
     middle = float(np.nanmedian(values))
-    made["winch_speed", "motor", None] = Measured(middle, 1.2533 * float(np.nanstd(values)) / np.sqrt(len(values)))
+    made["winch_speed", "motor", None] = Measured(middle, 1.2533 * combined(own).sd)
     for k, one in enumerate(own):
         made["winch_rate", "motor", k] = Measured(one.value - middle, one.sd)
     both = size[:, 0] - size[:, 1]

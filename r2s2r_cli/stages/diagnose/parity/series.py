@@ -29,7 +29,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Series:
-    """One run. t: frames [s], (frame,). p_WE: observed end caps [m], (frame, cap, 3), nan where not seen or an outlier;
+    """One run. t: frames [s], (frame,); interval: target interval of each, (frame,). p_WE: observed end caps [m], (frame, cap, 3), nan where not seen or an outlier;
     noise: sd of a coordinate, (cap,) [m]. seen: distance of the caps of every cable [m], (frame, cable), less what noise adds to it; seen_sd: (cable,).
     sensed: what the sensors read at the frames [m], (frame, cable), nan without one; sensed_rate: its rate [m/s].
     heard: times of the readings [s] and what they were [m], (sample,), (sample, cable), nan: none.
@@ -37,6 +37,7 @@ class Series:
 
     name: str
     t: np.ndarray
+    interval: np.ndarray
     p_WE: np.ndarray
     noise: np.ndarray
     seen: np.ndarray
@@ -68,7 +69,8 @@ def series(run: Run, robot: Robot, scale: float = 1.0) -> Series:
         length = np.full((len(t), len(ends)), np.nan)
         length[:, run.lengths.cable] = run.lengths.length
     sensed, rate = _at(caps.t, t, length)
-    return Series(run.name, caps.t, p_WE, sd, seen, np.sqrt(both), sensed, rate, (t, length), run)
+    interval = np.searchsorted(caps.intervals.first, np.arange(len(caps.t)), side="right")
+    return Series(run.name, caps.t, interval, p_WE, sd, seen, np.sqrt(both), sensed, rate, (t, length), run)
 
 
 def _at(t: np.ndarray, stamps: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -105,16 +107,17 @@ def combined(parts: Sequence[Measured], *, least_sd: float = 0.0) -> Measured:
 
 
 def regression(y: np.ndarray, x: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients (n,) of y (row,) on x (row, n) and their covariance (n, n), rows of one number in `group` (row,)
-    being neighbours in time: errors that persist widen the covariance (first-order autoregression), those that stick
-    out count less (Huber). Raises LinAlgError nowhere: what the rows do not say has an infinite variance."""
+    """Coefficients (n,) of y (row,) on x (row, n) and their covariance (n, n). Rows of one number in `group` (row,) are
+    neighbours in time and share an error: the covariance is that of Liang and Zeger (1986) for clusters, and at least
+    that of errors that persist (first-order autoregression). Rows that stick out count less (Huber). nan: too few."""
     keep = np.isfinite(y) & np.isfinite(x).all(axis=1)
     y, x, group = y[keep], x[keep], group[keep]
     n = x.shape[1]
-    if len(y) < n + 2:
+    names, place = np.unique(group, return_inverse=True)
+    if len(y) < n + 2 or len(names) < 2:
         return np.full(n, np.nan), np.full((n, n), np.nan)
     weight = np.ones(len(y))
-    beta, sigma = np.zeros(n), 1.0
+    beta = np.zeros(n)
     for _ in range(4):
         root = np.sqrt(weight)[:, None]
         beta = np.linalg.lstsq(x * root, y * root[:, 0], rcond=None)[0]
@@ -124,7 +127,12 @@ def regression(y: np.ndarray, x: np.ndarray, group: np.ndarray) -> tuple[np.ndar
     rest = y - x @ beta
     spread = float(np.sum(weight * rest**2) / max(len(y) - n, 1))
     inverse = np.linalg.pinv((x * weight[:, None]).T @ x)
-    return beta, inverse * spread * persistence(rest, group)
+    alone = inverse * spread * persistence(rest, group)
+    score = np.zeros((len(names), n))
+    np.add.at(score, place, x * (weight * rest)[:, None])
+    shared = inverse @ (score.T @ score) @ inverse * len(names) / max(len(names) - n, 1)
+    wide = np.sqrt(np.maximum(np.diag(shared), np.diag(alone)) / np.maximum(np.diag(alone), 1e-300))
+    return beta, alone * wide[:, None] * wide[None, :]
 
 
 def persistence(rest: np.ndarray, group: np.ndarray) -> float:

@@ -27,14 +27,13 @@ if TYPE_CHECKING:
 
     from schemas.header import InputRef
     from schemas.policy import PolicyFile
-    from schemas.results_simulate import SimulateReport
 
 
 def execute(
     policies: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Names of policies of 40-plan.h5, policy files or ARTIFACT.h5:NAME. Default: all of the plan.",
+            help="Names of policies of 40-plan.h5, policy files or ARTIFACT.h5:NAME. Default: its long ones.",
             show_default=False,
         ),
     ] = None,
@@ -82,6 +81,7 @@ def execute(
 
     Example: r2s2r execute straight --repeats 3 --port /dev/ttyUSB0 --camera realsense
     """  # fmt: skip
+    from r2s2r_cli.commands.execute_outcome import expect
     from r2s2r_cli.commands.record_run import Wish, carry_out, look
     from r2s2r_cli.commands.stage import require_input
     from r2s2r_cli.stages.record import plans
@@ -111,7 +111,7 @@ def execute(
         seed=None, draw=draw, force=force, stage="execute", inputs=inputs,
     )  # fmt: skip
     wish.recording().require_room(force=force)
-    _expect(here, place, chosen, numbers, console)
+    expect(here, place, runs, numbers, console)
     if dry_run:
         look(wish, console)
         return
@@ -134,11 +134,26 @@ def _chosen(project: Project, place: Iteration, names: Sequence[str]) -> tuple[l
     if not names or len(files) < len(names):
         require_input(plan, f"r2s2r plan --iteration {place.number}")
         _require_fresh(project, place, plan)
-    texts = [text if text in files else f"{plan}:{text}" for text in names] or [str(plan)]
+    texts = [text if text in files else f"{plan}:{text}" for text in names or _long(plan)]
     found = [policy for text in texts for policy in read_policies(text)]
     for policy in found:
         sequence(policy, project.robot())
     return found, Asked(project, place, tuple(texts), None, 0, (), None).refs()
+
+
+def _long(plan: Path) -> list[str]:
+    """The long policies of a plan; where it has none, the best gait of every behaviour."""
+    from r2s2r_cli.store.read import read_artifact
+
+    groups = read_artifact(plan, "plan")[1].groups
+    if "long" in groups:
+        return [name.decode() for name in groups["long"]["name"].tolist()]
+    gaits = groups["primitives"]
+    pairs = zip(gaits["behaviour"].tolist(), gaits["name"].tolist(), strict=True)
+    best: dict[bytes, bytes] = {}
+    for behaviour, name in pairs:
+        best.setdefault(behaviour, name)
+    return [name.decode() for name in best.values()]
 
 
 def _require_fresh(project: Project, place: Iteration, plan: Path) -> None:
@@ -156,45 +171,6 @@ def _require_fresh(project: Project, place: Iteration, plan: Path) -> None:
             where=project.relative(plan), expected="a fresh plan", received="; ".join(found),
             hint=f"r2s2r plan --iteration {place.number}",
         )  # fmt: skip
-
-
-def _expect(
-    project: Project, place: Iteration, policies: Sequence[PolicyFile], numbers: Path | None, console: Console
-) -> None:
-    """What the simulator says that the policies will do."""
-    from r2s2r_cli.views.simulation_page import report_tables
-
-    report = _simulated(project, place, policies, numbers, console)
-    words = "robot.toml: nothing was identified yet" if numbers is None else project.relative(numbers)
-    console.say(f"what the simulator expects (numbers of {words})")
-    for table in report_tables(report):
-        console.table(table.title, table.columns, table.rows)
-    for run in report.runs:
-        for text in run.warnings:
-            console.warn(f"{run.run}: {text}")
-
-
-def _simulated(
-    project: Project, place: Iteration, policies: Sequence[PolicyFile], numbers: Path | None, console: Console
-) -> SimulateReport:
-    from r2s2r_cli.commands.interrupts import loaded
-    from r2s2r_cli.commands.simulate_inputs import Asked
-
-    stage = loaded("r2s2r_cli.stages.simulate")
-    robot, model = project.robot(), Asked(project, place, (), None, 0, (), None, numbers).simulator()
-    requests = [stage.Request(policy) for policy in policies]
-    with console.progress("simulate, policies", len(requests)) as advance:
-        done: set[str] = set()
-
-        def progress(name: str, _: int) -> None:
-            if name not in done:
-                done.add(name)
-                advance(1)
-
-        _, report = stage.simulate(
-            robot, requests, project.config(place, {}).simulate, model=model, cache_dir=project.cache, progress=progress
-        )
-    return report
 
 
 def _ask(console: Console) -> None:

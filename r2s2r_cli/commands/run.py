@@ -85,7 +85,7 @@ def run(
                          hint=f"r2s2r run --until {STAGES[-1]}")  # fmt: skip
     robot: tuple[str, ...] = () if port is None else ("--port", port, "--protocol", protocol.value)
     robot += () if camera is None else ("--camera", camera)
-    names = tuple(policy or ()) or ("straight", "arching", "turn-clockwise", "turn-counterclockwise")
+    names = tuple(policy or ())
     steps = list(_steps(here, place, tuple(source or ()), robot, (random, seed), names, repeats, yes=yes))
     steps = [step for step in steps if STAGES.index(step.name) <= STAGES.index(until)]
     common = ("--project", str(here.root), "--iteration", str(place.number), *(("--quiet",) if quiet else ()),

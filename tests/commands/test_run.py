@@ -54,7 +54,8 @@ def test_a_robot_goes_through_all_stages(project: Path, calls: Calls) -> None:
     ]  # fmt: skip
     record, execute = Child.calls[0], Child.calls[4]
     assert record[1:3] == ["--random", "3"]
-    assert "straight" in execute and "--yes" in execute
+    assert execute[1:3] == ["--repeats", "1"], "the long policies: what `execute` takes by itself"
+    assert "--yes" in execute
     assert all("socket://nowhere:1" in words for words in (record, execute))
 
 

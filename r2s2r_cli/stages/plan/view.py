@@ -46,3 +46,14 @@ def view_reach(X_WC: np.ndarray, camera: Mapping[str, Scalar], robot: Robot) -> 
     normal = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
     edge = np.abs(((seen.mean(axis=0) - seen) * normal).sum(axis=1))
     return max(0.0, float(edge.min()) - out)
+
+
+def far(simulated: ArtifactData) -> dict[str, float]:
+    """How far the middle of the caps comes from where it started, over the ground [m], by run."""
+    found = {}
+    for run in simulated.runs():
+        frames = simulated.group(run, "frames")
+        if frames is not None:
+            xy = frames["p_WE"].mean(axis=1)[:, :2]
+            found[run] = float(np.linalg.norm(xy - xy[0], axis=1).max())
+    return found

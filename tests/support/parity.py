@@ -95,7 +95,8 @@ def jacobian_error(problem: Problem, one: Tensor, other: Tensor, *, floor: float
         row = floor * b[:, r].abs().amax((1, 2))
         for into in problem.inputs().values():
             c = slice(into.start, into.start + into.size)
-            size = torch.maximum(b[:, r, c].abs().amax((1, 2)), row)
+            # What has no derivative at all (a direction that is remembered) must have none in both.
+            size = torch.clamp(torch.maximum(b[:, r, c].abs().amax((1, 2)), row), min=1e-300)
             worst = torch.maximum(worst, (a[:, r, c] - b[:, r, c]).abs().amax((1, 2)) / size)
     return worst
 

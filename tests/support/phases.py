@@ -16,6 +16,8 @@ from tests.support.variants import Variant
 
 STEP = 1e-3
 """[s] of every step in these tests."""
+MEMORY = {"soft_ground.sunk": 1e-6}
+"""By how much memories are stirred, where 0.01 would lift the ground from below the caps."""
 
 
 def phases(variant: Variant, simulator: Simulator, n: int, *, seed: int = 0) -> tuple[dict[str, slice], State]:
@@ -137,7 +139,7 @@ def stirred(state: State, generator: torch.Generator) -> State:
     return replace(
         state, q_WR=roma.quat_normalize(state.q_WR), rest=state.rest + noise(state.rest, 1e-3),
         winding=state.winding + noise(state.winding, 0.02),
-        extra={name: x + noise(x, 0.01) for name, x in state.extra.items()},
+        extra={name: x + noise(x, MEMORY.get(name, 0.01)) for name, x in state.extra.items()},
     )  # fmt: skip
 
 

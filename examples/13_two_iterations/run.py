@@ -11,7 +11,8 @@ import json
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import tomlkit
@@ -21,8 +22,6 @@ sys.path.insert(0, str(HERE))
 from table import Row, rows_of, summary  # noqa: E402 - beside this file
 from world import COMMAND, rig, unknown  # noqa: E402
 
-MEASURES = ("com_end_m", "heading_end_rad", "segment_s")
-
 
 def r2s2r(project: Path, *words: str, quiet: bool = True) -> None:
     """A command that must succeed."""
@@ -30,7 +29,31 @@ def r2s2r(project: Path, *words: str, quiet: bool = True) -> None:
     subprocess.run([*COMMAND, *words, *(["--quiet"] if quiet else [])], cwd=project, check=True, stdout=sys.stderr)
 
 
-def prepared(out: Path, seed: int) -> Path:
+@dataclass(frozen=True)
+class Profile:
+    """How much is done. targets: of the random policy of iteration 1; repeats: of every policy, they make the floor;
+    settings: of project.toml, by stage."""
+
+    targets: int = 12
+    policies: tuple[str, ...] = ("straight", "turn-counterclockwise")
+    repeats: int = 2
+    # One fit: the range over starts and the profiles say how far it can be trusted, and take minutes.
+    settings: Mapping[str, Mapping[str, int]] = field(
+        default_factory=lambda: {"identify": {"starts": 1, "profiles": 0}}
+    )
+
+
+DEMO = Profile(
+    targets=8,
+    settings={
+        "identify": {"starts": 1, "profiles": 0, "max_iterations": 8},
+        "plan": {"draws": 4, "candidates": 24, "kept": 4, "beam": 100, "cycles": 3},
+    },
+)  # fmt: skip
+"""Minutes instead of a quarter of an hour: `make demo`."""
+
+
+def prepared(out: Path, seed: int, profile: Profile) -> Path:
     """A project with a calibrated robot, and the world that it will meet."""
     project = out / f"seed-{seed}"
     if not (project / "calibration.h5").exists():
@@ -38,8 +61,8 @@ def prepared(out: Path, seed: int) -> Path:
         out.mkdir(parents=True, exist_ok=True)
         r2s2r(out, "init", project.name, "--robot", "threebar")
         settings = tomlkit.parse((project / "project.toml").read_text("utf-8"))
-        # One fit: the range over starts and the profiles say how far it can be trusted, and take minutes.
-        settings["identify"].update({"starts": 1, "profiles": 0})
+        for stage, values in profile.settings.items():
+            settings[stage].update(values)
         (project / "project.toml").write_text(tomlkit.dumps(settings), "utf-8")
         (project / "drawn.json").write_text(json.dumps(unknown(project, seed), indent=1), "utf-8")
         r2s2r(project, "rig", "--robot", "truth.toml", "--world", "world.toml", "--points", "points.csv")
@@ -47,12 +70,12 @@ def prepared(out: Path, seed: int) -> Path:
     return project
 
 
-def iterate(project: Path, number: int, seed: int, targets: int, policies: Sequence[str], repeats: int) -> None:
+def iterate(project: Path, number: int, seed: int, profile: Profile) -> None:
     """One iteration, the robot being the rig."""
-    names = [word for name in policies for word in ("--policy", name)]
+    names = [word for name in profile.policies for word in ("--policy", name)]
     with rig(project) as robot:
-        r2s2r(project, "run", "--iteration", str(number), *robot, "--random", str(targets), "--seed", str(seed), *names,
-              "--repeats", str(repeats), "--yes", quiet=False)  # fmt: skip
+        r2s2r(project, "run", "--iteration", str(number), *robot, "--random", str(profile.targets), "--seed", str(seed),
+              *names, "--repeats", str(profile.repeats), "--yes", quiet=False)  # fmt: skip
 
 
 def compared(project: Path, number: int, models: dict[str, Path]) -> dict[str, object]:
@@ -90,34 +113,30 @@ def measured(project: Path, *, paper: bool) -> list[Row]:
     return [
         row
         for number, words in ((1, "the same runs"), (2, "new policies"))
-        for row in rows_of(compared(project, number, models), words)
+        for row in rows_of(compared(project, number, models), words, project.name)
     ]
 
 
-def main(
-    out: Path, seeds: Sequence[int], *, targets: int, policies: Sequence[str], repeats: int, paper: bool,
-    say: Callable[[str], None] = print,
-) -> None:  # fmt: skip
+def main(out: Path, seeds: Sequence[int], profile: Profile, *, paper: bool, say: Callable[[str], None] = print) -> None:
     """Everything, into `out`. say: where the table goes."""
     found: list[Row] = []
     for seed in seeds:
-        project = prepared(out, seed)
+        project = prepared(out, seed, profile)
         for number in (1, 2):
-            iterate(project, number, seed, targets, policies, repeats)
+            iterate(project, number, seed, profile)
         found += measured(project, paper=paper)
-        say(f"after seed {seed}")
+        say(f"\nafter seed {seed}: median (range) over {len({row.seed for row in found})} seeds")
         for line in summary(found):
             say(line)
+        say(f"look at: {project}/iterations/002/60-compare.html")
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("two-iterations"))
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
-    parser.add_argument("--targets", type=int, default=12, help="of the random policy of iteration 1")
-    parser.add_argument("--policies", nargs="+", default=["straight", "turn-counterclockwise"])
-    parser.add_argument("--repeats", type=int, default=2, help="of every policy: they make the floor")
-    parser.add_argument("--no-paper", action="store_true", help="leave the paper's preset out")
+    parser.add_argument(
+        "--demo", action="store_true", help="the short profile of `make demo`, without the paper's preset"
+    )
     given = parser.parse_args()
-    main(given.out.resolve(), given.seeds, targets=given.targets, policies=given.policies, repeats=given.repeats,
-         paper=not given.no_paper)  # fmt: skip
+    main(given.out.resolve(), given.seeds, DEMO if given.demo else Profile(), paper=not given.demo)

@@ -16,6 +16,7 @@ MEASURES = {"com_end_m": ("centre of mass at the end", 1e3, "mm"), "heading_end_
 class Row:
     """One measure of one seed on one set of runs. error, gap (above the floor): by simulator."""
 
+    seed: str
     runs: str
     measure: str
     floor: float | None
@@ -30,14 +31,14 @@ class Row:
         return first / now if now > 0 else inf
 
 
-def rows_of(report: Mapping[str, Any], runs: str) -> Iterator[Row]:
+def rows_of(report: Mapping[str, Any], runs: str, seed: str) -> Iterator[Row]:
     """The rows of one comparison."""
     for measure in MEASURES:
         found = {one["model"]: one["runs"].get(measure) for one in report["models"]}
         known = {name: one for name, one in found.items() if one is not None}
         floor = next((one["floor"] for one in known.values()), None)
         yield Row(
-            runs, measure, floor, {name: one["rms"] for name, one in known.items()},
+            seed, runs, measure, floor, {name: one["rms"] for name, one in known.items()},
             {name: one["gap"] for name, one in known.items() if one["gap"] is not None},
         )  # fmt: skip
 

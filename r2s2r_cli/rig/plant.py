@@ -90,6 +90,7 @@ class Plant:
         """Time of the plant; MuJoCo's own starts at the settling and would be a sum of rounded steps."""
         self._steps, self._begin = 0, self._t
         self.advance(world.start.settle_s, np.zeros(len(robot.motors)))
+        self._start = self.sim.read().p_WE
 
     @property
     def t(self) -> float:
@@ -108,17 +109,18 @@ class Plant:
             self._steps += 1
 
     def put_back(self) -> None:
-        """Where the world file asks for it: the robot lies at its start again, as it is, at rest, turned at random."""
-        start = self.world.start
-        if not start.put_back:
+        """Where the world file asks for it: the robot lies at its start again, on the side it lay on then, in the shape
+        that its cables have now, at rest, turned at random."""
+        if not self.world.start.put_back:
             return
-        data, R_WG = self.sim.data, self._R_WG
+        data, R_WG, seen = self.sim.data, self._R_WG, self.sim.read()
         a = self._hand.uniform(-np.pi, np.pi)
         R_GH = np.array([[np.cos(a), -np.sin(a), 0.0], [np.sin(a), np.cos(a), 0.0], [0.0, 0.0, 1.0]])
-        turn = R_WG @ R_GH @ R_WG.T
-        seen: Reading = self.sim.read()
-        middle = seen.p_WE.mean(axis=0)
-        there = R_WG @ np.array([*start.position_m, (R_WG.T @ middle)[2]])
+        there, middle = self._start.mean(axis=0), seen.p_WE.mean(axis=0)
+        turn = R_WG @ R_GH @ R_WG.T @ _turn(seen.p_WE - middle, self._start - there)
+        # It is laid down: its lowest cap as high above the floor as the lowest was at first.
+        up = R_WG[:, 2]
+        there = there + up * (((self._start - there) @ up).min() - ((seen.p_WE - middle) @ turn.T @ up).min())
         pose = data.qpos.reshape(-1, 7)
         pose[:, :3] = (seen.p_WR - middle) @ turn.T + there
         pose[:, 3:] = wxyz(np.array([quaternion(turn @ R) for R in rotation(seen.q_WR)]))
@@ -200,6 +202,12 @@ class Plant:
         model.geom_priority[self._caps] = model.geom_priority[self._ground] + 1
         model.geom_condim[self._caps] = model.geom_condim[self._ground]
         model.geom_friction[self._caps] = model.geom_friction[self._ground]
+
+
+def _turn(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The rotation (3, 3) that takes points a (n, 3) nearest to b, both about the origin (Kabsch)."""
+    u, _, v = np.linalg.svd(b.T @ a)
+    return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v)
 
 
 def _options(world: World) -> Options:

@@ -34,8 +34,9 @@ class Start(Section):
     settle_s: NonNegative = 3.0
     """How long it comes to rest before the rig's time 0 [s]."""
     put_back: bool = False
-    """Whenever its motors are told to stop after it has moved, a hand puts it back there: in the shape it has, on the
-    side it lies on, at rest, turned about the vertical at random (from the seed). A host says stop between two runs."""
+    """Whenever its motors are told to stop after it has moved, a hand puts it back there: on the side it lay on at
+    first, in the shape it has, at rest, turned about the vertical at random (from the seed). A host says stop between
+    runs."""
 
 
 class World(Section):

@@ -132,6 +132,17 @@ class PlanSettings(Frozen):
     """And its heading [deg]."""
 
 
+class DiagnoseSettings(Frozen):
+    """Settings of `diagnose`. What each does: docs/guides/diagnose.md."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
+    step_s: Annotated[float, Field(strict=True, gt=0, le=0.01)] = 0.001
+    """Step of the engine [s]. Where cables are stiff it is divided further."""
+    members: Annotated[int, Field(strict=True, ge=16, le=1024)] = 32
+    """Members of the ensemble that finds where every target interval starts."""
+
+
 class RunConfig(Frozen):
     """The settings of every stage; a stage stores its own section in what it writes."""
 
@@ -142,6 +153,7 @@ class RunConfig(Frozen):
     simulate: SimulateSettings = SimulateSettings()
     identify: IdentifySettings = IdentifySettings()
     plan: PlanSettings = PlanSettings()
+    diagnose: DiagnoseSettings = DiagnoseSettings()
 
 
 class ProjectFile(RunConfig):

@@ -11,6 +11,7 @@ from typing import Any
 from schemas.base import ArtifactSpec
 from schemas.calibration import CALIBRATION
 from schemas.compare import COMPARISON
+from schemas.diagnosis import DIAGNOSIS
 from schemas.estimate import ESTIMATE
 from schemas.floor import FLOOR
 from schemas.identification import IDENTIFICATION
@@ -21,7 +22,8 @@ from schemas.simulation import SIMULATION
 
 KINDS: dict[str, ArtifactSpec] = {
     spec.kind: spec
-    for spec in (CALIBRATION, RECORDING, ESTIMATE, IDENTIFICATION, PLAN, POLICY, SIMULATION, COMPARISON, FLOOR)
+    for spec in (CALIBRATION, RECORDING, ESTIMATE, IDENTIFICATION, PLAN, POLICY, SIMULATION, COMPARISON, FLOOR,
+                 DIAGNOSIS)
 }
 """The artifact kinds by name, in the order of the data."""
 
@@ -63,6 +65,6 @@ def chain(
 STAGE_VERSIONS: dict[str, int] = {
     "import": 1, "calibrate": 1, "record": 1, "estimate": 1, "identify": 1, "simulate": 1, "floor": 1,
     "plan": 1, "execute": 1,
-    "compare": 1,
+    "compare": 1, "diagnose": 1,
 }  # fmt: skip
 """Raised by hand when a stage computes something else from the same input; `status` then calls its results stale."""

@@ -13,6 +13,7 @@ from r2s2r_cli.commands.bench import bench_app
 from r2s2r_cli.commands.blind import blind_app
 from r2s2r_cli.commands.calibrate import calibrate
 from r2s2r_cli.commands.compare import compare
+from r2s2r_cli.commands.diagnose import diagnose
 from r2s2r_cli.commands.doctor import doctor_app
 from r2s2r_cli.commands.estimate import estimate
 from r2s2r_cli.commands.execute import execute
@@ -42,6 +43,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "plan": plan,
     "execute": execute,
     "compare": compare,
+    "diagnose": diagnose,
     "run": run,
     "floor": floor,
     "simulate": simulate,

@@ -48,6 +48,8 @@ ROBOT_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
              "sensors": ("cable", "stiffness_n_per_m", "rest_length_m"), "rest_caps_m": ()},
     "identify": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),
                  "sensors": ("cable", "stiffness_n_per_m", "rest_length_m"), "rest_caps_m": ()},
+    "diagnose": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),
+                 "sensors": (), "rest_caps_m": ()},
 }  # fmt: skip
 """Which part of robot.toml each stage uses; a change elsewhere does not make its results stale."""
 

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, Protocol
 
+import numpy as np
 
 from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.diagnose.diagnosis import Diagnosis
+from r2s2r_cli.stages.diagnose.diagnosis import Diagnosis, SegmentSeen
 from r2s2r_cli.stages.diagnose.evidence import Evidence, require_enough
 from r2s2r_cli.stages.diagnose.much.much import much
 from r2s2r_cli.stages.diagnose.next_gait import GaitLibrary, next_gait
 from r2s2r_cli.stages.diagnose.parity import Parity
+from r2s2r_cli.stages.diagnose.parity.finding import discoveries
 from r2s2r_cli.stages.diagnose.parity.parity import parity
 from r2s2r_cli.stages.diagnose.prepare import refit
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration, calibration
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
-from r2s2r_cli.stages.diagnose.which.which import compare_effects
+from r2s2r_cli.stages.diagnose.which.which import Compared, compare_effects
 from r2s2r_cli.stages.identify.start import Filter
+
+FALSE = 0.05
+"""Share of false ones among the segments that are said to have a gap (Benjamini-Hochberg)."""
 
 Told = Callable[[str, int, int], None]
 """Called with the part of the work, how much of it is done, and how much there is."""
@@ -42,13 +48,23 @@ class Settings:
     library: GaitLibrary = field(default_factory=GaitLibrary)
 
 
+class Checkpoint(Protocol):
+    """Where work is kept: a `store.checkpoint.CheckpointFile`."""
+
+    def load(self) -> dict[str, Any] | None:
+        """What was kept; None: nothing."""
+
+    def save(self, values: Mapping[str, Any]) -> None:
+        """Keep this instead."""
+
+
 def silent(part: str, done: int, total: int) -> None:
     """No progress."""
 
 
 def diagnose(
     evidence: Evidence, settings: Settings | None = None, progress: Told = silent, *, cache_dir: Path | None = None,
-    threads: int = 2,
+    threads: int = 2, checkpoint: Checkpoint | None = None,
 ) -> Diagnosis:  # fmt: skip
     """Where the gap lies, which effect causes it, how far it shrinks, and what to run next.
 
@@ -57,20 +73,23 @@ def diagnose(
     """
     settings = settings or Settings()
     require_enough(evidence)
+    kept = (checkpoint.load() if checkpoint is not None else None) or {}
     progress("parity", 0, 1)
     said: Parity | None = parity(evidence) if settings.with_parity else None
     if said is not None and said.mismatches:
         first = said.mismatches[0]
-        raise InputError(first.what, where=first.kind, expected=first.expected, received=first.received, hint=first.hint)
+        raise InputError(
+            first.what, where=first.kind, expected=first.expected, received=first.received, hint=first.hint
+        )
     progress("parity", 1, 1)
     belief = Filter(members=settings.members, seed=settings.seed)
     model = Model(evidence.model)
     replayer = Replayer(model, step=settings.step, cache_dir=cache_dir, threads=threads)
-    fitted = refit(evidence, replayer, belief=belief, told=progress)
+    fitted = refit(evidence, replayer, belief=belief, told=progress, kept=kept, keep=_keeper(checkpoint, kept))
     compared = compare_effects(
         fitted.arena, fitted.base, floor_m=fitted.floor.rmse, calibration=settings.calibration or calibration(),
         starts={} if said is None else said.starts(), suspected=() if said is None else tuple(said.suspected()),
-        effects=settings.effects, seed=settings.seed, told=progress,
+        effects=settings.effects, seed=settings.seed, told=progress, kept=kept, keep=_keeper(checkpoint, kept),
     )  # fmt: skip
     found = None
     shrunk = None
@@ -84,7 +103,42 @@ def diagnose(
             name: (float(value), float(sd[k]))
             for k, (name, value) in enumerate(zip(compared.arena.names, compared.base.z, strict=True))
         },
-        within_run=evidence.within_run, rollouts=replayer.rollouts, warnings=(*fitted.warnings, *compared.which.warnings),
+        segments=_segments(compared), within_run=evidence.within_run, rollouts=replayer.rollouts, warnings=(*fitted.warnings, *compared.which.warnings),
     )  # fmt: skip
 
 
+def _keeper(checkpoint: Checkpoint | None, kept: dict[str, Any]) -> Callable[[str, Any], None]:
+    """Keeps a value under a name, beside all that was kept before."""
+
+    def keep(name: str, value: Any) -> None:
+        kept[name] = value
+        if checkpoint is not None:
+            checkpoint.save(kept)
+
+    return keep
+
+
+def _segments(compared: Compared) -> tuple[SegmentSeen, ...]:
+    """The fitted intervals as the refit nominal model and the best effect predict them when they are left out."""
+    from scipy.stats import chi2
+
+    refit = compared.refit
+    best = compared.scores[0] if compared.scores else None
+    size = np.array([white.size for white in compared.arena.white])
+    p = chi2.sf(refit.misfit * size, size)
+    gap = discoveries(np.where(np.isfinite(p), p, 0.0), FALSE)
+    return tuple(
+        SegmentSeen(
+            run=one.run,
+            interval=one.interval,
+            gait=one.gait,
+            t=(one.window.start, float(one.t[-1])),
+            refit=float(np.sqrt(refit.squared[k])),
+            effect=None if best is None else float(np.sqrt(best.squared[k])),
+            misfit=float(refit.misfit[k]),
+            gap=bool(gap[k]),
+            key=one.caps[-1],
+            error=refit.key[k],
+        )
+        for k, one in enumerate(compared.arena.many)
+    )

@@ -4,12 +4,32 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from r2s2r_cli.stages.diagnose.evidence import FloorGiven
 from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage
 from r2s2r_cli.stages.diagnose.next_gait import NextGait
 from r2s2r_cli.stages.diagnose.parity import Parity
 from r2s2r_cli.stages.diagnose.where import Where
 from r2s2r_cli.stages.diagnose.which.found import Which
+
+
+@dataclass(frozen=True)
+class SegmentSeen:
+    """One fitted target interval, left out of the fit. refit, effect: cap RMSE at its end [m], without and with the best
+    effect, None where none was fitted. misfit: squares over what noise and floor explain; gap: it stands out. t [s]: of
+    start and end. key, error (cap, 3) [m]: observed caps there, and simulated minus observed ones."""
+
+    run: str
+    interval: int
+    gait: str
+    t: tuple[float, float]
+    refit: float
+    effect: float | None
+    misfit: float
+    gap: bool
+    key: np.ndarray
+    error: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -25,6 +45,7 @@ class Diagnosis:
     much: Shrinkage | None
     next_gait: NextGait | None
     refit: dict[str, tuple[float, float]]
+    segments: tuple[SegmentSeen, ...]
     within_run: bool
     rollouts: int
     warnings: tuple[str, ...] = ()

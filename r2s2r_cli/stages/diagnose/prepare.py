@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -42,15 +43,25 @@ class Refit:
     warnings: tuple[str, ...] = ()
 
 
-def refit(evidence: Evidence, replayer: Replayer, *, belief: Filter, told: Told, begin: np.ndarray | None = None) -> Refit:
-    """The nominal model fitted again to the intervals of `fit`, its nuisances alone. begin: nuisances to start from.
+def refit(
+    evidence: Evidence,
+    replayer: Replayer,
+    *,
+    belief: Filter,
+    told: Told,
+    kept: Mapping[str, Any] | None = None,
+    keep: Callable[[str, Any], None] = lambda name, value: None,
+) -> Refit:
+    """The nominal model fitted again to the intervals of `fit`, its nuisances alone. kept, keep: nuisances that were
+    reached before an interruption, and where to keep them.
 
     With healthy runs these are fitted first: they say what the numbers were, how large the floor is and how wrong the
     stated noise. Raises NumericalError where nothing can be simulated, InputError where nothing is left to fit.
     """
     floor, warnings = floor_for(evidence)
     simulator = np.sqrt(max(floor.rmse**2 - floor.sensor**2, (0.25 * floor.rmse) ** 2))
-    prior = None
+    kept = kept or {}
+    begin = prior = None
     noise = 1.0
     if evidence.healthy:
         told("healthy runs", 0, 1)
@@ -58,11 +69,12 @@ def refit(evidence: Evidence, replayer: Replayer, *, belief: Filter, told: Told,
             Selection(run.name, tuple(i + 1 for i, whole in enumerate(run.caps.intervals.complete.tolist()) if whole))
             for run in evidence.healthy
         )
-        arena, base = _fitted(evidence.healthy, part, replayer, simulator, 1.0, None, belief, None)
+        arena, base = _fitted(evidence.healthy, part, replayer, simulator, 1.0, None, belief, _known(kept, "healthy"))
         simulator, noise = _calibrated(arena, base)
         arena.whiten(floor_m=simulator, noise=noise)
         prior = _posterior(arena, base)
         begin = base.z
+        keep("healthy", base.z.tolist())
         if evidence.floor is None:
             sensor = float(np.sqrt(np.mean([np.sum(one.noise[-1] ** 2, axis=-1).mean() for one in arena.many])))
             ends = Fits(arena)
@@ -70,8 +82,14 @@ def refit(evidence: Evidence, replayer: Replayer, *, belief: Filter, told: Told,
             rmse = float(np.sqrt(np.mean(np.sum(key**2, axis=-1))))
             floor = FloorGiven(rmse, min(sensor, rmse), "the healthy runs, refitted", True)
         told("healthy runs", 1, 1)
-    arena, base = _fitted(evidence.runs, evidence.fit, replayer, simulator, noise, prior, belief, begin, told)
+    arena, base = _fitted(evidence.runs, evidence.fit, replayer, simulator, noise, prior, belief,
+                          begin if "refit" not in kept else _known(kept, "refit"), told)  # fmt: skip
+    keep("refit", base.z.tolist())
     return Refit(arena, base, floor, tuple(warnings))
+
+
+def _known(kept: Mapping[str, Any], name: str) -> np.ndarray | None:
+    return np.array(kept[name], dtype=float) if name in kept else None
 
 
 def floor_for(evidence: Evidence) -> tuple[FloorGiven, list[str]]:
@@ -89,7 +107,10 @@ def floor_for(evidence: Evidence) -> tuple[FloorGiven, list[str]]:
         given = FloorGiven(found.floor_m, found.sensor_m, "repeats within the diagnosed runs", False)
     else:
         given = FloorGiven(
-            float(np.hypot(NUMERICS_M, sensor)), sensor, "the noise of the caps and 3 mm for the numerics of engines", False
+            float(np.hypot(NUMERICS_M, sensor)),
+            sensor,
+            "the noise of the caps and 3 mm for the numerics of engines",
+            False,
         )
     said = [] if evidence.healthy else [f"no floor was given: taken from {given.words}, {1e3 * given.rmse:.1f} mm"]
     return given, said

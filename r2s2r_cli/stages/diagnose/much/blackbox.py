@@ -31,7 +31,9 @@ def corrected(
         return judged_errors  # it predicts nothing: no correction is the better black box
     W = _weights(X - mean_x, Y - mean_y, best)
     predicted = (_features(judged) - mean_x) @ W + mean_y
-    return judged_errors - _turned(judged, predicted.reshape(judged_errors.shape), back=True).reshape(judged_errors.shape)
+    return judged_errors - _turned(judged, predicted.reshape(judged_errors.shape), back=True).reshape(
+        judged_errors.shape
+    )
 
 
 def _features(many: Sequence[Stretch]) -> np.ndarray:

@@ -96,7 +96,9 @@ class Arena:
         for k, one in enumerate(self.many):
             roots, size = self._roots(one)
             by_value, by_offset = (self._channels(k, d) for d in self._caps_by[k])
-            white = White(roots, np.zeros((0, 0)), np.zeros(0), slice(begin, begin + roots.shape[0] * roots.shape[1]), size)
+            white = White(
+                roots, np.zeros((0, 0)), np.zeros(0), slice(begin, begin + roots.shape[0] * roots.shape[1]), size
+            )
             offsets = _rooted(white, by_offset) * sd[:, None]
             U, s, _ = np.linalg.svd(offsets.T, full_matrices=False)
             logdet = float(np.log1p(s**2).sum() - 2.0 * np.log(np.diagonal(roots, axis1=1, axis2=2)).sum())

@@ -104,7 +104,9 @@ def _candidate(
     keys = [number.field.split(".", 1)[1] for number in numbers]
     alone = [places for places in spread if len(places) == 1]
     names = tuple(n.name if places in alone else n.field for n, places in zip(numbers, spread, strict=True))
-    off, lower, upper, scale = (np.array([getattr(n, key) for n in numbers]) for key in ("off", "lower", "upper", "scale"))
+    off, lower, upper, scale = (
+        np.array([getattr(n, key) for n in numbers]) for key in ("off", "lower", "upper", "scale")
+    )
     tries = _tries(keys, off, scale, touched)
     known = {name.split(".", 1)[1]: k for k, name in enumerate(names)}
     given = [(known[name], value) for name, value in suggested.items() if name in known]
@@ -120,9 +122,7 @@ def _candidate(
     )  # fmt: skip
 
 
-def _tries(
-    keys: Sequence[str], off: np.ndarray, scale: np.ndarray, touched: np.ndarray
-) -> list[np.ndarray]:
+def _tries(keys: Sequence[str], off: np.ndarray, scale: np.ndarray, touched: np.ndarray) -> list[np.ndarray]:
     """Sizes: the numbers that do something alone, to both sides; with them, those that only say where or how."""
     shape = [k for k, key in enumerate(keys) if _only_shape(key, keys)]
     sizes = [k for k in range(len(keys)) if k not in shape]
@@ -184,6 +184,8 @@ def _distinct(
     found: list[np.ndarray] = []
     for row in rows:
         inside = np.clip(row, lower, upper)
-        if np.any(np.abs(inside - off)[sizes] > 1e-3 * scale[sizes]) and not any(np.allclose(inside, one) for one in found):
+        if np.any(np.abs(inside - off)[sizes] > 1e-3 * scale[sizes]) and not any(
+            np.allclose(inside, one) for one in found
+        ):
             found.append(inside)
     return np.array(found).reshape(-1, len(off))

@@ -97,9 +97,7 @@ class Model:
         self.names = tuple(number.name for number in numbers)
         self.place = {name: k for k, name in enumerate(self.names)}
         given = {number.field: self._base.extra[number.field] for number in numbers if number.kind == "own"}
-        self.values0 = np.array(
-            [float(given[n.field][0, n.index[0]]) if n.kind == "own" else n.off for n in numbers]
-        )
+        self.values0 = np.array([float(given[n.field][0, n.index[0]]) if n.kind == "own" else n.off for n in numbers])
         self.nuisances = tuple(
             k for k, n in enumerate(numbers)
             if n.kind != "own" or (n.sd > 0 and self.values0[k] == n.off)
@@ -135,7 +133,7 @@ class Model:
         return flat if values.ndim == 2 else flat[0]
 
     def jacobian(self, values: np.ndarray | Tensor) -> Tensor:
-        """d packed / d values, (NP, n), at values (n,)."""
+        """D packed / d values, (NP, n), at values (n,)."""
         import torch
 
         return torch.func.jacfwd(self.packed)(torch.as_tensor(values, dtype=torch.float64).detach())

@@ -18,7 +18,7 @@ from r2s2r_cli.stages.identify.predict import Prediction, Predictor, alike
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from r2s2r_cli.engine import Parameters, Structure
+    from r2s2r_cli.engine import Parameters
 
 EVERY = 10
 """Engine steps between stored states."""
@@ -112,7 +112,7 @@ class Replayer(Predictor):
         return Prediction(p_WE, index.numpy(), d[..., :n], d[..., n:])
 
     def _batch(self, many: Sequence[Stretch], values: np.ndarray) -> list[Seen]:
-        """k hypotheses of some stretches of about the same length."""
+        """K hypotheses of some stretches of about the same length."""
         import torch
 
         from r2s2r_cli.engine import delay_of

@@ -82,15 +82,15 @@ def _stretch(run: Run, number: int, own: Window, order: int) -> Stretch:
         length, length_sd = _lengths(run, t, caps.t[[own.first, *own.frames]])
         sensors = tuple(run.lengths.cable.tolist())
     thin = replace(
-        caps, t=np.concatenate([caps.t[[own.first]], t]), observed=np.concatenate([caps.observed[[own.first]], observed])
+        caps,
+        t=np.concatenate([caps.t[[own.first]], t]),
+        observed=np.concatenate([caps.observed[[own.first]], observed]),
     )
     made = replace(
         own, run=thin, first=0, frames=np.arange(1, len(t) + 1), key=np.arange(len(t)) == len(t) - 1,
         place=np.zeros(len(t), dtype=int),
     )  # fmt: skip
-    return Stretch(
-        caps.name, run.gait or caps.name, number, order, made, observed, noise, length, length_sd, sensors
-    )
+    return Stretch(caps.name, run.gait or caps.name, number, order, made, observed, noise, length, length_sd, sensors)
 
 
 def _groups(t: np.ndarray) -> list[np.ndarray]:

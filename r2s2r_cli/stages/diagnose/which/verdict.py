@@ -206,7 +206,9 @@ def _left_out(m: Material) -> str:
     if len(set(m.arena.gait.tolist())) > 1:
         return f"leave one gait out, {count} gaits"
     runs = {one.run for one in m.arena.many}
-    return f"leave one run out, {count} runs" if len(runs) > 1 else f"leave one interval out, {count} intervals of one run"
+    return (
+        f"leave one run out, {count} runs" if len(runs) > 1 else f"leave one interval out, {count} intervals of one run"
+    )
 
 
 def _warnings(m: Material, rows: list[int]) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -45,21 +46,21 @@ class Compared:
 def compare_effects(
     arena: Arena, base: Fit, *, floor_m: float, calibration: Calibration, starts: Mapping[str, Mapping[str, float]],
     suspected: Sequence[str] = (), effects: Sequence[str] | None = None, seed: int = 0, told: Told,
+    kept: Mapping[str, Any] | None = None, keep: Callable[[str, Any], None] = lambda name, value: None,
 ) -> Compared:  # fmt: skip
     """All effects against the refit nominal model `base` of this arena. floor_m: key-frame RMSE with nothing wrong.
 
     starts, suspected: of the parity stage: sizes to begin with, and effects that are fitted whatever the screening
     says. effects: only these. Raises NumericalError where nothing can be simulated.
     """
-    known = [
-        one for one in candidates(arena.model, starts, touched(arena)) if effects is None or one.effect in effects
-    ]
+    known = [one for one in candidates(arena.model, starts, touched(arena)) if effects is None or one.effect in effects]
     told("screening", 0, 1)
     responses = screen(arena, base, known)
     told("screening", 1, 1)
     groups = groups_of(arena)
     picked = _picked(responses, suspected)
-    fits = _fitted(arena, base, picked, told)
+    fits = _fitted(arena, base, picked, told, kept or {})
+    keep("fits", {fit.hypothesis.label: [fit.z.tolist(), fit.x.tolist()] for fit in fits})
     wider, unexplained = _widened(arena, fits[0] if fits else base)
     if wider > 1.0:
         arena.whiten(floor_m=wider * arena.floor_m)
@@ -77,9 +78,7 @@ def compare_effects(
     )  # fmt: skip
     which = concluded(material)
     order = np.argsort([-score.total for score in own], kind="stable")
-    return Compared(
-        arena, base, tuple(fits[i] for i in order), refit, tuple(own[i] for i in order), which
-    )
+    return Compared(arena, base, tuple(fits[i] for i in order), refit, tuple(own[i] for i in order), which)
 
 
 def touched(arena: Arena) -> np.ndarray:
@@ -107,12 +106,17 @@ def _picked(responses: Sequence[Response], suspected: Sequence[str]) -> list[Res
     return found
 
 
-def _fitted(arena: Arena, base: Fit, picked: Sequence[Response], told: Told) -> list[Fit]:
-    """Fits of the picked candidates from several sizes and signs, the best of each, best first."""
+def _fitted(arena: Arena, base: Fit, picked: Sequence[Response], told: Told, kept: Mapping[str, Any]) -> list[Fit]:
+    """Fits of the picked candidates from several sizes and signs, the best of each, best first; from where they were
+    before an interruption (kept)."""
     fits = Fits(arena)
     points: list[tuple[Hypothesis, np.ndarray, np.ndarray]] = []
     for response in picked:
         one = response.candidate
+        if one.label in kept.get("fits", {}):
+            z, x = kept["fits"][one.label]
+            points.append((Hypothesis((one,)), np.array(z), np.array(x)))
+            continue
         for share in (1.0, 0.3, -1.0):
             x = np.clip(one.off + share * (response.size - one.off), one.lower, one.upper)
             if share == 1.0 or np.any(np.abs(x - one.off) > 1e-6):
@@ -193,5 +197,3 @@ def _pairs(
     begun = _begun(arena, fits_of, points)
     fits_of.run(begun, iterations=SECOND + 1)
     return _best_of(begun)[:3]
-
-

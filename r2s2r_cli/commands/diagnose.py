@@ -1,0 +1,214 @@
+"""`r2s2r diagnose`: identified simulator and runs -> 70-diagnose.h5: where the gap lies, what causes it, how far it
+shrinks."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from r2s2r_cli.console import Console
+from r2s2r_cli.errors import Interrupted
+from r2s2r_cli.options import (
+    DrawOption,
+    DryRunOption,
+    ForceOption,
+    IterationOption,
+    JsonOption,
+    ProjectOption,
+    QuietOption,
+    SetOption,
+    ShowConfigOption,
+    parse_overrides,
+)
+from r2s2r_cli.store.project import Project
+
+if TYPE_CHECKING:
+    from r2s2r_cli.artifact import ArtifactData
+    from r2s2r_cli.commands.diagnose_inputs import Asked
+    from r2s2r_cli.store.checkpoint import CheckpointFile
+    from schemas.config import DiagnoseSettings
+    from schemas.results_diagnose import DiagnoseReport, DiagnoseResult
+
+
+def diagnose(
+    train: Annotated[
+        list[str] | None,
+        typer.Option("--train", metavar="RUN:1-7", help="Target intervals to fit. Default: those of 30-identify.h5."),
+    ] = None,
+    test: Annotated[
+        list[str] | None,
+        typer.Option("--test", metavar="RUN:8-11", help="Target intervals to judge on. Default: as identified."),
+    ] = None,
+    healthy: Annotated[
+        list[str] | None,
+        typer.Option("--healthy", metavar="RUN", help="A run from when nothing was wrong; repeatable."),
+    ] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option("--effect", metavar="ID", help="Consider only this effect; repeatable. Default: the catalogue."),
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option("--model", metavar="FILE", help="Another 30-identify.h5 as the nominal simulator.")
+    ] = None,
+    also: Annotated[
+        list[int] | None, typer.Option("--also", metavar="N", help="Also the runs of iteration N; repeatable.")
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of filters and bootstrap.")] = 0,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where the same command was interrupted.")] = False,
+    project: ProjectOption = None,
+    iteration: IterationOption = None,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+    draw: DrawOption = True,
+    dry_run: DryRunOption = False,
+    force: ForceOption = False,
+    set_: SetOption = None,
+    show_config: ShowConfigOption = False,
+) -> None:
+    """Say where the sim-to-real gap lies, which unmodelled effect causes it, and how far it shrinks with that effect.
+
+    Fits the identified simulator again, alone and with every effect of the catalogue, and compares them on runs that
+    were left out. Says `no_gap`, `ambiguous` or `unknown` where that is the answer, and what to run next.
+
+    Example: r2s2r diagnose
+    """
+    from r2s2r_cli.commands.diagnose_inputs import Asked
+    from r2s2r_cli.commands.stage import StageRun, print_config, show_outcome, wanted
+    from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_key, checkpoint_of
+    from schemas.results_diagnose import DiagnoseReport
+
+    console = Console(json=json, quiet=quiet)
+    here = Project.find(project)
+    place = here.iteration(iteration)
+    overrides = parse_overrides(set_, "diagnose")
+    if show_config:
+        print_config("diagnose", wanted(here, place, "diagnose", overrides, {}).settings, console)
+        return
+    asked = Asked(
+        here, place, model=model, train=tuple(train or ()), test=tuple(test or ()), healthy=tuple(healthy or ()),
+        effects=tuple(effect or ()), also=tuple(also or ()), seed=seed,
+    )  # fmt: skip
+    if asked.effects:
+        _require_effects(asked.effects)
+    settings = here.config(place, overrides).diagnose
+    unfinished = checkpoint_of(here.artifact("diagnosis", place))
+    if resume and not unfinished.exists():
+        console.say("nothing was interrupted: there is no checkpoint to go on from")
+    run = StageRun(
+        stage="diagnose", kind="diagnosis", project=here, iteration=place, find_inputs=asked.refs,
+        report_model=DiagnoseReport, overrides=overrides, flags=asked.flags(), dry_run=dry_run,
+        force=force or (resume and unfinished.exists()),
+    )  # fmt: skip
+    if dry_run:
+        asked.evidence()
+    digests = [ref.sha256 for ref in run.inputs]
+    key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
+    checkpoint = CheckpointFile(unfinished, key, resume)
+    try:
+        result, report = run.run(
+            lambda: _compute(asked, settings, checkpoint, console), _draw if draw else None,
+            lambda said: checkpoint.clear(),
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        if not checkpoint.kept():
+            raise
+        again = [word for word in sys.argv[1:] if word != "--resume"]
+        raise Interrupted(
+            f"what was fitted so far is kept in {here.relative(unfinished)}, nothing else was written",
+            hint=shlex.join(["r2s2r", *again, "--resume"]),
+        ) from None
+    show_outcome(_answer(result, report), console)
+    if report is not None:
+        _show(report, console)
+
+
+def _require_effects(names: tuple[str, ...]) -> None:
+    from r2s2r_cli.stages.identify.free.catalogue import require_effects
+
+    require_effects(names)
+
+
+def _compute(
+    asked: Asked, settings: DiagnoseSettings, checkpoint: CheckpointFile, console: Console
+) -> tuple[ArtifactData, DiagnoseReport]:
+    from r2s2r_cli.commands.interrupts import loaded
+
+    evidence = asked.evidence()
+    stage = loaded("r2s2r_cli.stages.diagnose.stage")
+    seconds: dict[str, float] = {}
+    begun = time.monotonic()
+    with _shown(console, seconds) as progress:
+        data, report = stage.diagnosed(
+            evidence, settings, seed=asked.seed, effects=asked.effects or None,
+            cache_dir=asked.project.cache, progress=progress, checkpoint=checkpoint,
+        )  # fmt: skip
+    return data, report.model_copy(update={"wall_s": time.monotonic() - begun, "seconds": seconds})
+
+
+PARTS = ("parity", "healthy runs", "refit", "screening", "fits", "left out", "where", "judged", "next gait")
+"""Of the work, in its order."""
+
+
+@contextmanager
+def _shown(console: Console, seconds: dict[str, float]) -> Iterator[Callable[[str, int, int], None]]:
+    """Progress over all parts; keeps the wall time of each."""
+    with console.progress("diagnose", len(PARTS)) as advance:
+        state: dict[str, Any] = {"part": None, "since": time.monotonic(), "at": 0}
+
+        def told(part: str, done: int, total: int) -> None:
+            del done, total
+            if part == state["part"]:
+                return
+            now = time.monotonic()
+            if state["part"] is not None:
+                seconds[state["part"]] = seconds.get(state["part"], 0.0) + now - state["since"]
+            place = PARTS.index(part) if part in PARTS else state["at"]
+            if place > state["at"]:
+                advance(place - state["at"])
+                state["at"] = place
+            state["part"], state["since"] = part, now
+
+        yield told
+        if state["part"] is not None:
+            seconds[state["part"]] = seconds.get(state["part"], 0.0) + time.monotonic() - state["since"]
+        advance(len(PARTS) - state["at"])
+
+
+def _answer(result: Any, report: DiagnoseReport | None) -> DiagnoseResult:
+    """The document: what every stage says, and design.md section 5 at the top."""
+    from schemas.results_diagnose import DiagnoseResult
+
+    shared: dict[str, Any] = result.model_dump(exclude={"schema_"})
+    if report is None:
+        return DiagnoseResult(**shared)
+    names = ("verdict", "effects", "probability", "set90", "ranking", "where", "shrinkage", "not_testable", "confusable",
+             "next_gait")  # fmt: skip
+    return DiagnoseResult(**shared, **{name: getattr(report, name) for name in names})
+
+
+def _draw(data: ArtifactData, report: DiagnoseReport) -> Iterator[tuple[str, bytes]]:
+    from r2s2r_cli.views.diagnose import draw_diagnosis
+    from r2s2r_cli.views.diagnose_page import diagnose_page
+
+    pictures = []
+    for name, title, png in draw_diagnosis(data, report):
+        yield f"-{name}.png", png
+        pictures.append((title, png))
+    yield ".html", diagnose_page(report, pictures)
+
+
+def _show(report: DiagnoseReport, console: Console) -> None:
+    from r2s2r_cli.views.diagnose_page import diagnose_tables
+
+    for table in diagnose_tables(report):
+        console.table(table.title, table.columns, table.rows)
+    console.data(report.sentence)
+    for text in report.warnings:
+        console.warn(text)

@@ -1,0 +1,160 @@
+"""What `diagnose` was asked for: runs of one or several iterations, the identified simulator, the split, the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from r2s2r_cli.commands.identify_inputs import Asked as IdentifyAsked, Source
+from r2s2r_cli.commands.stage import require_input
+from r2s2r_cli.errors import UsageError
+from r2s2r_cli.store.project import Iteration, Project
+from schemas.header import InputRef
+
+if TYPE_CHECKING:
+    from r2s2r_cli.artifact import ArtifactData, Group
+    from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run
+    from r2s2r_cli.stages.identify.data import Selection
+
+TRAIN, TEST = 1, 2
+"""Codes of `schemas.identification.ROLES`."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The request of one command line, its texts as typed."""
+
+    project: Project
+    iteration: Iteration
+    model: Path | None = None
+    train: tuple[str, ...] = ()
+    test: tuple[str, ...] = ()
+    healthy: tuple[str, ...] = ()
+    effects: tuple[str, ...] = ()
+    also: tuple[int, ...] = ()
+    seed: int = 0
+
+    def flags(self) -> dict[str, Any]:
+        """What else than settings and inputs decides the result, for the provenance."""
+        return {
+            "train": list(self.train), "test": list(self.test), "healthy": list(self.healthy),
+            "effects": list(self.effects), "also": list(self.also), "seed": self.seed,
+        }  # fmt: skip
+
+    @property
+    def identification(self) -> Path:
+        """The nominal simulator."""
+        return self.model or self.iteration.artifact("identification")
+
+    @property
+    def floor_file(self) -> Path:
+        """The floor of the project, there or not."""
+        return self.project.artifact("floor", None)
+
+    @cached_property
+    def sources(self) -> tuple[Source, ...]:
+        """Where the runs lie. Raises ArtifactError, UsageError as `identify`."""
+        return IdentifyAsked(self.project, self.iteration, also=self.also).sources
+
+    def refs(self) -> list[InputRef]:
+        """The inputs. Raises ArtifactError where one is missing or cannot be read."""
+        from r2s2r_cli.store.header import whole_header
+        from r2s2r_cli.store.staleness import artifact_ref
+
+        require_input(self.identification, f"r2s2r identify --iteration {self.iteration.number}")
+        paths = [path for source in self.sources for path in (source.recording, source.estimate)]
+        paths.append(self.identification)
+        paths += [path for path in (self.floor_file,) if path.exists()]
+        return [artifact_ref(self.project, path, whole_header(path)) for path in paths]
+
+    def evidence(self) -> Evidence:
+        """What the diagnosis is made from. Raises ArtifactError, InputError, UsageError."""
+        from r2s2r_cli.stages.diagnose.evidence import Evidence, require_enough
+        from r2s2r_cli.stages.identified import identified
+        from r2s2r_cli.store.read import read_artifact
+
+        robot = self.project.robot()
+        found = read_artifact(self.identification, "identification")[1]
+        model = identified(found, robot, words=self.project.relative(self.identification))
+        runs = self._runs()
+        healthy = tuple(run for run in runs if run.name in self.healthy)
+        missing = [name for name in self.healthy if name not in {run.name for run in runs}]
+        if missing:
+            raise UsageError("there is no such run", where="--healthy", received=missing[0],
+                             expected=", ".join(run.name for run in runs), hint=f"--healthy {runs[0].name}")  # fmt: skip
+        diagnosed = tuple(run for run in runs if run.name not in self.healthy)
+        fit, judge = self._split(diagnosed, found)
+        made = Evidence(robot, model, diagnosed, fit, judge, self._floor(), healthy)
+        require_enough(made)
+        return made
+
+    def _runs(self) -> tuple[Run, ...]:
+        """All runs, named as `identify` names them."""
+        from r2s2r_cli.stages.diagnose.evidence import Run
+        from r2s2r_cli.stages.floor.runs import sensed_run
+        from r2s2r_cli.stages.identify.load import run_data
+        from r2s2r_cli.store.read import read_artifact
+
+        robot = self.project.robot()
+        found: dict[str, Run] = {}
+        for source in self.sources:
+            recording = read_artifact(source.recording, "recording")[1]
+            estimate = read_artifact(source.estimate, "estimate")[1]
+            prefix = "" if source.place == self.sources[0].place else f"{source.place.number:03d}-"
+            for run in estimate.runs():
+                name = prefix + run
+                name = f"executed-{name}" if name in found else name
+                caps = run_data(recording, estimate, run, name=name)
+                commands = recording.group(run, "commands")
+                policy = "" if commands is None else str(commands.attributes.get("policy", ""))
+                found[name] = Run(caps, sensed_run(name, recording, run, robot), gait=policy or run)
+        return tuple(found.values())
+
+    def _split(self, runs: Sequence[Run], found: ArtifactData) -> tuple[tuple[Selection, ...], tuple[Selection, ...]]:
+        """As typed, else that of the identification; runs that it does not know are fitted, the last of them judged."""
+        from r2s2r_cli.stages.identify.data import Selection
+        from r2s2r_cli.stages.identify.selection import split
+
+        caps = [run.caps for run in runs]
+        if self.train or self.test:
+            return split(caps, self.train, self.test, 0.65)
+        table = found.groups["segments"]
+        fit, judge = (_selected(table, role, {run.name for run in runs}) for role in (TRAIN, TEST))
+        known = {name.decode() for name in table["run"].tolist()}
+        new = [run for run in runs if run.name not in known]
+        whole = [
+            Selection(run.name, tuple(i + 1 for i, yes in enumerate(run.caps.intervals.complete.tolist()) if yes))
+            for run in new
+        ]
+        if whole and judge:
+            fit += whole
+        elif whole:
+            fit, judge = [*fit, *whole[:-1]], [whole[-1]]
+        return tuple(fit), tuple(judge)
+
+    def _floor(self) -> FloorGiven | None:
+        from r2s2r_cli.stages.diagnose.evidence import FloorGiven
+        from r2s2r_cli.store.read import read_artifact
+
+        if not self.floor_file.exists():
+            return None
+        group = read_artifact(self.floor_file, "floor")[1].groups.get("caps")
+        if group is None:
+            return None
+        told = group.attributes
+        return FloorGiven(float(told["floor"]), float(told["sensor"]), f"floor.h5, {told['basis']}")
+
+
+def _selected(table: Group, role: int, names: set[str]) -> list[Selection]:
+    from r2s2r_cli.stages.identify.data import Selection
+
+    found: dict[str, list[int]] = {}
+    for run, interval, own in zip(
+        table["run"].tolist(), table["interval"].tolist(), table["role"].tolist(), strict=True
+    ):
+        if own == role and run.decode() in names:
+            found.setdefault(run.decode(), []).append(int(interval))
+    return [Selection(run, tuple(sorted(set(numbers)))) for run, numbers in found.items()]

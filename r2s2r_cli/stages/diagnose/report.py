@@ -1,0 +1,121 @@
+"""The diagnosis as the report that is printed, stored and drawn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from r2s2r_cli.stages.diagnose.diagnosis import Diagnosis
+from r2s2r_cli.stages.diagnose.parity.finding import Element
+from r2s2r_cli.stages.diagnose.which.found import Ranked
+from r2s2r_cli.stages.diagnose.words import sentence
+from schemas.results_diagnose import (
+    DiagnoseReport,
+    ElementFound,
+    NextGaitFound,
+    RankedName,
+    SegmentFound,
+    ShrinkageFound,
+    WhereFound,
+)
+
+FINDINGS = 8
+"""Findings of the parity stage that are told."""
+
+
+def diagnose_report(found: Diagnosis) -> DiagnoseReport:
+    """Of a diagnosis; wall time and files are added by the command."""
+    which = found.which
+    return DiagnoseReport(
+        verdict=which.verdict, sentence=sentence(found), effects=which.effects, probability=which.probability,  # type: ignore[arg-type]
+        set90=which.set90, ranking=tuple(_ranked(one) for one in which.ranking), where=_where(found),
+        shrinkage=_shrinkage(found), not_testable=which.not_testable,
+        confusable=tuple(one for one in which.confusable if math.isfinite(one[2])), next_gait=_next(found),
+        robot=found.robot, floor_m=found.floor.rmse, floor_from=found.floor.words, floor_given=found.floor.given,
+        refit_rmse_m=which.no_gap.rmse, refit_upper_m=which.no_gap.upper, chance_nats=which.chance,
+        calibrated=which.calibrated, left_out=which.within, segments=_segments(found),
+        hidden=tuple(shift.words for shift in which.shifts), parity=_parity(found), missing=_missing(found),
+        refit=found.refit, rollouts=found.rollouts, within_run=found.within_run, warnings=found.warnings,
+    )  # fmt: skip
+
+
+def element_of(found: Diagnosis) -> Element | None:
+    """The part the verdict points at: of the best effect, else of the probe that explains most."""
+    best = found.which.best
+    if found.which.verdict in ("effect", "pair", "ambiguous") and best is not None:
+        return best.element
+    if found.which.verdict == "unknown" and found.where is not None:
+        return found.where.element
+    return None
+
+
+def _where(found: Diagnosis) -> WhereFound:
+    element = element_of(found)
+    onset = None if found.where is None or found.where.onset is None else found.where.onset.order + 1
+    return WhereFound(
+        segments=tuple(f"{one.run}:{one.interval}" for one in found.segments if one.gap), onset_segment=onset,
+        channel=found.channel, element=None if element is None else _element(element),
+    )  # fmt: skip
+
+
+def _element(one: Element) -> ElementFound:
+    return ElementFound(kind=one.kind, index=one.index, xy_m=one.xy_m)  # type: ignore[arg-type]
+
+
+def _ranked(one: Ranked) -> RankedName:
+    return RankedName(
+        effect=one.effect, elpd_gain=_finite(one.gain, -1e9), probability=one.probability, size=dict(one.size),
+        ci90=dict(one.ci90), units=dict(one.units), channel=one.channel,
+        element=None if one.element is None else _element(one.element),
+        rmse_m=None if one.rmse is None or not math.isfinite(one.rmse) else one.rmse, moved=one.moved,
+        on_bound=one.on_bound,
+    )  # fmt: skip
+
+
+def _shrinkage(found: Diagnosis) -> ShrinkageFound | None:
+    much = found.much
+    if much is None:
+        return None
+    return ShrinkageFound(
+        effects=much.effects, nominal=much.rmse("nominal"), refit=much.rmse("refit"),
+        refit_plus_effect=much.rmse("effect"), ceiling=much.rmse("ceiling"), floor=much.floor, own_share=much.share,
+        ci90=much.ci90, predicted=much.predicted, judged_on=much.names, within_run=much.within_run,
+    )  # fmt: skip
+
+
+def _next(found: Diagnosis) -> NextGaitFound | None:
+    one = found.next_gait
+    if one is None:
+        return None
+    return NextGaitFound(name=one.name, file=None, targets=one.targets, nats=one.nats, now=one.now)
+
+
+def _segments(found: Diagnosis) -> tuple[SegmentFound, ...]:
+    return tuple(
+        SegmentFound(
+            run=one.run, interval=one.interval, gait=one.gait, rmse_m=_finite(one.refit, 0.0),
+            with_effect_m=None if one.effect is None or not math.isfinite(one.effect) else one.effect,
+            misfit=_finite(one.misfit, 1e9), gap=one.gap, t_s=one.t,
+        )
+        for one in found.segments
+    )  # fmt: skip
+
+
+def _parity(found: Diagnosis) -> tuple[str, ...]:
+    if found.parity is None:
+        return ()
+    return tuple(f"{one.what} ({one.z:+.1f} sd)" for one in found.parity.significant[:FINDINGS])
+
+
+def _missing(found: Diagnosis) -> tuple[str, ...]:
+    parts: list[Sequence[str]] = [
+        () if found.parity is None else found.parity.missing, () if found.where is None else found.where.missing,
+        () if found.much is None else found.much.missing,
+    ]  # fmt: skip
+    return tuple(dict.fromkeys(one for part in parts for one in part))
+
+
+def _finite(value: float, instead: float) -> float:
+    return float(value) if np.isfinite(value) else instead

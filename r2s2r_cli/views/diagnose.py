@@ -1,0 +1,179 @@
+"""Pictures of a diagnosis: gap over time, the robot with what is guilty, the floor, the ranking, before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.views.diagnose_floor import floor_picture
+from r2s2r_cli.views.figure import new_figure, png_bytes, rod_color
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from schemas.results_diagnose import DiagnoseReport
+
+GUILTY = "#d55e00"
+PLAIN = "#8792a2"
+BEFORE, AFTER, STALE, BLACK_BOX = "#0072b2", "#009e73", "#b8bec8", "#cc79a7"
+
+
+def draw_diagnosis(data: ArtifactData, report: DiagnoseReport) -> Iterator[tuple[str, str, bytes]]:
+    """(name, title, PNG)."""
+    yield "gap", "the gap over time: fitted target intervals, each left out", _gap(data, report)
+    yield "robot", "the robot, and what is guilty", _robot(data, report)
+    yield "floor", "where on the floor the gap arises", floor_picture(data, report)
+    yield "ranking", "how much better each effect predicts what was left out", _ranking(data, report)
+    if "judged" in data.groups:
+        yield "judged", "before and after, on intervals that nothing was fitted to", _judged(data, report)
+
+
+def _gap(data: ArtifactData, report: DiagnoseReport) -> bytes:
+    rows = data.groups["segments"]
+    runs = list(dict.fromkeys(rows["run"].tolist()))
+    figure = new_figure(11.0, 3.6)
+    axes = figure.subplots(
+        1, len(runs), sharey=True, squeeze=False, width_ratios=[1.0 * np.sum(rows["run"] == r) for r in runs]
+    )[0]
+    for k, (own, run) in enumerate(zip(axes, runs, strict=True)):
+        at = np.flatnonzero(rows["run"] == run)
+        for row in at:
+            t0, t1 = rows["t"][row]
+            stands_out = bool(rows["gap"][row])
+            own.axvspan(t0, t1, color=GUILTY if stands_out else PLAIN, alpha=0.14, lw=0)
+            own.annotate(str(rows["interval"][row]), ((t0 + t1) / 2, 1.0), xycoords=("data", "axes fraction"), ha="center",
+                         va="bottom", fontsize=7, color=PLAIN)  # fmt: skip
+        middle = rows["t"][at].mean(axis=1)
+        own.plot(middle, 1e3 * rows["refit"][at], "o-", color=BEFORE, label="refit", lw=1.4)
+        if np.isfinite(rows["effect"][at]).any():
+            own.plot(
+                middle, 1e3 * rows["effect"][at], "s--", color=AFTER, label=f"refit + {_best(report)}", lw=1.2, ms=4
+            )
+        own.axhline(1e3 * report.floor_m, color="#111111", lw=1, ls=":", label="floor")
+        own.set(xlabel=f"{run.decode()}, time [s]", ylim=(0, None))
+        own.tick_params(labelsize=8)
+        if k == 0:
+            own.set_ylabel("cap error at the end\nof an interval [mm]")
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncol=3, fontsize=8, frameon=False)
+    return png_bytes(figure)
+
+
+def _best(report: DiagnoseReport) -> str:
+    return next((one.effect for one in report.ranking if one.effect not in ("none", "unknown")), "effect")
+
+
+def _robot(data: ArtifactData, report: DiagnoseReport) -> bytes:
+    """From above and from the side: rods, cables, and the guilty part thick."""
+    group = data.groups["robot"]
+    p = group["p_WE"] - np.array([*group["p_WE"][:, :2].mean(axis=0), 0.0])
+    element = report.where.element
+    figure = new_figure(9.5, 4.4)
+    for axes, (i, j), title in zip(
+        figure.subplots(1, 2), ((0, 1), (0, 2)), ("from above", "from the side"), strict=True
+    ):
+        _drawn(axes, group, p[:, [i, j]], element)
+        axes.set(title=title, xlabel="x [m]", ylabel=f"{'xyz'[j]} [m]")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.margins(0.12)
+    words = "nothing is guilty: there is no element" if element is None else f"guilty: {_words(element)}"
+    if report.verdict not in ("effect", "pair") and element is not None:
+        words = f"most suspect: {_words(element)} (verdict: {report.verdict})"
+    figure.suptitle(words, color=GUILTY if element is not None else "#1c2430", fontsize=11)
+    return png_bytes(figure)
+
+
+def _words(element: object) -> str:
+    kind, index, xy = (getattr(element, name) for name in ("kind", "index", "xy_m"))
+    if xy is not None:
+        return f"the place ({xy[0]:.2f}, {xy[1]:.2f}) m"
+    if kind in ("world", "camera", "place"):
+        return f"the {kind}"
+    return f"all {kind}s" if index is None else f"{kind} {index}"
+
+
+def _drawn(axes: Axes, group: Group, p: np.ndarray, element: object) -> None:
+    kind = getattr(element, "kind", None)
+    index = getattr(element, "index", None)
+
+    def guilty(own: tuple[str, ...], number: int) -> bool:
+        return kind in own and index in (None, number)
+
+    for k, (a, b) in enumerate(group["cable"].tolist()):
+        bad = guilty(("cable", "motor", "sensor"), k) and (kind != "motor" or bool(group["actuated"][k]))
+        axes.plot(p[[a, b], 0], p[[a, b], 1], color=GUILTY if bad else PLAIN, lw=3.5 if bad else 1.0,
+                  ls="-" if group["actuated"][k] else "--", zorder=3 if bad else 1)  # fmt: skip
+        x, y = p[[a, b]].mean(axis=0)
+        axes.annotate(str(k), (x, y), fontsize=7, color=GUILTY if bad else PLAIN, ha="center", va="center",
+                      bbox={"boxstyle": "circle,pad=0.12", "fc": "white", "ec": "none"}, zorder=4)  # fmt: skip
+    for rod in range(len(p) // 2):
+        bad = guilty(("rod",), rod)
+        ends = p[2 * rod : 2 * rod + 2]
+        axes.plot(ends[:, 0], ends[:, 1], color=GUILTY if bad else rod_color(2 * rod), lw=9 if bad else 5, alpha=0.9, zorder=2,
+                  solid_capstyle="round")  # fmt: skip
+    for cap, (x, y) in enumerate(p):
+        bad = guilty(("cap",), cap)
+        axes.plot(x, y, "o", ms=19 if bad else 12, color=GUILTY if bad else rod_color(cap), zorder=5)
+        axes.annotate(str(cap), (x, y), ha="center", va="center", fontsize=8, color="white", weight="bold", zorder=6)
+
+
+def _ranking(data: ArtifactData, report: DiagnoseReport) -> bytes:
+    """Gains over the refit nominal model with their probabilities; what chance reaches is marked."""
+    del data
+    rows = [one for one in report.ranking if one.effect not in ("none", "unknown")][:10]
+    others = [one for one in report.ranking if one.effect in ("none", "unknown")]
+    figure = new_figure(10.5, 1.4 + 0.36 * (len(rows) + len(others)))
+    left, right = figure.subplots(1, 2, sharey=True, width_ratios=[1.6, 1])
+    names, y = [], 0
+    for one in [*rows, *others]:
+        color = GUILTY if one.effect in report.effects else "#444f5e" if one in others else BEFORE
+        if one not in others:
+            left.barh(y, one.elpd_gain, color=color, height=0.6)
+        right.barh(y, one.probability, color=color, height=0.6)
+        right.annotate(f"{one.probability:.2f}", (one.probability, y), xytext=(4, 0), textcoords="offset points", va="center",
+                       fontsize=8)  # fmt: skip
+        where = "" if one.element is None else f", {_words(one.element)}"
+        names.append(f"{one.effect}{where}")
+        y += 1
+    left.axvline(report.chance_nats, color="#111111", lw=1, ls=":")
+    left.annotate("chance, 1 in 20", (report.chance_nats, y - 0.6), fontsize=7, va="top", xytext=(3, 0),
+                  textcoords="offset points")  # fmt: skip
+    left.axvline(0.0, color="#111111", lw=0.8)
+    left.set_yticks(range(len(names)), names, fontsize=8)
+    left.invert_yaxis()
+    left.set_xlabel("gain on what was left out [nats]", fontsize=8)
+    right.set(xlim=(0, 1.15))
+    right.set_xlabel(f"probability ({report.calibrated.split(':')[0]})", fontsize=8)
+    return png_bytes(figure)
+
+
+def _judged(data: ArtifactData, report: DiagnoseReport) -> bytes:
+    group = data.groups["judged"]
+    names = [name.decode() for name in group["name"].tolist()]
+    figure = new_figure(min(13.0, 5.0 + 0.6 * len(names)), 3.8)
+    each, all_ = figure.subplots(1, 2, sharey=True, width_ratios=[max(2.0, 0.5 * len(names)), 1.0])
+    series = (("nominal", STALE, "as identified"), ("refit", BEFORE, "refit"),
+              ("effect", AFTER, "refit + " + (" + ".join(report.shrinkage.effects) if report.shrinkage else "effect")),
+              ("ceiling", BLACK_BOX, "black box"))  # fmt: skip
+    width = 0.8 / len(series)
+    for k, (name, color, label) in enumerate(series):
+        x = np.arange(len(names)) - 0.4 + (k + 0.5) * width
+        values = 1e3 * group[name]
+        each.bar(x, np.nan_to_num(values), width, color=color, label=label)
+        if np.isfinite(values).any():
+            all_.bar(k, float(np.sqrt(np.nanmean(values**2))), 0.7, color=color)
+    for axes in (each, all_):
+        axes.axhline(1e3 * report.floor_m, color="#111111", lw=1, ls=":", label="floor")
+    each.set_xticks(range(len(names)), names, rotation=45 if len(names) > 6 else 0, ha="right" if len(names) > 6 else "center",
+                    fontsize=8)  # fmt: skip
+    each.set_ylabel("cap error at the key frame [mm]")
+    all_.set_xticks(
+        range(len(series)), ["identified", "refit", "+ effect", "black box"], rotation=45, ha="right", fontsize=8
+    )
+    all_.set_title("all together", fontsize=9)
+    handles, labels = each.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncol=5, fontsize=8, frameon=False)
+    return png_bytes(figure)

@@ -1,0 +1,50 @@
+"""The floor from above: where the robot was, how far off the simulation was there, and what contacts say of the place."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.views.figure import new_figure, png_bytes, rod_color
+
+if TYPE_CHECKING:
+    from schemas.results_diagnose import DiagnoseReport
+
+GUILTY = "#d55e00"
+ARROW = 5.0
+"""Times that errors are drawn larger than they are."""
+
+
+def floor_picture(data: ArtifactData, report: DiagnoseReport) -> bytes:
+    """Errors at the ends of all fitted intervals as arrows at the caps; the map of the contact probe where there is one."""
+    rows = data.groups["segments"]
+    figure = new_figure(7.5, 6.2)
+    axes = figure.subplots()
+    if "place" in data.groups:
+        place = data.groups["place"]
+        seen = np.where(place["weight"] > 0, place["value"], np.nan)
+        if np.isfinite(seen).any():
+            limit = max(float(np.nanmax(np.abs(seen))), 1e-6)
+            shown = axes.pcolormesh(
+                place["x"], place["y"], seen, cmap="RdBu", vmin=-limit, vmax=limit, alpha=0.6, shading="nearest"
+            )
+            figure.colorbar(shown, ax=axes, label="change of friction that contacts ask for [1]", shrink=0.8)
+    xy, error = rows["xy"], rows["error"]
+    for row in range(len(xy)):
+        for cap in range(xy.shape[1]):
+            if np.isfinite(error[row, cap]).all():
+                axes.annotate("", xy=xy[row, cap] - ARROW * error[row, cap, :2], xytext=xy[row, cap],
+                              arrowprops={"arrowstyle": "->", "color": rod_color(cap), "lw": 0.9, "alpha": 0.8})  # fmt: skip
+    for cap in range(xy.shape[1]):
+        axes.plot(xy[:, cap, 0], xy[:, cap, 1], ".", ms=4, color=rod_color(cap))
+    element = report.where.element
+    if element is not None and element.xy_m is not None:
+        axes.plot(*element.xy_m, "x", ms=16, mew=3, color=GUILTY)
+        axes.annotate("guilty place", element.xy_m, xytext=(10, 10), textcoords="offset points", color=GUILTY)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set(xlabel="x [m]", ylabel="y [m]",
+             title=f"arrows: what the robot did beyond the refit model, {ARROW:g} times")  # fmt: skip
+    axes.margins(0.1)
+    return png_bytes(figure)

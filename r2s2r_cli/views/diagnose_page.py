@@ -1,0 +1,151 @@
+"""The HTML page of a diagnosis and its tables: verdict, ranking, shrinkage, what cannot be told, what to run next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from r2s2r_cli.views.page import Page, PageTable, Picture, render
+
+if TYPE_CHECKING:
+    from schemas.results_diagnose import DiagnoseReport, ElementFound, RankedName
+
+INDISTINCT = 3.0
+"""[nats] Below, two effects cannot be told apart."""
+
+
+def diagnose_tables(report: DiagnoseReport) -> Iterator[PageTable]:
+    """What people read first comes first."""
+    yield PageTable(
+        "what explains the gap",
+        ["name", "where", "gain [nats]", "probability", "size", "90 % interval", "left-out error [mm]", "remarks"],
+        [_ranked(one) for one in report.ranking],
+    )
+    if report.shrinkage is not None:
+        yield _shrinkage(report)
+    yield PageTable("where", ["what", "found"], list(_where(report)))
+    if report.confusable:
+        yield PageTable(
+            "how well these runs tell effects apart", ["effect", "and", "nats", "meaning"],
+            [[a, b, f"{nats:.1f}", "cannot be told apart by these runs" if nats < INDISTINCT else "can be told apart"]
+             for a, b, nats in report.confusable],
+        )  # fmt: skip
+    yield PageTable("what cannot be told, and what to run next", ["what", "found"], list(_limits(report)))
+    yield PageTable("how", ["what", "found"], list(_how(report)))
+
+
+def diagnose_page(report: DiagnoseReport, pictures: Sequence[tuple[str, bytes]]) -> bytes:
+    """The page, self-contained."""
+    labels = list(report.warnings)
+    if report.calibrated.startswith("uncalibrated"):
+        labels.insert(0, f"probabilities are {report.calibrated}")
+    if report.within_run:
+        labels.insert(
+            0, "judged intervals are of the same run as fitted ones: what is constant over the run helps both"
+        )
+    return render(
+        Page(
+            title=f"Diagnosis of {report.robot}", sentence=report.sentence, labels=labels,
+            tables=list(diagnose_tables(report)), pictures=[Picture(title, png) for title, png in pictures],
+        )
+    )  # fmt: skip
+
+
+def element_words(element: ElementFound | None) -> str:
+    """`cable 3`, `all sensors`, `the world`."""
+    if element is None:
+        return ""
+    if element.xy_m is not None:
+        return f"the place ({element.xy_m[0]:.2f}, {element.xy_m[1]:.2f}) m"
+    if element.kind in ("world", "camera", "place"):
+        return f"the {element.kind}"
+    return f"all {element.kind}s" if element.index is None else f"{element.kind} {element.index}"
+
+
+def _ranked(one: RankedName) -> list[str]:
+    sizes, wide = [], []
+    for name, value in one.size.items():
+        short = name.split(".")[1]
+        unit = "" if one.units.get(name, "1") == "1" else f" {one.units[name]}"
+        sizes.append(f"{short} {value:.3g}{unit}")
+        wide.append(f"{one.ci90[name][0]:.3g} .. {one.ci90[name][1]:.3g}")
+    remarks = [] if one.moved else ["never left its start"]
+    remarks += [f"{name.split('.', 1)[1]} on a bound" for name in one.on_bound]
+    rmse = "" if one.rmse_m is None else f"{1e3 * one.rmse_m:.1f}"
+    where = element_words(one.element) or (one.channel or "")
+    return [one.effect, where, f"{one.elpd_gain:.1f}", f"{one.probability:.2f}", "; ".join(sizes), "; ".join(wide), rmse,
+            "; ".join(remarks)]  # fmt: skip
+
+
+def _shrinkage(report: DiagnoseReport) -> PageTable:
+    s = report.shrinkage
+    assert s is not None  # noqa: S101
+    rows = [
+        ["as identified", _mm(s.nominal), ""],
+        ["refit", _mm(s.refit), ""],
+        [f"refit + {' + '.join(s.effects)}", _mm(s.refit_plus_effect), _share(s.own_share, s.ci90)],
+        ["refit + a black box", _mm(s.ceiling), ""],
+        ["floor", _mm(s.floor), ""],
+        ["predicted before it was looked at", "", _share(s.predicted, None)],
+    ]
+    where = "; within the run that was fitted" if s.within_run else ""
+    return PageTable(
+        f"how far the gap shrinks, {len(s.judged_on)} held-out intervals{where}",
+        ["model", "key-frame error [mm]", "own share of the refit gap above the floor"], rows,
+    )  # fmt: skip
+
+
+def _where(report: DiagnoseReport) -> Iterator[list[str]]:
+    where = report.where
+    yield ["intervals with a gap", ", ".join(where.segments) or "none stands out"]
+    yield [
+        "begins with",
+        "it does not begin anywhere" if where.onset_segment is None else f"fitted interval {where.onset_segment}",
+    ]
+    yield ["channel", where.channel or "-"]
+    yield ["element", element_words(where.element) or "-"]
+    for text in report.parity:
+        yield ["logs against each other", text]
+    for text in report.hidden:
+        yield ["hidden so far", text]
+
+
+def _limits(report: DiagnoseReport) -> Iterator[list[str]]:
+    yield ["90 % set", ", ".join(report.set90)]
+    yield ["not testable with these runs", ", ".join(report.not_testable) or "none"]
+    for text in report.missing:
+        yield ["not looked at", text]
+    if report.next_gait is None:
+        yield ["run next", "nothing: no gait of the library would decide more"]
+    else:
+        one = report.next_gait
+        told = "" if one.now is None else f", these runs by {one.now:.1f}"
+        how = f"r2s2r record {one.file}" if one.file else one.name
+        yield ["run next", f"{one.name}: separates the nearest candidates by {one.nats:.1f} nats{told}: {how}"]
+
+
+def _how(report: DiagnoseReport) -> Iterator[list[str]]:
+    upper = "" if report.refit_upper_m is None else f", upper 90 % bound {1e3 * report.refit_upper_m:.1f} mm"
+    yield ["refit error, left out", f"{1e3 * report.refit_rmse_m:.1f} mm{upper}"]
+    yield [
+        "floor",
+        f"{1e3 * report.floor_m:.1f} mm: {report.floor_from}" + ("" if report.floor_given else " (estimated)"),
+    ]
+    yield ["left out", report.left_out]
+    yield ["chance", f"the best of the catalogue gains {report.chance_nats:.1f} nats by chance in one case of 20"]
+    yield ["probabilities", report.calibrated]
+    for name, (value, sd) in report.refit.items():
+        yield [f"refit: {name}", f"{value:+.4g} +- {sd:.2g}"]
+    yield ["work", f"{report.rollouts} simulated intervals, {report.wall_s:.1f} s"
+           + "".join(f"; {part} {seconds:.1f} s" for part, seconds in report.seconds.items())]  # fmt: skip
+
+
+def _mm(value: float | None) -> str:
+    return "-" if value is None else f"{1e3 * value:.1f}"
+
+
+def _share(value: float | None, ends: tuple[float, float] | None) -> str:
+    if value is None:
+        return "at the floor"
+    wide = "" if ends is None else f" ({100 * ends[0]:.0f} .. {100 * ends[1]:.0f})"
+    return f"{100 * value:.0f} %{wide}"

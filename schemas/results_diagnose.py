@@ -1,0 +1,160 @@
+"""What `diagnose` says: printed in words, and at the top of its `--json` document (design.md section 5). SI."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from schemas.base import Frozen
+from schemas.results import StageResult
+
+Verdict = Literal["effect", "pair", "ambiguous", "no_gap", "unknown"]
+
+
+class ElementFound(Frozen):
+    """A part of the robot, or where it stands."""
+
+    kind: Literal["cable", "cap", "rod", "motor", "sensor", "place", "world", "camera"]
+    index: int | None = None
+    """None: all of the kind, or a kind without numbers."""
+    xy_m: tuple[float, float] | None = None
+
+
+class RankedName(Frozen):
+    """One name of the ranking: an effect at its best element, `none` or `unknown`."""
+
+    effect: str
+    elpd_gain: float
+    """Log predictive density over the refit nominal model on gaits that were left out [nats]."""
+    probability: float
+    size: dict[str, float] = Field(default_factory=dict)
+    """Of its numbers, by name, in `units`."""
+    ci90: dict[str, tuple[float, float]] = Field(default_factory=dict)
+    units: dict[str, str] = Field(default_factory=dict)
+    channel: str | None = None
+    element: ElementFound | None = None
+    rmse_m: float | None = None
+    """Of the caps at the ends of intervals that were left out."""
+    moved: bool = True
+    """False: the fit never left its start, so that its size says nothing."""
+    on_bound: tuple[str, ...] = ()
+
+
+class WhereFound(Frozen):
+    """Where the gap lies."""
+
+    segments: tuple[str, ...]
+    """Target intervals that stand out, RUN:N."""
+    onset_segment: int | None
+    """The gap begins with it, counted from 1 through the fitted intervals; None: it does not begin anywhere."""
+    channel: str | None
+    element: ElementFound | None
+
+
+class ShrinkageFound(Frozen):
+    """How far the gap shrinks on intervals that nothing was fitted to."""
+
+    metric: Literal["keyframe_cap_rmse_m"] = "keyframe_cap_rmse_m"
+    effects: tuple[str, ...]
+    """Whose effect it is: what the verdict names, else the best one."""
+    nominal: float | None
+    refit: float | None
+    refit_plus_effect: float | None
+    ceiling: float | None
+    """A black box that may correct anything it can predict."""
+    floor: float
+    own_share: float | None
+    """Of the refit model's gap above the floor; None: that gap is at the floor."""
+    ci90: tuple[float, float] | None
+    predicted: float | None
+    """The same from intervals that were left out of the fit, before the judged ones were looked at."""
+    judged_on: tuple[str, ...]
+    within_run: bool
+    """Judged intervals share a run with fitted ones."""
+
+
+class NextGaitFound(Frozen):
+    """What to run next, as `record --policy` takes it."""
+
+    name: str
+    file: str | None
+    targets: tuple[tuple[float, ...], ...]
+    nats: float
+    """By which it separates the two candidates that are nearest to each other."""
+    now: float | None
+    """The same of the gaits that were run."""
+
+
+class SegmentFound(Frozen):
+    """One fitted target interval, simulated from its own start by the refit nominal model."""
+
+    run: str
+    interval: int
+    gait: str
+    rmse_m: float
+    """At its end, left out."""
+    with_effect_m: float | None
+    misfit: float
+    """Squares over what noise and floor explain."""
+    gap: bool
+    t_s: tuple[float, float]
+
+
+class DiagnoseReport(Frozen):
+    """The whole of it."""
+
+    verdict: Verdict
+    sentence: str
+    effects: tuple[str, ...]
+    probability: float
+    set90: tuple[str, ...]
+    """Names that hold the truth in 90 of 100 cases, where probabilities are calibrated."""
+    ranking: tuple[RankedName, ...]
+    where: WhereFound
+    shrinkage: ShrinkageFound | None
+    not_testable: tuple[str, ...]
+    """Effects that these gaits would not show."""
+    confusable: tuple[tuple[str, str, float], ...]
+    """Pairs of effects and the nats by which these gaits tell them apart; below 3 they do not."""
+    next_gait: NextGaitFound | None
+    robot: str
+    floor_m: float
+    floor_from: str
+    floor_given: bool
+    refit_rmse_m: float
+    refit_upper_m: float | None
+    """Upper 90 % bound; below 1.25 floor there is no gap."""
+    chance_nats: float
+    """What the best of the catalogue gains by chance in one case of twenty."""
+    calibrated: str
+    left_out: str
+    segments: tuple[SegmentFound, ...]
+    hidden: tuple[str, ...]
+    """What refitting had been hiding, in words."""
+    parity: tuple[str, ...]
+    """What the logs say against each other, strongest first, in words."""
+    missing: tuple[str, ...]
+    refit: dict[str, tuple[float, float]]
+    """Nuisances of the refit nominal model: value and sd."""
+    rollouts: int
+    within_run: bool
+    wall_s: float = 0.0
+    seconds: dict[str, float] = Field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+
+class DiagnoseResult(StageResult):
+    """What `diagnose` prints: as every stage, and design.md section 5 at the top. None where it did not run."""
+
+    schema_: Literal["r2s2r.diagnose/1"] = Field(default="r2s2r.diagnose/1", alias="schema")  # type: ignore[assignment]
+    verdict: Verdict | None = None
+    effects: tuple[str, ...] | None = None
+    probability: float | None = None
+    set90: tuple[str, ...] | None = None
+    ranking: tuple[RankedName, ...] | None = None
+    where: WhereFound | None = None
+    shrinkage: ShrinkageFound | None = None
+    not_testable: tuple[str, ...] | None = None
+    confusable: tuple[tuple[str, str, float], ...] | None = None
+    next_gait: NextGaitFound | None = None

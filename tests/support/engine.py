@@ -85,12 +85,12 @@ def state(
     if q is None:
         q = pointing(vector(1.0, 0.0, 0.0) if axis is None else axis)
     named = {"p_WB": p, "q_WR": q, "v_WB": v, "w_R": w, "rest": rest, "winding": None}
-    made = {}
+    made, extra = {}, {}
     for name, shape in state_shapes(structure).items():
-        value = named[name]
+        value = named.get(name)
         value = torch.zeros((), dtype=torch.float64) if value is None else value
-        made[name] = value.expand(len(p), *shape)
-    return State(**made)
+        (extra if "." in name else made)[name] = value.expand(len(p), *shape)
+    return State(**made, extra=extra)
 
 
 def lying(structure: Structure, *, batch: int = 1, axis: Tensor | None = None, v: Tensor | None = None) -> State:

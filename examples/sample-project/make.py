@@ -24,9 +24,9 @@ SECOND = ("arching", "turn-clockwise")
 REPEATS = 2
 SETTINGS = {
     "identify.free": ["friction", "motor_speed"], "identify.starts": 1, "identify.profiles": 0,
-    "identify.max_iterations": 6, "identify.train_share": 1.0, "plan.depth": 3, "plan.beam": 40,
-    "plan.draws": 3, "plan.starts": 2, "plan.candidates": 9, "plan.kept": 2, "plan.cycles": 2,
-    "record.rest_s": 1.0, "record.jpeg_quality": 80, "record.camera_hold_s": 0.5,
+    "identify.max_iterations": 3, "identify.train_share": 1.0, "identify.step_s": 0.002, "simulate.step_s": 0.002,
+    "plan.step_s": 0.002, "plan.depth": 3, "plan.beam": 40, "plan.draws": 3, "plan.starts": 2, "plan.candidates": 9,
+    "plan.kept": 2, "plan.cycles": 2, "record.rest_s": 1.0, "record.jpeg_quality": 80, "record.camera_hold_s": 0.5,
 }  # fmt: skip
 """What differs from the defaults: a small problem, so that all stages together take a minute or two to repeat."""
 WORLD = """\

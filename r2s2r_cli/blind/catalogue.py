@@ -15,9 +15,10 @@ def diagnosed(evidence: Evidence, settings: dict[str, Any]) -> dict[str, Any]:
     as `diagnose` does.
     """
     from r2s2r_cli.stages.diagnose.diagnose import Settings, diagnose
-    from r2s2r_cli.stages.diagnose.report import document
+    from r2s2r_cli.stages.diagnose.report import diagnose_report
 
     own = dict(settings)
     cache, threads = own.pop("cache", None), int(own.pop("threads", 1))
     found = diagnose(evidence, Settings(**own), cache_dir=None if cache is None else Path(cache), threads=threads)
-    return document(found)
+    document: dict[str, Any] = diagnose_report(found).model_dump(mode="json")
+    return document

@@ -33,18 +33,22 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Range:
-    """seeds: of the sets. low, high: sizes of effects as factors of their usual size, drawn evenly in the logarithm."""
+    """seeds: of the sets. low, high: sizes of effects as factors of their usual size, drawn evenly in the logarithm.
+    faint: the same of a part FAINT of the sets, most of whose effects lie under the floor; None: there is no such part.
+    """
 
     seeds: range
     low: float
     high: float
+    faint: tuple[float, float] | None = None
 
 
 RANGES = {
-    Bank.CALIBRATION: Range(range(100_000, 200_000), 0.22, 1.6),
-    Bank.BLIND: Range(range(500_000, 900_000), 0.18, 2.1),
-    Bank.REGRESSION: Range(range(1_000, 2_000), 0.9, 1.7),
+    Bank.CALIBRATION: Range(range(100_000, 200_000), 0.16, 1.1, (0.03, 0.14)),
+    Bank.BLIND: Range(range(500_000, 900_000), 0.14, 1.4, (0.025, 0.16)),
+    Bank.REGRESSION: Range(range(1_000, 2_000), 0.8, 1.3),
 }
+FAINT = 0.25
 SHARES = {Kind.NONE: 0.15, Kind.SINGLE: 0.60, Kind.PAIR: 0.10, Kind.OUTSIDE: 0.15}
 NOISE_M = (0.002, 0.005, 0.010)
 AR1 = (0.0, 0.7)
@@ -79,4 +83,6 @@ def kinds(count: int, rng: np.random.Generator) -> list[Kind]:
 def size(bank: Bank, rng: np.random.Generator) -> float:
     """A size, as a factor of the usual one: off every grid."""
     of = RANGES[bank]
-    return float(np.exp(rng.uniform(np.log(of.low), np.log(of.high))))
+    faint = rng.random() < FAINT
+    low, high = of.faint if faint and of.faint is not None else (of.low, of.high)
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))

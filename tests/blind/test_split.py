@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from r2s2r_cli.blind.split import RANGES, SHARES, Bank, Kind, kinds, seeds, size
+from r2s2r_cli.blind.split import FAINT, RANGES, SHARES, Bank, Kind, kinds, seeds, size
 from r2s2r_cli.errors import UsageError
 
 
@@ -20,9 +20,14 @@ def test_sizes_of_the_banks_differ_and_lie_in_their_ranges() -> None:
     rng = np.random.default_rng(0)
     drawn = {bank: np.array([size(bank, rng) for _ in range(4000)]) for bank in Bank}
     for bank, values in drawn.items():
-        assert values.min() >= RANGES[bank].low and values.max() <= RANGES[bank].high
+        of = RANGES[bank]
+        faint = of.faint or (np.inf, -np.inf)
+        plain = (values >= of.low) & (values <= of.high)
+        assert (plain | ((values >= faint[0]) & (values <= faint[1]))).all()
+        share = np.mean(values < of.low) + 0.5 * np.mean((values >= of.low) & (values <= faint[1]))
+        assert of.faint is None or share == pytest.approx(FAINT, abs=0.04)
     assert drawn[Bank.BLIND].max() > RANGES[Bank.CALIBRATION].high
-    assert drawn[Bank.BLIND].min() < RANGES[Bank.CALIBRATION].low
+    assert drawn[Bank.BLIND].min() < drawn[Bank.CALIBRATION].min()
 
 
 @pytest.mark.parametrize(("count", "wanted"), [(20, (3, 12, 2, 3)), (120, (18, 72, 12, 18)), (250, (38, 150, 25, 37))])

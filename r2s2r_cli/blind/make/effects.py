@@ -230,3 +230,6 @@ STARRED: dict[str, Callable[[Draw], Planted]] = {
     "dropout": _dropout,
 }  # fmt: skip
 """By id. The rig's usual size (1) is about that of the pilot in reference/diagnosis.md section 6."""
+USUAL = {"motor_dead_zone": 1.6, "cap_friction": 1.6, "cap_radius": 1.8, "sensor_bias": 1.5, "sensor_gain": 1.5,
+         "camera_pose": 1.6}  # fmt: skip
+"""Effects whose size 1 tells less than that of the others (tested by d): by how much their usual size is larger."""

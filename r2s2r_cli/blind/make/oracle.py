@@ -23,8 +23,8 @@ from schemas.robot import Robot
 FLOOR_M, GROWN_M = 0.002, 0.006
 """Floor of a cap's coordinate [m]: constant over a target interval, and a random walk that has grown to so much at its
 end: what another engine's numerics make of a motion."""
-LENGTH_SD_M, LENGTH_FLOOR_M, LENGTH_GROWN_M = 0.001, 0.001, 0.002
-"""The same of a sensor, whose noise is a count of its converter."""
+LENGTH_SD_M, LENGTH_FLOOR_M, LENGTH_GROWN_M = 0.0015, 0.0015, 0.003
+"""The same of a sensor; its noise is a count of its converter, and what its lag makes of a moving cable."""
 LOOK_S = 0.1
 """Between two instants that are compared."""
 STEP = 0.05

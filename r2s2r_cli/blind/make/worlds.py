@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from r2s2r_cli.blind.make.effects import STARRED, Draw, Planted
+from r2s2r_cli.blind.make.effects import STARRED, USUAL, Draw, Planted
 from r2s2r_cli.blind.make.outside import OUTSIDE, Outside, outside
 from r2s2r_cli.blind.split import AR1, GAITS, NOISE_M, RATES_HZ, Bank, Kind, size
 from r2s2r_cli.rig.effects.base import Law, Scene
@@ -108,5 +108,7 @@ def hidden(
     number = {Kind.NONE: 0, Kind.SINGLE: 1, Kind.PAIR: 2}[kind]
     names = effects or tuple(str(name) for name in wrong.choice(list(STARRED), size=number, replace=False))
     sizes = [s if i == 0 or factor is not None else size(bank, wrong) for i in range(len(names))]
-    planted = tuple(STARRED[name](Draw(wrong, one, count)) for name, one in zip(names, sizes, strict=True))
+    planted = tuple(
+        STARRED[name](Draw(wrong, USUAL.get(name, 1.0) * one, count)) for name, one in zip(names, sizes, strict=True)
+    )
     return replace(plain, planted=planted, factor=s if planted else None)

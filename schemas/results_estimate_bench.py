@@ -12,7 +12,11 @@ from schemas.base import Frozen
 class TrackScore(Frozen):
     """Estimated against true states of one run, or of several runs together. Errors of end caps are distances."""
 
+    runs: int
+    failed: int
+    """Runs that could not be tracked. `within`, `covered` and `lost` count their frames, the other figures cannot."""
     frames: int
+    """Of the runs that were tracked."""
     cap_mean_mm: float
     cap_p95_mm: float
     cap_max_mm: float
@@ -34,6 +38,12 @@ class TrackScore(Frozen):
     are left out. None: no such contact."""
     delay_error_ms: float | None
     """Sensors against pictures: estimated minus true delay; of several runs the largest size. None: not known."""
+    delay_unknown: int
+    """Runs with sensors whose delay the estimate says it does not know."""
+    floor_mm: float
+    """Estimated minus true distance of the camera from the floor; of several runs the largest size."""
+    floor_deg: float
+    """Tilt of the estimated against the true floor, likewise the largest."""
     sensor_error_mm: float | None
     """Mean size of a sensor's mean error once its estimated bias is taken off. None: no sensors."""
     recovery_s: float | None
@@ -60,7 +70,7 @@ class EstimateBenchCase(Frozen):
 
     setting: dict[str, float | bool | str]
     all_: TrackScore | None = Field(alias="all")
-    """Of all runs that did not fail; None: all did."""
+    """Of all runs; None: all failed."""
     runs: tuple[TrackedCase, ...]
 
 

@@ -160,7 +160,8 @@ def caps_well_observed(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="what the smoother expects and what it then sees differ by as much as it believes: ratio 0.5 to 2",
     why="below, its uncertainties are too large; above, they are too small, and every interval built on them",
-    fix="compare runs/<run>/tracks/noise_sd with the source; if you know its noise, state noise_sd_m in the sidecar",
+    fix="camera images: look at the overlay and camera pictures of the run; logs: state noise_sd_m in the sidecar if "
+    "you know the noise of the source",
 )
 def noise_as_assumed(run: Run) -> Iterator[Found]:
     """Innovations far larger or smaller than their variance."""

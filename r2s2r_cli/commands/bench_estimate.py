@@ -77,18 +77,20 @@ def _measured(
     with console.progress("estimate", len(names) * len(seeds)) as advance:
         for name in names:
             errors: list[Errors] = []
+            failed: list[int] = []
             runs: list[TrackedCase] = []
             for seed in seeds:
                 with tempfile.TemporaryDirectory(prefix="r2s2r-bench-") as folder:
                     made = make_case(seed, keep or Path(folder), run_s=run_s, robot=robot, **asdict(SETTINGS[name]))
                     found = _tracked(made)
                 if isinstance(found, str):
+                    failed.append(len(made.frames))
                     runs.append(TrackedCase(seed=seed, score=None, failed=found))
                 else:
                     errors.append(found)
                     runs.append(TrackedCase(seed=seed, score=summed_up([found])))
                 advance(1)
-            both = summed_up(errors) if errors else None
+            both = summed_up(errors, failed) if errors else None
             cases[name] = EstimateBenchCase(setting=asdict(SETTINGS[name]), all=both, runs=tuple(runs))
     return EstimateBenchResult(
         machine=machine(), versions={name: version(name) for name in _PACKAGES},
@@ -133,27 +135,36 @@ def _print(result: EstimateBenchResult, console: Console) -> None:
     console.table(
         f"{result.robot}, runs of {result.run_s:g} s, seeds {', '.join(map(str, result.seeds))} ({result.machine})",
         ["case", "cap mean / p95 / max mm", "rod mm", "axis deg (p95)", "2 cm 5 deg", "CoM mm", "in 95 %", "lost",
-         "contact F1", "delay ms", "sensor mm", "back s", "frames/s", "CPU ms", "MB"],
+         "contact F1", "delay ms", "sensor mm", "floor mm", "back s", "frames/s", "CPU ms", "MB"],
         [[name, *_row(case.all_)] for name, case in result.cases.items()],
     )  # fmt: skip
     for name, case in result.cases.items():
         for run in case.runs:
             if run.failed:
                 console.warn(f"{name}, seed {run.seed}: {run.failed}")
-    console.say("in 95 %: share of errors inside the 95 % ellipsoid that the estimate states")
+    console.say(
+        "in 95 %: share of errors inside the 95 % ellipsoid that the estimate states; heights and tilt of the floor "
+        "count, x, y and heading of the world are a choice; runs that failed count as lost"
+    )
 
 
 def _row(score: TrackScore | None) -> list[str]:
     if score is None:
-        return ["failed", *[""] * 13]
+        return ["failed", *[""] * 14]
     return [
         f"{score.cap_mean_mm:.2f} / {score.cap_p95_mm:.1f} / {score.cap_max_mm:.0f}", f"{score.rod_mean_mm:.2f}",
         f"{score.axis_mean_deg:.2f} ({score.axis_p95_deg:.2f})", f"{100 * score.within:.2f} %",
         f"{score.com_mean_mm:.2f}", f"{100 * score.covered:.1f} %", f"{100 * score.lost:.1f} %",
-        _number(score.contact_f1, 3), _number(score.delay_error_ms, 1), _number(score.sensor_error_mm, 2),
+        _number(score.contact_f1, 3), _delay(score), _number(score.sensor_error_mm, 2), f"{score.floor_mm:.2f}",
         _number(score.recovery_s, 2), f"{score.frames_per_s:.1f}", f"{score.cpu_ms:.0f}",
         f"{score.memory_mb:.0f}",
     ]  # fmt: skip
+
+
+def _delay(score: TrackScore) -> str:
+    """Largest error, and in how many runs with sensors the estimate does not know the delay."""
+    known = _number(score.delay_error_ms, 1)
+    return f"{known} ({score.delay_unknown} unknown)".strip() if score.delay_unknown else known
 
 
 def _number(value: float | None, digits: int) -> str:

@@ -27,7 +27,9 @@ WEIGHT_SHARE, NEAR_M = 0.05, 0.001
 @dataclass(frozen=True)
 class Errors:
     """One run, frame by frame, so that runs can be put together. cap, com [m], axis [deg], squared: normalised squared
-    error; contact, touching, counted: estimated and true contact, and whether it counts, (frame, cap)."""
+    error; contact, touching, counted: estimated and true contact, and whether it counts, (frame, cap). delay_s:
+    estimated minus true delay, None where it is said to be unknown. sensors: whether the run has any. floor_m,
+    floor_rad: by how much the floor is taken for too far from the camera, and its tilt."""
 
     cap: np.ndarray
     rod: np.ndarray
@@ -38,6 +40,9 @@ class Errors:
     touching: np.ndarray
     counted: np.ndarray
     delay_s: float | None
+    sensors: bool
+    floor_m: float
+    floor_rad: float
     sensor_m: float | None
     recovery_s: float | None
     wall_s: float
@@ -46,13 +51,13 @@ class Errors:
 
 
 def errors_of(case: Case, groups: Mapping[str, Group], *, wall_s: float, cpu_s: float, memory_mb: float) -> Errors:
-    """groups: of the estimate, by stream. Estimates are taken to the camera by their own X_WC, and from there to the
-    rig's world by the true one, because where x and y of an estimate's world lie is a choice."""
+    """groups: of the estimate, by stream. Where an estimate's world has its origin on the floor and where its x axis
+    points is a choice, which `same_axes` takes away; heights and the tilt of the floor are none."""
     frames, truth = groups["frames"], case.truth
     rows = frames["source_frame"]
-    R = truth.X_WC[:3, :3] @ groups["camera"]["X_WC"][:3, :3].T
-    p_WC = groups["camera"]["X_WC"][:3, 3]
-    p_WE = (frames["p_WE"] - p_WC) @ R.T + truth.X_WC[:3, 3]
+    X_WC = groups["camera"]["X_WC"]
+    R, shift = same_axes(X_WC, truth)
+    p_WE = frames["p_WE"] @ R.T + shift
     true, off = truth.p_WE[rows], p_WE - truth.p_WE[rows]
     cov = R @ frames["cov_p_WE"] @ R.T
     squared = np.einsum("tci,tcij,tcj->tc", off, np.linalg.inv(cov), off)
@@ -64,14 +69,33 @@ def errors_of(case: Case, groups: Mapping[str, Group], *, wall_s: float, cpu_s: 
         cap=cap, rod=np.linalg.norm(off[:, 0::2] + off[:, 1::2], axis=-1) / 2, axis=_angles(p_WE, true),
         com=np.linalg.norm(_centre(p_WE, case.robot) - _centre(true, case.robot), axis=-1), squared=squared,
         contact=frames["contact"], touching=force, counted=force | ~near, delay_s=_delay(groups, truth),
+        sensors="sensors" in case.streams, floor_m=float(X_WC[2, 3] - truth.X_WC[2, 3]),
+        floor_rad=float(np.arccos(np.clip(X_WC[2, :3] @ truth.X_WC[2, :3], -1.0, 1.0))),
         sensor_m=_sensor(frames, groups, truth, rows),
         recovery_s=_recovery(frames["t"], cap, truth.blind[rows]), wall_s=wall_s, cpu_s=cpu_s,
         memory_mb=memory_mb,
     )  # fmt: skip
 
 
-def summed_up(runs: Sequence[Errors]) -> TrackScore:
-    """The figures of some runs together."""
+def same_axes(X_WC: np.ndarray, truth: Truth) -> tuple[np.ndarray, np.ndarray]:
+    """Turn about z (3, 3) and move along the floor (3,) that take an estimate's world to the rig's.
+
+    By the camera, which both know: its heading is the same in both, and the point of the true floor on which the robot
+    was on average lies where its line of sight meets the estimate's floor. Caps of the estimate play no part.
+    """
+    both = truth.X_WC[:3, :3] @ X_WC[:3, :3].T
+    yaw = np.arctan2(both[1, 0] - both[0, 1], both[0, 0] + both[1, 1])
+    c, s = np.cos(yaw), np.sin(yaw)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    middle = truth.p_WE.mean(axis=(0, 1)) * np.array([1.0, 1.0, 0.0])
+    ray = X_WC[:3, :3] @ truth.X_WC[:3, :3].T @ (middle - truth.X_WC[:3, 3])
+    seen = X_WC[:3, 3] - ray * X_WC[2, 3] / ray[2]
+    return R, middle - R @ seen
+
+
+def summed_up(runs: Sequence[Errors], failed: Sequence[int] = ()) -> TrackScore:
+    """The figures of some runs together. failed: frames of every run that could not be tracked; in these the robot is
+    lost, within nothing and covered by nothing."""
     cap, rod, axis, com = (
         np.concatenate([getattr(run, name) for run in runs]) for name in ("cap", "rod", "axis", "com")
     )
@@ -80,15 +104,22 @@ def summed_up(runs: Sequence[Errors]) -> TrackScore:
     delays = [abs(run.delay_s) for run in runs if run.delay_s is not None]
     sensors = [run.sensor_m for run in runs if run.sensor_m is not None]
     recoveries = [run.recovery_s for run in runs if run.recovery_s is not None]
+    count, missed = len(cap), sum(failed)
+    tracked = count / (count + missed)
     return TrackScore(
-        frames=len(cap), cap_mean_mm=1e3 * float(cap.mean()), cap_p95_mm=1e3 * float(np.percentile(cap, 95)),
+        runs=len(runs) + len(failed), failed=len(failed), frames=count,
+        cap_mean_mm=1e3 * float(cap.mean()), cap_p95_mm=1e3 * float(np.percentile(cap, 95)),
         cap_max_mm=1e3 * float(cap.max()), rod_mean_mm=1e3 * float(rod.mean()), axis_mean_deg=float(axis.mean()),
-        axis_p95_deg=float(np.percentile(axis, 95)), within=float(np.mean((rod < WITHIN_M) & (axis < WITHIN_DEG))),
+        axis_p95_deg=float(np.percentile(axis, 95)),
+        within=tracked * float(np.mean((rod < WITHIN_M) & (axis < WITHIN_DEG))),
         com_mean_mm=1e3 * float(com.mean()),
-        covered=float(np.mean(np.concatenate([run.squared for run in runs]) < CHI2_95)),
-        lost=float(np.mean(cap.max(axis=1) > LOST_M)),
+        covered=tracked * float(np.mean(np.concatenate([run.squared for run in runs]) < CHI2_95)),
+        lost=(float(np.sum(cap.max(axis=1) > LOST_M)) + missed) / (count + missed),
         contact_f1=2 * hit / (2 * hit + wrong) if hit + wrong else None,
         delay_error_ms=1e3 * max(delays) if delays else None,
+        delay_unknown=sum(run.sensors and run.delay_s is None for run in runs),
+        floor_mm=1e3 * max(abs(run.floor_m) for run in runs),
+        floor_deg=float(np.degrees(max(run.floor_rad for run in runs))),
         sensor_error_mm=1e3 * float(np.mean(sensors)) if sensors else None,
         recovery_s=max(recoveries) if recoveries else None,
         frames_per_s=len(cap) / sum(run.wall_s for run in runs),

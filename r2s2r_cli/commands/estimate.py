@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,7 +25,6 @@ from r2s2r_cli.options import (
 from r2s2r_cli.store.project import Project
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     from r2s2r_cli.artifact import ArtifactData
@@ -90,7 +91,7 @@ def estimate(
         from r2s2r_cli.store.read import read_artifact
 
         _, recording = read_artifact(source, "recording")
-        with PictureFile(source) as file, console.parts() as show:
+        with PictureFile(source) as file, console.parts() as show, _hints_name(here.relative(source)):
             return compute_states(
                 recording, here.robot(), here.config(place, overrides).estimate, show=show,
                 pictures=lambda run, name: file.pictures(f"runs/{run}/camera/{name}"),
@@ -100,6 +101,18 @@ def estimate(
     show_outcome(result, console)
     if report is not None:
         _show(report, console)
+
+
+@contextmanager
+def _hints_name(source: str) -> Iterator[None]:
+    """Hints of the stage, which knows no paths, with that of the recording: they can be pasted in the project."""
+    from r2s2r_cli.errors import R2S2RError
+
+    try:
+        yield
+    except R2S2RError as error:
+        error.hint = error.hint.replace("10-record.h5", source)
+        raise
 
 
 def _draw(data: ArtifactData, robot: Robot, report: EstimateReport, source: Path) -> Iterator[tuple[str, bytes]]:

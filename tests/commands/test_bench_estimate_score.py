@@ -34,8 +34,12 @@ def truth(seed: int = 0) -> SimpleNamespace:
                            length=np.ones((N, 9)), blind=np.zeros(N, dtype=bool))  # fmt: skip
 
 
-def scored(true: SimpleNamespace, p_WE: np.ndarray, cov: np.ndarray, world: np.ndarray | None = None) -> Errors:
-    """An estimate p_WE of `true` in the rig's world, written down in another world."""
+def scored(
+    true: SimpleNamespace, p_WE: np.ndarray, cov: np.ndarray, world: np.ndarray | None = None,
+    delay: float | None = None,
+) -> Errors:  # fmt: skip
+    """An estimate p_WE of `true` in the rig's world, written down in another world. delay: that of the sensors, NaN:
+    not known; None: there are none."""
     world = np.eye(4) if world is None else world
     R, p = world[:3, :3], world[:3, 3]
     frames = Group({
@@ -43,7 +47,10 @@ def scored(true: SimpleNamespace, p_WE: np.ndarray, cov: np.ndarray, world: np.n
         "contact": true.force > 0.5,
     })  # fmt: skip
     groups = {"frames": frames, "camera": Group({"X_WC": world @ true.X_WC})}
-    return errors_of(SimpleNamespace(truth=true, robot=ROBOT), groups, wall_s=1.0, cpu_s=1.0, memory_mb=0.0)
+    if delay is not None:
+        groups["sensor_fit"] = Group({}, {"delay": delay, "delay_known": bool(np.isfinite(delay))})
+    case = SimpleNamespace(truth=true, robot=ROBOT, streams={} if delay is None else {"sensors": None})
+    return errors_of(case, groups, wall_s=1.0, cpu_s=1.0, memory_mb=0.0)
 
 
 def cov_of(sd: float) -> np.ndarray:
@@ -58,6 +65,33 @@ def test_another_choice_of_axes_and_origin_is_no_error() -> None:
     assert score.cap_max_mm < 1e-9
     assert score.axis_mean_deg < 1e-6
     assert (score.within, score.lost, score.contact_f1) == (1.0, 0.0, 1.0)
+
+
+def test_a_wrong_floor_is_an_error() -> None:
+    """Floor 5 mm too near and 0.5 degrees off: heights where the robot stands are wrong by it; x, y, heading are not."""
+    true, angle = truth(), np.radians(0.5)
+    wrong = np.eye(4)
+    wrong[:3, :3] = [[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]]
+    high = wrong[:3, :3] @ true.X_WC[:3, 3]
+    wrong[2, 3] = true.X_WC[2, 3] - 0.005 - high[2]  # the camera is 5 mm nearer to the floor
+    for turned in (0.0, 2.0):
+        errors = scored(true, true.p_WE, cov_of(1e-3), turn(turned, (0.3, 0.1, 0.0)) @ wrong)
+        score = summed_up([errors])
+        assert (score.floor_mm, score.floor_deg) == pytest.approx((5.0, 0.5))
+        caps = true.p_WE - true.X_WC[:3, 3]
+        height = (caps @ wrong[:3, :3].T)[..., 2] + true.X_WC[2, 3] - 0.005 - true.p_WE[..., 2]
+        assert score.cap_mean_mm == pytest.approx(1e3 * np.mean(np.abs(height)), rel=0.15)
+        assert score.covered < 0.5
+
+
+def test_runs_that_failed_and_unknown_delays_are_counted() -> None:
+    """One run in four fails: a quarter of all frames is lost. A delay that is not known is no good delay."""
+    true = truth()
+    runs = [scored(true, true.p_WE, cov_of(1e-3), delay=delay) for delay in (0.031, float("nan"), 0.025)]
+    score = summed_up(runs, [N])
+    assert (score.runs, score.failed, score.delay_unknown) == (4, 1, 1)
+    assert (score.within, score.covered, score.lost) == pytest.approx((0.75, 0.75, 0.25))
+    assert score.delay_error_ms == pytest.approx(5.0)
 
 
 def test_a_planted_shift_is_found_in_every_figure() -> None:

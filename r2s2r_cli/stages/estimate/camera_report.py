@@ -70,7 +70,10 @@ def camera_warnings(state: RunState, facts: CameraFacts) -> list[str]:
                      "the covariances are not right")  # fmt: skip
     dead = np.flatnonzero(facts.tracked.sensor_dead)
     if facts.readings is None:
-        found.append("the recording has no cable sensors: hidden caps are guessed from the rods alone")
+        found.append(
+            "the recording has no cable sensors: hidden caps are guessed from the rods alone, and whether the colours "
+            "belong to the rods that robot.toml says cannot be told"
+        )
     elif len(dead):
         cables = ", ".join(str(int(facts.readings.cable[i])) for i in dead)
         found.append(f"the sensors of cables {cables} contradict what is seen, or never speak: they are not used")

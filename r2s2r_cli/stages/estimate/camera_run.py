@@ -12,9 +12,19 @@ from r2s2r_cli.artifact import Group
 from r2s2r_cli.devices.camera import Intrinsics
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.estimate.camera_input import Pictures, kept_frames, sensor_readings
+from r2s2r_cli.stages.estimate.exchanged import check_names
 from r2s2r_cli.stages.estimate.ground import Ground
 from r2s2r_cli.stages.estimate.lengths import sensor_lengths
-from r2s2r_cli.stages.estimate.motion.data import LOST, REJECTED, SEEN, MotionSettings, Readings, Sighted, TrackedRun
+from r2s2r_cli.stages.estimate.motion.data import (
+    LOST,
+    NO_IMAGE,
+    REJECTED,
+    SEEN,
+    MotionSettings,
+    Readings,
+    Sighted,
+    TrackedRun,
+)
 from r2s2r_cli.stages.estimate.motion.smooth_run import smooth_run
 from r2s2r_cli.stages.estimate.rigid import make_rigid
 from r2s2r_cli.stages.estimate.run import RunState, intervals_of, switches
@@ -23,6 +33,7 @@ from r2s2r_cli.stages.estimate.sweep import Sweep, Swept
 from r2s2r_cli.stages.estimate.vision.frames import FrameSource
 from r2s2r_cli.stages.estimate.vision.known import Survey
 from r2s2r_cli.stages.estimate.vision.sight import Sighter
+from r2s2r_cli.stages.estimate.vision.sightings import NO_PICTURE
 from r2s2r_cli.stages.estimate.vision.survey import survey
 from r2s2r_cli.stages.segments import Intervals, Segments
 from schemas.estimate import EstimateSettings
@@ -70,7 +81,7 @@ def camera_run(
     try:
         return tracked_run(run, streams, source, robot, settings, rows=rows, show=show)
     except InputError as error:
-        if run in error.what:
+        if f"run {run}" in error.what:
             raise
         raise InputError(
             f"run {run}: {error.what}", where=error.where or f"runs/{run}/camera", expected=error.expected,
@@ -92,6 +103,8 @@ def tracked_run(
 
     known = survey(source, robot)
     motion = MotionSettings(kick_m_per_s=settings.switch_kick_m_per_s)
+    if known.height_sd > motion.ground_sd_m:
+        motion = replace(motion, ground_sd_m=known.height_sd)
     readings = sensor_readings(streams, robot)
     sighter = Sighter(robot, source.lens, source.depth_scale, known)
     swept = Sweep(run, source, sighter, known.X_WC, readings, robot, motion, advance).run()
@@ -102,10 +115,15 @@ def tracked_run(
         if readings is not None:
             heard = readings.t <= source.t[n - 1]
             readings = Readings(readings.t[heard], readings.length[heard], readings.cable)
+    doubt = check_names(swept.sighted, readings, robot, where=f"runs/{run}/camera")
     t = source.t[:n]
     show(f"{run}: smoothing", 0, 1, "")
     tracked = smooth_run(swept.sighted, readings, robot, motion, switches=switches(streams, t))
     show(f"{run}: smoothing", 1, 1, "")
+    blank = np.all(swept.code == NO_PICTURE, axis=1)
+    tracked = replace(tracked, mode=np.where(blank, tracked.mode | NO_IMAGE, tracked.mode).astype(np.uint8))
+    if doubt is not None:
+        known = replace(known, warnings=(*known.warnings, doubt))
     return _state(run, streams, source, t, robot, settings, known, swept, tracked, readings,
                   np.arange(n) if rows is None else rows[:n])  # fmt: skip
 

@@ -170,13 +170,11 @@ class Sweep:
 
     def _not_found(self) -> InputError:
         n = len(self._source)
-        seen = ", ".join(
-            f"{color.rod} in {count}" for color, count in zip(self._robot.colors, self._seen, strict=False)
-        )
+        seen = ", ".join(f"{rod.name} in {count}" for rod, count in zip(self._robot.rods, self._seen, strict=True))
         return InputError(
             f"in no frame of run {self._run} are all end caps seen and told apart", where=f"runs/{self._run}/camera",
             expected="one frame at least with both caps of every rod, as far apart as the cable sensors say",
-            received=f"of {n} frames both caps of a colour: {seen or 'robot.toml has no colours'}",
+            received=f"of {n} frames both caps of a colour: {seen}",
             hint="r2s2r doctor camera shows what the colours of robot.toml find",
         )  # fmt: skip
 

@@ -8,9 +8,12 @@ import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.estimate.smooth import MISSING, OUTLIER
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.segments import Intervals, Segments
 
+GUESSED_M = 0.005
+"""Standard deviation of a hidden cap, along its worst axis, from which on it counts as not observed at all."""
 STILL = 3.0
 """A run whose smoothed caps move less than this many standard deviations of the noise (all axes) shows no motion."""
 
@@ -51,7 +54,7 @@ def run_data(recording: ArtifactData | None, estimate: ArtifactData, run: str, *
         sd_p=np.sqrt(np.diagonal(frames["cov_p_WE"], axis1=-2, axis2=-1)),
         v_WE=frames["v_WE"],
         sd_v=frames["sd_v_WE"],
-        quality=frames["quality"],
+        quality=frames["quality"] if caps is not None else _quality(frames, tracks, estimate.group(run, "camera")),
         t_command=commands["t"],
         control=_control(commands, run),
         target=commands["target"],
@@ -98,6 +101,21 @@ def _group(data: ArtifactData, run: str, stream: str) -> Group:
 def _as_known(frames: Group, tracks: Group) -> np.ndarray:
     """End caps of a run of camera images; smoothed ones know later frames, and no test segment may start from them."""
     return tracks["observed"] if "observed" in tracks else frames["p_WE"]
+
+
+def _quality(frames: Group, tracks: Group, camera: Group | None) -> np.ndarray:
+    """Codes of a run of camera images, (frame, cap): OUTLIER where what was known of a cap is a guess.
+
+    That is where it was hidden for so long that it is GUESSED_M uncertain, and before the frame in which the tracker
+    told the caps apart: what it knew there it had from later frames.
+    """
+    quality = frames["quality"].copy()
+    if "observed_sd" in tracks:
+        guessed = tracks["observed_sd"].max(axis=2) > GUESSED_M
+        quality[(quality == MISSING) & guessed] = OUTLIER
+    if camera is not None:
+        quality[: int(camera.attributes.get("begun", 0))] = OUTLIER
+    return quality
 
 
 def _observed(caps: Group, frames: Group, ground: Group, run: str) -> np.ndarray:

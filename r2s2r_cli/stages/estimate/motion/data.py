@@ -43,8 +43,6 @@ class MotionSettings:
     """Of the horizontal speed of a cap that carries weight: it rolls, and slides at times."""
     lost_sd_m: float = 0.03
     """A cap less certain than this along its worst axis counts as lost."""
-    systematic_sd_m: float = 0.0
-    """Error of the camera's positions that all frames share, per axis; it is added to the covariances."""
 
 
 @dataclass(frozen=True)

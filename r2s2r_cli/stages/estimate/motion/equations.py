@@ -18,7 +18,7 @@ START_SD = (3.0, 1.0)
 SHARED_S = 1.0
 """[s] How long the errors that neighbouring sightings share stay alike."""
 BELOW_SD_M = 1e-3
-"""[m] Of how far a cap that is not known to touch may be below the floor."""
+"""[m] Of how far any cap may be below the floor, whether it is known to touch or not."""
 LIFTED_M, LIFTED_HIDDEN_M = 0.03, 0.1
 """[m] How high a cap may be that was taken to touch and does not: with the probability of that it widens the height
 (the variance of the mixture of both). While it is hidden, times the root of the frames that share the mistake."""
@@ -93,7 +93,7 @@ def _floor(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body, settin
         p = x[:, body.p(cap)]
         height = p[:, 2] - body.radius[cap]
         touching = evidence.touching[:, cap]
-        below = np.where(height < 0, 1 - touching, 0.0) / BELOW_SD_M**2
+        below = (height < 0) / BELOW_SD_M**2
         lifted = np.where(evidence.information[:, cap, 2, 2] > 0, LIFTED_M, LIFTED_HIDDEN_M)
         stands = touching / (settings.contact_sd_m**2 + (1 - touching) * lifted**2)
         frames.scalar(body.p(cap)[2:], one[:, None], height, stands + below)
@@ -145,23 +145,17 @@ def _motion(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body, setti
             frames.matrix[1:, rows[i], rows[j]] += w[:, :, i, j]
             frames.matrix[:-1, rows[i], rows[j]] += fwf[:, :, i, j]
             upper[:, rows[i], rows[j]] -= fw[:, :, i, j]
-    _slow(frames, x, dt, upper, np.arange(body.bias.start, body.bias.stop), 1.0, settings.sensor_walk_m**2 * dt)
+    _slow(frames, x, upper, np.arange(body.bias.start, body.bias.stop), np.ones_like(dt), evidence.sensor_drift)
     fade = np.exp(-dt / SHARED_S)
-    _slow(frames, x, dt, upper, np.arange(body.bias.stop, body.dim), fade, 1.0 - fade**2)
+    _slow(frames, x, upper, np.arange(body.bias.stop, body.dim), fade, 1.0 - fade[:, None] ** 2)
     return upper
 
 
 def _slow(
-    frames: Frames,
-    x: np.ndarray,
-    dt: np.ndarray,
-    upper: np.ndarray,
-    states: np.ndarray,
-    fade: np.ndarray | float,
-    variance: np.ndarray,
+    frames: Frames, x: np.ndarray, upper: np.ndarray, states: np.ndarray, fade: np.ndarray, variance: np.ndarray
 ) -> None:
-    """States that go on by themselves: times `fade`, plus noise of that `variance`, (gap,)."""
-    weight, keep = 1.0 / variance[:, None], np.broadcast_to(fade, dt.shape)[:, None]
+    """States that go on by themselves: times `fade` (gap,), plus noise of that `variance`, (gap, 1 or state)."""
+    weight, keep = 1.0 / variance, fade[:, None]
     step = x[1:, states] - keep * x[:-1, states]
     frames.cost += 0.5 * float(np.sum(weight * step**2))
     frames.gradient[1:, states] += weight * step

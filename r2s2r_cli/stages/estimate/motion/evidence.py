@@ -31,6 +31,8 @@ class Evidence:
     """How many, (frame, sensor)."""
     sensor_weight: np.ndarray
     """[1/m^2], (frame, sensor)."""
+    sensor_drift: np.ndarray
+    """Variance of the change of a sensor's offset over each gap [m^2], (frame - 1, sensor)."""
     sighting_bend: float | None
     """Beyond so many standard deviations the cost of a sighting grows linearly; None: Student's t, which lets it go."""
     sensor_bend: float | None

@@ -121,6 +121,7 @@ def first_evidence(prepared: Prepared, body: Body, settings: MotionSettings, swi
         across=np.zeros((len(prepared.t), body.caps, 3, ACROSS)),
         density=np.full((gaps, body.caps), settings.acceleration), kick=kick,
         shown=none, later=none, samples=none, sensor_weight=none,
+        sensor_drift=np.broadcast_to(settings.sensor_walk_m**2 * np.diff(prepared.t)[:, None], (gaps, sensors)),
         sighting_bend=SIGHTING_BEND, sensor_bend=None, touching=np.zeros((len(prepared.t), body.caps)),
     )  # fmt: skip
 

@@ -25,9 +25,16 @@ from r2s2r_cli.stages.estimate.motion.rounds import State, cap_covariances, dist
 
 USED = 0.3
 """A sighting whose weight fell below this share contradicts the rest: nearly 5 standard deviations off."""
+LEVERAGE_LEAST = 0.25
+"""Least share of a sighting's variance that its distance from the state is measured by: where the state follows a
+single sighting that distance is next to nothing, and so is its variance."""
+TOUCHES_M = 0.015
+"""[m] A cap that is written down higher does not touch, however likely it is that it does."""
 SHARED_ALONG = 0.1
 """Share of the error along the line of sight that all frames have in common (standard deviations): of depth cameras it
 is mostly noise, but not all."""
+SHARED_ACROSS = 0.3
+"""The same across it: where rims lie in a pixel, and how a picture stores colour, are alike for all caps and frames."""
 NEAR_S = 0.25
 """[s] A sensor that was not heard for that long before and after a frame is missing there."""
 
@@ -44,7 +51,7 @@ def tracked_run(
     quality, score = _quality(state, prepared, body)
     variance = np.diagonal(cov, axis1=1, axis2=2)
     heard = _heard(state.evidence.t, state.evidence.sensor_weight)
-    shown = p_cov + _along(prepared) + settings.systematic_sd_m**2 * np.eye(3)
+    shown = p_cov + _everywhere(prepared)
     worst = np.sqrt(np.linalg.eigvalsh(shown)[..., -1])
     mode = (
         np.where(np.any(heard, axis=1), 0, NO_SENSORS)
@@ -59,20 +66,23 @@ def tracked_run(
         sensor_bias_sd=np.sqrt(variance[rows, body.bias]), sensor_noise_sd=state.noise,
         sensor_dead=~np.any(state.evidence.sensor_weight > 0, axis=0), clock=clock,
         ground=np.zeros(3), ground_sd=np.array([settings.ground_sd_m, *2 * [settings.ground_tilt_sd_rad]]),
-        contact=contacts(state.evidence.touching)[rows], contact_probability=state.evidence.touching[rows],
+        contact=(contacts(state.evidence.touching) & _near_floor(x, worst, body, settings))[rows],
+        contact_probability=state.evidence.touching[rows],
         quality=quality[rows], mode=mode[rows], score=score[rows], noise_scale=np.sqrt(state.factor),
         acceleration=np.array([state.evidence.density[first == k].mean(axis=0) for k in range(len(rows) - 1)]),
         rounds=state.rounds, settled=state.solved is not None and state.solved.settled,
     )  # fmt: skip
 
 
-def _along(prepared: Prepared) -> np.ndarray:
-    """Shared part of the error along the lines of sight, as covariances [m^2], (frame, cap, 3, 3)."""
+def _everywhere(prepared: Prepared) -> np.ndarray:
+    """What all sightings err alike, as covariances [m^2], (frame, cap, 3, 3): no state of the run knows of it."""
     values, axes = principal(prepared.cov)
+    usual = np.median(values[prepared.sighted], axis=0)
     ray = axes[prepared.sighted][:, 2]
-    usual = np.median(values[prepared.sighted][:, 2]) * SHARED_ALONG**2
-    _, vectors = np.linalg.eigh(ray.T @ ray)
-    return np.broadcast_to(usual * np.outer(vectors[:, 2], vectors[:, 2]), prepared.cov.shape)
+    along = np.linalg.eigh(ray.T @ ray)[1][:, 2]
+    line = np.outer(along, along)
+    across = SHARED_ACROSS**2 * 0.5 * (usual[0] + usual[1])
+    return np.broadcast_to(SHARED_ALONG**2 * usual[2] * line + across * (np.eye(3) - line), prepared.cov.shape)
 
 
 def _quality(state: State, prepared: Prepared, body: Body) -> tuple[np.ndarray, np.ndarray]:
@@ -88,8 +98,15 @@ def _quality(state: State, prepared: Prepared, body: Body) -> tuple[np.ndarray, 
     total = np.where(used[rows][:, None, None], seen - spread[rows], seen + spread[rows])
     values, axes = np.linalg.eigh(total)
     part = np.einsum("nai,na->ni", axes, off[rows])
-    score[rows] = np.sqrt(np.mean(part**2 / np.maximum(values, 0.02 * np.linalg.eigvalsh(seen)[:, :1]), axis=1))
+    least = LEVERAGE_LEAST * np.einsum("nai,nab,nbi->ni", axes, seen, axes)
+    score[rows] = np.sqrt(np.mean(part**2 / np.maximum(values, least), axis=1))
     return quality, score
+
+
+def _near_floor(x: np.ndarray, worst: np.ndarray, body: Body, settings: MotionSettings) -> np.ndarray:
+    """Caps that are neither lost nor written down high above the floor: only these are said to touch, (frame, cap)."""
+    height = x[:, 2 + 3 * np.arange(body.caps)] - body.radius
+    return (height < TOUCHES_M) & (worst <= settings.lost_sd_m)
 
 
 def _heard(t: np.ndarray, weight: np.ndarray) -> np.ndarray:

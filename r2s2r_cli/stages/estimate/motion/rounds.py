@@ -13,14 +13,13 @@ from r2s2r_cli.stages.estimate.motion.equations import sighting_slope
 from r2s2r_cli.stages.estimate.motion.evidence import Evidence
 from r2s2r_cli.stages.estimate.motion.noise import gap_density, next_density, sensor_variance, sighting_scale
 from r2s2r_cli.stages.estimate.motion.prepare import Prepared, information, principal
+from r2s2r_cli.stages.estimate.motion.sensors import LATE_S, offset_drift, sample_variance, sample_weights
 from r2s2r_cli.stages.estimate.motion.shared import shared_errors
 from r2s2r_cli.stages.estimate.motion.solve import Solved, solve
 from r2s2r_cli.stages.estimate.motion.touching import touching_probability
 
 STEPS = 10
 """Gauss-Newton steps of the last round, at most."""
-DEAD_NOISE_M = 0.02
-"""[m] A sensor with more noise than this says nothing."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ def settle(state: State, body: Body, settings: MotionSettings, *, steps: int = S
     )
 
 
-def learn(state: State, prepared: Prepared, body: Body) -> State:
+def learn(state: State, prepared: Prepared, body: Body, settings: MotionSettings) -> State:
     """Noise of sightings, sensors and motion from the present states."""
     evidence, cov = state.evidence, known(state).cov
     rows = np.nonzero(prepared.sighted)
@@ -55,8 +54,10 @@ def learn(state: State, prepared: Prepared, body: Body) -> State:
     step = sighting_scale(residual[rows], seen, axes, spread[rows])
     factor = np.clip(state.factor * step, 0.05, 30.0)
     noise = state.noise.copy()
+    rate = rates(state.x, body)
+    slow = (LATE_S * rate) ** 2 <= sample_variance(evidence.samples, noise, 0.0 * rate)  # noise shows alone
     for s in range(len(noise)):
-        used = evidence.sensor_weight[:, s] > 0
+        used = (evidence.sensor_weight[:, s] > 0) & slow[:, s]
         if np.sum(used) < 10:
             continue
         residual, spread = sensor_residual(state.x, cov, evidence, body, s)
@@ -69,13 +70,13 @@ def learn(state: State, prepared: Prepared, body: Body) -> State:
     told = prepared.sighted | heard
     believed = told[1:] & told[:-1]
     density = next_density(each, evidence.kick, np.diff(evidence.t), believed)
-    weight = sensor_weights(evidence.samples, noise)
     evidence = replace(
         evidence,
         information=information(prepared, factor),
         across=shared_errors(prepared, factor),
         density=density,
-        sensor_weight=weight,
+        sensor_weight=sample_weights(evidence.samples, noise, rate),
+        sensor_drift=offset_drift(evidence.t, rate, settings.sensor_walk_m),
     )
     return replace(state, evidence=evidence, factor=factor, noise=noise)
 
@@ -101,9 +102,14 @@ def known(state: State) -> Marginals:
     return state.marginal
 
 
-def sensor_weights(samples: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """1 / variance of means of so many samples; 0 for sensors that say nothing."""
-    return np.where(noise < DEAD_NOISE_M, samples / noise**2, 0.0)
+def rates(x: np.ndarray, body: Body) -> np.ndarray:
+    """Of the sensors' lengths [m/s], (frame, sensor)."""
+    found = np.empty((len(x), len(body.sensor)))
+    for s, (a, b) in enumerate(body.sensor):
+        bar = x[:, body.p(b)] - x[:, body.p(a)]
+        u = bar / np.maximum(np.linalg.norm(bar, axis=1), 1e-9)[:, None]
+        found[:, s] = np.sum(u * (x[:, body.v(b)] - x[:, body.v(a)]), axis=1)
+    return found
 
 
 def cap_covariances(cov: np.ndarray, body: Body) -> np.ndarray:

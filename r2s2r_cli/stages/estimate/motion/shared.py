@@ -7,8 +7,7 @@ import numpy as np
 from r2s2r_cli.stages.estimate.motion.prepare import Prepared, principal
 
 TOTAL = 0.85
-"""What the whole error is taken for, over what the sightings state (variances): at 1.44 m they state a little too
-much, at 2.4 m a little too little (tuning runs)."""
+"""What the whole error is taken for, over what the sightings state (variances)."""
 LEAST = 0.02
 """Least share of the stated variance that is shared."""
 

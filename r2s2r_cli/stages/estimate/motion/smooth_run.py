@@ -42,10 +42,10 @@ def smooth_run(
     settings = settings or MotionSettings()
     if len(sighted.t) <= LONGEST:
         return smooth_window(sighted, readings, robot, settings, switches, None)
-    prepare(sighted, Body.of(robot))
+    prepared = prepare(sighted, Body.of(robot))
     parts: list[TrackedRun] = []
     clock: SensorClock | None = None
-    cuts = windows(np.all(np.isfinite(sighted.p_WE), axis=2))
+    cuts = windows(prepared.sighted[prepared.given])
     for first, last in cuts:
         part = Sighted(sighted.t[first:last], sighted.p_WE[first:last], sighted.cov[first:last])
         own = None if switches is None else switches[(switches >= first) & (switches < last - 1)] - first

@@ -15,6 +15,9 @@ from r2s2r_cli.stages.estimate.motion.evidence import Evidence
 
 SETTLED_M = 1e-4
 """[m] A step that moves no cap by more is the last one: a fraction of what is uncertain even where all is seen."""
+SETTLED_COST = 0.02
+"""Nor does one matter that lowers the cost (minus log posterior) by less: no state is moved by a fifth of its standard
+deviation, however far a hidden cap goes."""
 HALVINGS = 8
 
 
@@ -30,8 +33,14 @@ class Solved:
 
 
 def solve(x: np.ndarray, evidence: Evidence, body: Body, settings: MotionSettings, *, rounds: int) -> Solved:
-    """Minimise the cost from x. Raises NumericalError where the states stop being finite."""
+    """Minimise the cost from x. Raises NumericalError where sightings or covariances are not finite, or where nothing
+    observes a state."""
     cost, normal = equations(x, evidence, body, settings)
+    if not np.isfinite(cost):
+        raise NumericalError(
+            "the smoother's states are not finite", where="sightings", expected="finite sightings and covariances",
+            received=f"cost {cost}", hint="r2s2r inspect 10-record.h5 shows what was recorded",
+        )  # fmt: skip
     done = eliminate(normal)
     settled, taken = False, 0
     while taken < rounds and not settled:
@@ -45,12 +54,8 @@ def solve(x: np.ndarray, evidence: Evidence, body: Body, settings: MotionSetting
             share *= 0.5
         else:
             break
-        if not np.isfinite(tried):
-            raise NumericalError(
-                "the smoother's states are not finite", where="sightings", expected="finite sightings and covariances",
-                received=f"cost {tried}", hint="r2s2r inspect 10-record.h5 shows what was recorded",
-            )  # fmt: skip
+        small = np.max(np.abs(step[:, : 3 * body.caps])) < SETTLED_M or cost - tried < SETTLED_COST
         x, cost = x + share * step, tried
         done = eliminate(equation)
-        settled = bool(share == 1.0 and np.max(np.abs(step[:, : 3 * body.caps])) < SETTLED_M)
+        settled = bool(share == 1.0 and small)
     return Solved(x, done, cost, taken, settled)

@@ -10,9 +10,9 @@ from r2s2r_cli.stages.estimate.motion.body import Body
 from r2s2r_cli.stages.estimate.motion.data import MotionSettings, Readings, SensorClock, Sighted, TrackedRun
 from r2s2r_cli.stages.estimate.motion.prepare import first_evidence, first_states, prepare
 from r2s2r_cli.stages.estimate.motion.result import tracked_run
-from r2s2r_cli.stages.estimate.motion.rounds import State, distances, known, learn, sensor_weights, settle, touch
+from r2s2r_cli.stages.estimate.motion.rounds import State, distances, known, learn, settle, touch
 from r2s2r_cli.stages.estimate.motion.sensor_clock import find_clock
-from r2s2r_cli.stages.estimate.motion.sensors import bin_readings
+from r2s2r_cli.stages.estimate.motion.sensors import bin_readings, offset_drift, sample_weights
 from schemas.robot import Robot
 
 BURSTS = 2.0
@@ -48,14 +48,14 @@ def smooth_window(
         noise=np.full(len(body.sensor), settings.sensor_noise_sd_m),
     )  # fmt: skip
     for _ in range(ALONE):
-        state = learn(settle(state, body, settings, steps=FEW), prepared, body)
+        state = learn(settle(state, body, settings, steps=FEW), prepared, body, settings)
     state = settle(state, body, settings, steps=FEW)
     state, clock = _with_sensors(state, readings, body, settings, before)
     state = touch(state, prepared, body, hidden=False)
     state = settle(state, body, settings)
     state = replace(state, evidence=replace(state.evidence, sighting_bend=None, sensor_bend=SENSOR_BEND))
     for left in reversed(range(TOGETHER)):
-        state = learn(settle(state, body, settings, steps=FEW), prepared, body)
+        state = learn(settle(state, body, settings, steps=FEW), prepared, body, settings)
         state = touch(state, prepared, body, hidden=left == 0)
     near = prepared.sighted[1:] & prepared.sighted[:-1]
     density = np.where(near, BURSTS, UNSEEN_BURSTS) * state.evidence.density
@@ -82,6 +82,7 @@ def _with_sensors(
             x[:, body.bias.start + s] = np.median((binned.shown - length - binned.later * rate)[clear, s])
     evidence = replace(
         state.evidence, shown=binned.shown, later=binned.later, samples=binned.samples,
-        sensor_weight=sensor_weights(binned.samples, state.noise),
+        sensor_weight=sample_weights(binned.samples, state.noise, rate),
+        sensor_drift=offset_drift(t, rate, settings.sensor_walk_m),
     )  # fmt: skip
     return replace(state, x=x, evidence=evidence), clock

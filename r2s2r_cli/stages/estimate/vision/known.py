@@ -28,6 +28,8 @@ class Survey:
     swell_sd_px: float = 0.3
     frames: tuple[int, ...] = ()
     warnings: tuple[str, ...] = field(default=())
+    height_sd: float = float("nan")
+    """Of the camera's distance from the ground [m]; NaN: not known."""
 
     def with_colors(
         self, *, shift_px: tuple[float, float], shift_sd_px: float, swell_px: float, swell_sd_px: float

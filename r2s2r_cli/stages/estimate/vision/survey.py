@@ -15,6 +15,7 @@ from r2s2r_cli.stages.estimate.vision.colors import blank
 from r2s2r_cli.stages.estimate.vision.frames import FrameSource, ImageFrame
 from r2s2r_cli.stages.estimate.vision.known import Survey
 from r2s2r_cli.stages.estimate.vision.lens import Lens
+from r2s2r_cli.stages.estimate.vision.level import levelled_ground
 from r2s2r_cli.stages.estimate.vision.noise import DepthNoise, measured
 from r2s2r_cli.stages.estimate.vision.plane import (
     MIN_SHARE,
@@ -45,6 +46,8 @@ class _Seen:
     shift_cov: list[np.ndarray] = field(default_factory=list)
     swell: list[float] = field(default_factory=list)
     caps: int = 0
+    places: list[np.ndarray] = field(default_factory=list)
+    """Of the caps found in each frame, (cap, 2) [px]."""
     length: list[tuple[float, float]] = field(default_factory=list)
     """Distances of a rod's two caps over the length of the rod, with standard deviation."""
 
@@ -72,20 +75,7 @@ def survey(
         raise _bad("no frame of the run has a picture in colour and one in depth with anything in them",
                    f"{len(index)} frames looked at", "colour and depth", _lacks(looked))  # fmt: skip
     ground = _ground(usable, lens, scale, seed, method, warnings)
-    X_WC = camera_pose(ground)
-    if source.X_WC is not None:
-        angle, height = disagreement(source.X_WC, ground)
-        if angle <= TILT_RAD and abs(height) <= HEIGHT_M:
-            X_WC = levelled(source.X_WC, ground)
-        else:
-            trusted = ground.share >= MIN_SHARE
-            warnings.append(
-                f"the recording's camera pose and the ground that is seen differ by {np.degrees(angle):.1f} degrees, "
-                f"{1e3 * height:.0f} mm; {'the ground that is seen' if trusted else 'the stated pose'} is used"
-            )
-            if not trusted:
-                X_WC = source.X_WC
-                ground = replace(ground, normal_C=X_WC[2, :3].copy(), distance=float(X_WC[2, 3]))
+    X_WC, ground, seen = _posed(source.X_WC, ground, warnings)
     noise = _noise(usable[:: max(len(usable) // NOISE_FRAMES, 1)][:NOISE_FRAMES], lens, scale, ground)
     first = Survey(X_WC, ground, noise)
     check_sizes(usable, robot, lens, scale)
@@ -95,6 +85,11 @@ def survey(
                    "two balls of the colour of each rod (robot.toml [[colors]])", "none")  # fmt: skip
     if (doubt := check_lengths(rough.length, lens, scale)) is not None:
         warnings.append(doubt)
+    height_sd = float("nan")
+    if seen:
+        ground, height_sd = levelled_ground(ground, usable, rough.places, Lens(lens), scale, noise)
+        X_WC, ground, _ = _posed(source.X_WC, ground, [])
+        first = replace(first, X_WC=X_WC, ground=ground)
     shift, shift_sd = _pooled(rough)
     second = first.with_colors(shift_px=shift, shift_sd_px=shift_sd, swell_px=0.0, swell_sd_px=0.3)
     fine = _caps(usable, robot, lens, scale, second) if np.hypot(*shift) > 0.3 else rough
@@ -106,8 +101,25 @@ def survey(
         warnings.append(f"depth lies ({shift[0]:+.2f}, {shift[1]:+.2f}) pixels beside colour; this is corrected")
     return Survey(
         X_WC, ground, noise, shift, shift_sd, swell, 0.1 if len(fine.swell) >= 6 else 0.3,
-        tuple(int(i) for i in index), tuple(warnings),
+        tuple(int(i) for i in index), tuple(warnings), height_sd,
     )  # fmt: skip
+
+
+def _posed(stated: np.ndarray | None, ground: Ground, warnings: list[str]) -> tuple[np.ndarray, Ground, bool]:
+    """X_WC (4, 4), the ground it stands on, and whether that is the one that is seen."""
+    if stated is None:
+        return camera_pose(ground), ground, True
+    angle, height = disagreement(stated, ground)
+    if angle <= TILT_RAD and abs(height) <= HEIGHT_M:
+        return levelled(stated, ground), ground, True
+    trusted = ground.share >= MIN_SHARE
+    warnings.append(
+        f"the recording's camera pose and the ground that is seen differ by {np.degrees(angle):.1f} degrees, "
+        f"{1e3 * height:.0f} mm; {'the ground that is seen' if trusted else 'the stated pose'} is used"
+    )
+    if trusted:
+        return camera_pose(ground), ground, True
+    return stated, replace(ground, normal_C=stated[2, :3].copy(), distance=float(stated[2, 3])), False
 
 
 def _usable(frame: ImageFrame, lens: Intrinsics) -> bool:
@@ -177,6 +189,8 @@ def _caps(frames: list[ImageFrame], robot: Robot, lens: Intrinsics, scale: float
     sighter, seen = Sighter(robot, lens, scale, known), _Seen()
     for frame in frames:
         found = sighter.balls(frame)
+        centers = [sighter.lens.project(fit.center) for fits in found for fit in fits[:2]]
+        seen.places.append(np.array(centers).reshape(-1, 2))
         for rod, fits in enumerate(found):
             seen.caps += len(fits)
             if len(fits) >= 2:

@@ -53,7 +53,8 @@ def evidence(body: Body, rng: np.random.Generator, frames: int) -> tuple[np.ndar
         information=1e4 * root @ np.swapaxes(root, -1, -2), across=3e-3 * rng.standard_normal((*shape, 3, ACROSS)),
         density=rng.uniform(0.01, 0.1, (frames - 1, body.caps)), kick=np.full(frames - 1, 1e-4),
         shown=0.2 + 0.02 * rng.standard_normal(sensors), later=0.01 * rng.standard_normal(sensors),
-        samples=np.ones(sensors), sensor_weight=np.full(sensors, 1e4), sighting_bend=None, sensor_bend=2.5,
+        samples=np.ones(sensors), sensor_weight=np.full(sensors, 1e4),
+            sensor_drift=rng.uniform(1e-8, 1e-6, (frames - 1, sensors[1])), sighting_bend=None, sensor_bend=2.5,
         touching=rng.uniform(0.0, 1.0, shape),
     )  # fmt: skip
 

@@ -126,7 +126,7 @@ def test_samples_go_to_the_frame_nearest_to_when_they_were_true() -> None:
 
 def test_touching_is_the_sum_over_all_histories(monkeypatch: pytest.MonkeyPatch) -> None:
     """Forward and backward messages against the enumeration of all 2^6 histories of one cap."""
-    monkeypatch.setattr(touching_module, "TEMPER", 1.0)
+    monkeypatch.setattr(touching_module, "ALIKE_S", 1e-9)
     t = np.cumsum(np.array([0.0, 0.03, 0.1, 0.03, 0.3, 0.03]))
     height = np.array([0.0, 0.001, 0.002, 0.01, 0.004, -0.001])
     sd = np.array([5e-4, 1e-3, 2e-3, 5e-2, 1e-3, 5e-4])

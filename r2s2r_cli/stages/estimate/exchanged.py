@@ -1,0 +1,117 @@
+"""Whether the rods have the colours, and the sensors the cables, that robot.toml says: lengths of both over the run.
+
+With two colours exchanged every picture fits a robot as well as before, only that of another robot: cables that are
+reeled in look as if others were. Only the sensors know which cable is which, so their lengths are compared with the
+distances between sighted caps under every other naming of the caps.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+
+from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.estimate.motion.data import Readings, Sighted
+from schemas.robot import Robot
+
+BETTER = 0.65
+"""Another naming fits better where it leaves less than this share of the deviations: then it is the right one."""
+TELLS = 1.3
+"""A naming that leaves less than so many times the deviations is not told from the right one."""
+FRAMES = 300
+"""Frames that are compared at most, spread over the run."""
+LEAST = 30
+"""Fewest frames that show a cable for its sensor to count."""
+SENSORS = 3
+"""Fewest sensors that can tell."""
+NEAR_S = 0.1
+"""[s] Readings farther from a frame than this are none of it."""
+OFFSET_SHARE = 0.4
+"""Of a sensor's offset that counts as a deviation: sensors are off by millimetres, other cables by centimetres."""
+MOST_RODS = 4
+"""Robots of more rods are checked for two rods exchanged alone."""
+
+
+def check_names(sighted: Sighted, readings: Readings | None, robot: Robot, *, where: str) -> str | None:
+    """A warning where the run cannot tell, in words; None where the names of the caps are right.
+
+    Raises InputError where other names fit the sensors clearly better.
+    """
+    if readings is None:
+        return None  # the report says what a run without sensors cannot tell
+    rows = np.unique(np.linspace(0, len(sighted.t) - 1, min(FRAMES, len(sighted.t))).round().astype(int))
+    p, shown = sighted.p_WE[rows], lengths_at(sighted.t[rows], readings)
+    ends = np.array([cable.caps for cable in robot.cables])[readings.cable]
+    names = list(namings(len(robot.rods)))
+    found = np.array([deviation(p, shown, ends, name) for name in names])
+    if not np.isfinite(found[0]):
+        return None
+    others = np.where(np.isfinite(found[1:]), found[1:], np.inf)
+    best = 1 + int(np.argmin(others))
+    if found[best] < BETTER * found[0]:
+        raise InputError(
+            _what(names[best], robot), where=where,
+            expected="lengths of the cable sensors as the camera sees them, but for an offset each",
+            received=f"{1e3 * found[0]:.1f} mm between them in the mean, {1e3 * found[best]:.1f} mm with other names",
+            hint="r2s2r doctor camera shows which rod has which colour; correct rod in [[colors]] of robot.toml",
+        )  # fmt: skip
+    if found[best] < TELLS * found[0]:
+        return (
+            "so little moves, or the sensors err so much, that nobody can tell whether the colours belong to the rods "
+            "that robot.toml says"
+        )
+    return None
+
+
+def _what(naming: np.ndarray, robot: Robot) -> str:
+    rods = naming[::2] // 2
+    if np.array_equal(rods, np.arange(len(rods))):
+        flipped = ", ".join(str(r) for r in np.flatnonzero(naming[::2] % 2))
+        return f"the two end caps of rod {flipped} are exchanged, or sensors are on other cables than robot.toml says"
+    name = [rod.name for rod in robot.rods]
+    hue = {color.rod: f" (hue {color.hue[0]:g} to {color.hue[1]:g})" for color in robot.colors}
+    parts = [f"rod {name[r]} has that of rod {name[of]}{hue.get(name[of], '')}" for r, of in enumerate(rods) if r != of]
+    return f"the colours in robot.toml are exchanged: by the cables {', '.join(parts)}"
+
+
+def namings(rods: int) -> Iterator[np.ndarray]:
+    """Where each cap could be among the caps as they were named, (cap,); the names as they are come first."""
+    if rods > MOST_RODS:
+        yield np.arange(2 * rods)
+        for a, b in itertools.combinations(range(rods), 2):
+            order = np.arange(rods)
+            order[[a, b]] = b, a
+            yield np.stack([2 * order, 2 * order + 1], axis=1).ravel()
+        return
+    for places in itertools.permutations(range(rods)):
+        for flip in itertools.product((0, 1), repeat=rods):
+            yield np.array([2 * r + (end ^ turned) for r, turned in zip(places, flip, strict=True) for end in (0, 1)])
+
+
+def deviation(p_WE: np.ndarray, shown: np.ndarray, ends: np.ndarray, naming: np.ndarray) -> float:
+    """Of the sensors from the distances under a naming [m], the median over sensors; NaN where too few tell.
+
+    p_WE: (frame, cap, 3), NaN where not sighted; shown: (frame, sensor), NaN where silent; ends: (sensor, 2).
+    """
+    apart = np.linalg.norm(p_WE[:, naming[ends[:, 0]]] - p_WE[:, naming[ends[:, 1]]], axis=-1)
+    off, found = shown - apart, []
+    for s in range(off.shape[1]):
+        one = off[np.isfinite(off[:, s]), s]
+        if len(one) >= min(LEAST, len(off) // 2 + 1):
+            middle = float(np.median(one))
+            found.append(np.hypot(1.4826 * float(np.median(np.abs(one - middle))), OFFSET_SHARE * middle))
+    return float(np.median(found)) if len(found) >= SENSORS else float("nan")
+
+
+def lengths_at(t: np.ndarray, readings: Readings) -> np.ndarray:
+    """Of each sensor the mean of its readings within NEAR_S of frames at t [s], (frame, sensor); NaN: none."""
+    order = np.argsort(readings.t, kind="stable")
+    stamps, length = readings.t[order], readings.length[order]
+    first, last = np.searchsorted(stamps, t - NEAR_S), np.searchsorted(stamps, t + NEAR_S, side="right")
+    good = np.isfinite(length)
+    total = np.concatenate([np.zeros((1, length.shape[1])), np.cumsum(np.where(good, length, 0.0), axis=0)])
+    count = np.concatenate([np.zeros((1, length.shape[1]), dtype=int), np.cumsum(good, axis=0)])
+    some = count[last] - count[first]
+    return np.where(some > 0, (total[last] - total[first]) / np.maximum(some, 1), np.nan)

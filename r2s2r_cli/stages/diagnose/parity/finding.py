@@ -1,4 +1,4 @@
-"""What the parity checks say: findings with size and error, effects that they speak for, and settings that are wrong."""
+"""What the parity checks say: findings with size and error, effects that they speak for, settings that are wrong."""
 
 from __future__ import annotations
 

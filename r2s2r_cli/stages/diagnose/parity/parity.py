@@ -84,8 +84,8 @@ def _finding(key: Key, value: Measured, base: Quantities | None, found: Quantiti
     what = f"{scale.words.format(element=element.words())} is {value.value:.4g} {scale.unit}".removesuffix(" 1")
     what += f", {expected.value:.4g} {against}"
     return Finding(
-        check, element, float(value.value), float(value.sd), scale.unit, float(expected.value), float(expected.sd), differential, z,
-        math.erfc(abs(z) / math.sqrt(2)), what, suspected,
+        check, element, float(value.value), float(value.sd), scale.unit, float(expected.value), float(expected.sd),
+        differential, z, math.erfc(abs(z) / math.sqrt(2)), what, suspected,
     )  # fmt: skip
 
 

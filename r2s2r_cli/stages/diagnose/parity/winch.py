@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -51,7 +52,7 @@ class Grid:
 
 
 def ramps(runs: tuple[Series, ...], actuated: tuple[int, ...], rest: np.ndarray, *, seen: bool) -> Ramps:
-    """Of runs. rest: of the passive cables [m], (cable,), nan for the others. seen: cap distances instead of sensors."""
+    """Of runs. rest: of the passive cables [m], (cable,), nan for others. seen: cap distances instead of sensors."""
     rows: list[list[np.ndarray]] = [[], [], []]
     table: list[tuple[int, int, int]] = []
     grids = []
@@ -155,7 +156,7 @@ def _played(path: np.ndarray, play: float) -> np.ndarray:
         moving = np.flatnonzero(way)
         edges = [0, *(moving[turns + 1]).tolist(), len(x) - 1]
         out = x[0] - play
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
+        for a, b in pairwise(edges):
             part = np.minimum(np.maximum(out, x[a : b + 1] - play), x[a : b + 1])
             found[a : b + 1, k] = part
             out = float(part[-1])
@@ -182,7 +183,7 @@ def _spells(u: np.ndarray) -> list[tuple[int, int, int]]:
     """(first row, row after the last, sign) of commands of one sign."""
     sign = np.sign(u).astype(int)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], sign, [0]])))
-    return [(int(a), int(b), int(sign[a])) for a, b in zip(edges[:-1], edges[1:], strict=True) if sign[a]]
+    return [(int(a), int(b), int(sign[a])) for a, b in pairwise(edges) if sign[a]]
 
 
 def _next(grid: Grid, cable: int, end: int, until: float) -> float:

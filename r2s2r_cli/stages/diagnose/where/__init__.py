@@ -8,3 +8,4 @@ from r2s2r_cli.stages.diagnose.where.found import (
     SegmentGap as SegmentGap,
     Where as Where,
 )
+from r2s2r_cli.stages.diagnose.where.where import where as where

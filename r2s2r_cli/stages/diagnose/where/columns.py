@@ -1,0 +1,171 @@
+"""Whitened responses of every target interval to every probe, as products of columns: all that a fit of probes needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from r2s2r_cli.stages.diagnose.parity.finding import Element
+from r2s2r_cli.stages.diagnose.where.probes import KINDS, WINCHED_N, ProbeModel
+from r2s2r_cli.stages.diagnose.which.arena import Arena, White
+from r2s2r_cli.stages.diagnose.which.robust import weight
+from r2s2r_cli.stages.identify.predict import Predictor
+
+if TYPE_CHECKING:
+    from r2s2r_cli.stages.identified import Identified
+
+LATER_S = 0.03
+"""[s] by which commands are shifted for the secant of the command probe."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One number of a probe. scale: sd of its prior, in `unit`."""
+
+    probe: str
+    channel: str
+    element: Element
+    unit: str
+    scale: float
+
+
+@dataclass(frozen=True)
+class Design:
+    """Products of whitened columns of every stretch. gram: (stretch, q + P + 1, q + P + 1): q nuisances, P probes over
+    their scales, then the innovations themselves (observed less simulated). columns: of the probes. size: data of each
+    stretch; gait: number of its gait; precision, offset: of the nuisances' prior, (q, q), mean less where they are (q,).
+    caps: simulated, of every stretch (F, cap, 3) [m]; innovation: whitened cap residuals, (F, cap, 3).
+    """
+
+    gram: np.ndarray
+    columns: tuple[Column, ...]
+    size: np.ndarray
+    gait: np.ndarray
+    known: np.ndarray
+    caps: tuple[np.ndarray, ...]
+    innovation: tuple[np.ndarray, ...]
+
+    @property
+    def q(self) -> int:
+        """How many nuisances."""
+        return len(self.known)
+
+    def of(self, channel: str) -> np.ndarray:
+        """Places among the probes of a channel's columns."""
+        return np.array([k for k, one in enumerate(self.columns) if one.channel == channel], dtype=int)
+
+
+def design(
+    nominal: Identified, arena: Arena, z: np.ndarray, *, cache_dir: Path | None = None, threads: int = 2
+) -> Design:
+    """At the nuisances z of an arena that was prepared there. Raises NumericalError where nothing can be simulated."""
+    replayer = arena.replayer
+    values = arena.values(z[None])[0]
+    model = ProbeModel(nominal, arena.model, values)
+    predictor = Predictor(model, step=replayer.step, cache_dir=cache_dir, threads=threads)  # type: ignore[arg-type]
+    windows = [one.window for one in arena.many]
+    seen = predictor.predict(windows, np.zeros(len(model.names)), jacobian=True)
+    assert seen.by_value is not None  # noqa: S101 - it was asked for
+    later = _later(predictor, model, arena)
+    residual = arena.residuals(values[None], z[None])[0]
+    columns = _columns(model, arena)
+    scale = np.array([one.scale for one in columns])
+    grams, caps, innovations = [], [], []
+    for k, one in enumerate(arena.many):
+        rows = seen.window == k
+        own = seen.p_WE[rows]
+        caps.append(own)
+        by = np.concatenate([seen.by_value[rows], later[rows][..., None], _observed(own, one.t)], axis=-1)
+        whole = np.concatenate([_channels(arena, own, by), _sensing(arena, len(own))], axis=0)
+        white = arena.white[k]
+        probes = _whitened(white, whole) * scale[:, None]
+        joined = np.concatenate([arena.by_nuisance[white.rows].T, probes, -residual[None, white.rows]], axis=0)
+        grams.append(joined @ joined.T)
+        count = own.shape[1] * 3
+        innovation = -residual[white.rows].reshape(-1, len(own))[:count]
+        innovations.append(innovation.reshape(own.shape[1], 3, len(own)).transpose(2, 0, 1))
+    gram, q = np.array(grams), len(z)
+    w = weight(gram[:, -1, -1], arena.sizes)
+    # Not from their prior anew: half of the gaits may leave one of them open, far beyond where derivatives hold.
+    known = arena.precision + np.einsum("s,sij->ij", w, gram[:, :q, :q])
+    return Design(gram, tuple(columns), arena.sizes, arena.gait, known, tuple(caps), tuple(innovations))
+
+
+def _columns(model: ProbeModel, arena: Arena) -> list[Column]:
+    robot = model.robot
+    found = []
+    for name in (*model.names, "delay.all", "scale.all", "late.all", "tilt_x.all", "tilt_y.all"):
+        probe, _, index = name.partition(".")
+        kind = KINDS[probe]
+        if index == "all":
+            found.append(Column(probe, kind.channel, Element(kind.kind), kind.unit, kind.scale))
+            continue
+        k = int(index)
+        scale = kind.scale
+        if probe == "rate":
+            k = robot.actuated[k]
+        elif probe == "force" and robot.cables[k].kind == "actuated":
+            scale = WINCHED_N
+        elif probe == "push":
+            k //= 2
+        found.append(Column(probe, kind.channel, Element(kind.kind, k), kind.unit, scale))
+    bias = KINDS["bias"]
+    return found + [Column("bias", bias.channel, Element(bias.kind, k), bias.unit, bias.scale) for k in arena.sensors]
+
+
+def _later(predictor: Predictor, model: ProbeModel, arena: Arena) -> np.ndarray:
+    """Secant of the caps by a delay of all commands, (F, cap, 3) [m/s]."""
+    from dataclasses import replace
+
+    many = [one.window for one in arena.many]
+    moved = {id(w.run): replace(w.run, t_command=w.run.t_command + LATER_S) for w in many}
+    shifted = [replace(w, run=moved[id(w.run)]) for w in many]
+    zero = np.zeros(len(model.names))
+    both = [predictor.predict(windows, zero).p_WE for windows in (shifted, many)]
+    return np.asarray((both[0] - both[1]) / LATER_S)
+
+
+def _observed(caps: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """What scale, delay and tilt of the camera do to caps (F, cap, 3), per unit, (F, cap, 3, 4)."""
+    away = caps - caps.mean(axis=(0, 1))
+    rate = np.gradient(caps, t, axis=0) if len(t) > 1 else np.zeros_like(caps)
+    x, y, z = away[..., 0], away[..., 1], away[..., 2]
+    zero = np.zeros_like(x)
+    about_x, about_y = np.stack([zero, -z, y], axis=-1), np.stack([z, zero, -x], axis=-1)
+    return np.stack([away, -rate, about_x, about_y], axis=-1)
+
+
+CAMERA_ONLY = 4
+"""The last columns of `_observed` move what is seen, and no cable."""
+
+
+def _channels(arena: Arena, caps: np.ndarray, by: np.ndarray) -> np.ndarray:
+    """Responses of the caps (F, cap, 3, D) as those of all channels of an arena, (D, channel, F)."""
+    seen = by.reshape(len(caps), -1, by.shape[-1]).transpose(2, 1, 0)
+    if not arena.sensors:
+        return seen
+    ends = np.array([arena.replayer.cable_caps[cable] for cable in arena.sensors])
+    way = caps[:, ends[:, 0]] - caps[:, ends[:, 1]]
+    way = way / np.linalg.norm(way, axis=-1, keepdims=True)
+    length = np.einsum("fsi,fsid->dsf", way, by[:, ends[:, 0]] - by[:, ends[:, 1]])
+    length[-CAMERA_ONLY:] = 0.0
+    return np.concatenate([seen, length], axis=1)
+
+
+def _sensing(arena: Arena, frames: int) -> np.ndarray:
+    """Responses to a bias of each sensor, (sensor, channel, F)."""
+    count = len(arena.sensors)
+    caps = 3 * arena.many[0].caps.shape[1]
+    found = np.zeros((count, caps + count, frames))
+    for s in range(count):
+        found[s, caps + s] = 1.0
+    return found
+
+
+def _whitened(white: White, columns: np.ndarray) -> np.ndarray:
+    """(k, channel, F) -> (k, channel F), white."""
+    found = np.einsum("cfg,kcg->kcf", white.roots, columns, optimize=True).reshape(len(columns), -1)
+    return np.asarray(found - ((found @ white.U) * white.shrink) @ white.U.T)

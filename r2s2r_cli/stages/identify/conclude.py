@@ -40,13 +40,14 @@ class Fitted:
 def known_before(task: Task, predictor: Predictor) -> Identifiability:
     """What the training intervals can tell at all, at the values of robot.toml, each interval from its own start.
 
-    Raises InputError for parameters without effect, and starts on a bound.
+    Raises InputError for starts on a bound, and for parameters that were asked for and have no effect. One of the
+    default set may have none: a random policy need not reel out every cable. It is not identifiable, and is held.
     """
     frees, recipe = predictor.mapping.frees, task.recipe
     values = np.array([free.start for free in frees])
     windows = training_windows(task.runs, task.request.train, predictor, values, replace(recipe, window=1))
     problem = CapResiduals(predictor, windows, spread=recipe.spread, noise=recipe.noise)
-    return identifiability(problem, problem.z0, frees)
+    return identifiability(problem, problem.z0, frees, dead_refused=bool(task.request.free or task.settings.free))
 
 
 def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:

@@ -27,13 +27,16 @@ DEMO   ?= demo
 PROJECT ?= .
 ITER   ?= 001
 SOURCE ?=
+PORT   ?=
+CAMERA ?=
 
 help:  ## this list
 	@printf 'usage: make TARGET\n\n'
 	@sed -n 's/^\([a-z -]*\):.*##  *\(.*\)/  \1\t\2/p' Makefile | expand -t 14
 
-demo: $(VENV)/.run-stamp  ## make a sample project, import, validate and draw it (in ./demo)
+demo: $(VENV)/.demo-stamp  ## a sample project, then two iterations of the whole loop on the virtual robot (in ./demo)
 	@PATH="$(ROOT)/$(VENV)/bin:$$PATH" bash examples/01_first_project/run.sh "$(DEMO)"
+	@PATH="$(ROOT)/$(VENV)/bin:$$PATH" bash examples/13_two_iterations/run.sh "$(DEMO)/two-iterations"
 
 test: $(VENV)/.dev-stamp  ## the test suite, without the slow tests
 	@$(PY) -m pytest $(PYTEST_FLAGS)
@@ -57,9 +60,9 @@ docs: $(VENV)/.run-stamp  ## regenerate docs/reference, schemas/json and schemas
 
 check: lint test  ## lint and test: what to run before a commit
 
-iterate status: $(VENV)/.run-stamp  ## the loop of a project: make iterate PROJECT=dir ITER=001 [SOURCE=log.csv]
+iterate status: $(VENV)/.run-stamp  ## the loop of a project: make iterate PROJECT=dir ITER=001 [SOURCE=log.csv | PORT=... CAMERA=...]
 	@$(MAKE) --no-print-directory -C "$(PROJECT)" -f "$(ROOT)/r2s2r_cli/templates/project.mk" $@ \
-	  R2S2R="$(ROOT)/$(VENV)/bin/r2s2r" ITER="$(ITER)" SOURCE="$(SOURCE)"
+	  R2S2R="$(ROOT)/$(VENV)/bin/r2s2r" ITER="$(ITER)" SOURCE="$(SOURCE)" PORT="$(PORT)" CAMERA="$(CAMERA)"
 
 clean:  ## remove what this Makefile made: .venv, ./demo, caches
 	rm -rf "$(VENV)" demo build dist r2s2r.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
@@ -72,9 +75,15 @@ $(VENV)/.run-stamp: pyproject.toml .ci/system-libs .ci/venv
 	@bash .ci/venv "$(PYTHON)" "$(VENV)" '.'
 	@touch $@
 
+# The virtual robot is simulated by MuJoCo, which nothing else needs.
+$(VENV)/.demo-stamp: pyproject.toml .ci/system-libs .ci/venv
+	@bash .ci/system-libs
+	@bash .ci/venv "$(PYTHON)" "$(VENV)" '.[rig]'
+	@touch $@ $(VENV)/.run-stamp
+
 $(VENV)/.dev-stamp: pyproject.toml .ci/system-libs .ci/venv
 	@bash .ci/system-libs
 	@bash .ci/venv "$(PYTHON)" "$(VENV)" '.[dev]'
-	@touch $@ $(VENV)/.run-stamp
+	@touch $@ $(VENV)/.run-stamp $(VENV)/.demo-stamp
 
 endif

@@ -10,9 +10,10 @@ import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TypeVar
 
-from r2s2r_cli.errors import HardwareError, UsageError
+from r2s2r_cli.errors import HardwareError, R2S2RError, UsageError
 
 LOCAL, DASK = "local", "dask://"
 Item = TypeVar("Item")
@@ -49,13 +50,35 @@ def each(
 ) -> Iterator[tuple[Item, Result]]:
     """Items with their results as they come. At most `at_once` are handed out, so that an interruption loses little."""
     waiting = list(reversed(items))
-    under_way: dict[Future[Result], Item] = {}
+    under_way: dict[Future[Result | _Broken], Item] = {}
     while waiting or under_way:
         while waiting and len(under_way) < at_once:
             item = waiting.pop()
-            under_way[executor.submit(work, item)] = item
+            under_way[executor.submit(_held, work, item)] = item
         done = next(as_completed(under_way))
-        yield under_way.pop(done), done.result()
+        found = done.result()
+        if isinstance(found, _Broken):
+            raise found.error()
+        yield under_way.pop(done), found
+
+
+@dataclass(frozen=True)
+class _Broken:
+    """An error of ours on its way between processes: its class asks for words by keyword, which pickling cannot give."""
+
+    kind: type[R2S2RError]
+    facts: dict[str, str]
+
+    def error(self) -> R2S2RError:
+        return self.kind(**self.facts)
+
+
+def _held(work: Callable[[Item], Result], item: Item) -> Result | _Broken:
+    try:
+        return work(item)
+    except R2S2RError as error:
+        names = ("what", "where", "expected", "received", "hint")
+        return _Broken(type(error), {name: getattr(error, name) for name in names})
 
 
 def _dask(spec: str) -> Executor:

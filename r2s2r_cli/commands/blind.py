@@ -64,6 +64,9 @@ def make(
     effect: Annotated[
         str | None, typer.Option("--effect", metavar="ID", help="Every single effect is this one.")
     ] = None,
+    gaits: Annotated[
+        int | None, typer.Option("--gaits", min=2, max=8, help="Of every set; default: 3, 5 or 8 by chance.")
+    ] = None,
     oracle: Annotated[
         bool, typer.Option("--oracle/--no-oracle", help="Compute how well each effect can be told; half of the time.")
     ] = True,
@@ -87,7 +90,7 @@ def make(
     asked = ["--out", str(out), "--key", str(key), "--bank", bank.value, "--tier", tier.value, "--count", str(count),
              "--commissioning", str(commissioning), "--observed", str(observed), "--executor", executor,
              "--workers", str(workers), *(["--effect", effect] if effect else []),
-             *([] if oracle else ["--no-oracle"])]  # fmt: skip
+             *(["--gaits", str(gaits)] if gaits else []), *([] if oracle else ["--no-oracle"])]  # fmt: skip
     with console.progress("blind sets", count) as advance:
         _maker(asked, advance)
     from r2s2r_cli.blind.index import read_index

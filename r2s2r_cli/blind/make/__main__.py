@@ -26,6 +26,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--commissioning", type=int, default=2)
     parser.add_argument("--observed", type=int, default=0)
     parser.add_argument("--effect", choices=sorted(STARRED))
+    parser.add_argument("--gaits", type=int)
     parser.add_argument("--no-oracle", action="store_true")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--executor", default="local")
@@ -34,7 +35,7 @@ def main(arguments: list[str]) -> int:
         # A key that is there belongs to a bank that was begun: go on with it.
         key = read_key(given.key) if given.key.exists() else new_key(given.key)
         asked = Asked(given.bank, given.count, given.out, key, given.first, given.commissioning, given.observed,
-                      given.effect, not given.no_oracle)  # fmt: skip
+                      given.effect, given.gaits, not given.no_oracle)  # fmt: skip
         for done, name in enumerate(make(asked, executor=given.executor, workers=given.workers), 1):
             sys.stdout.write(json.dumps({"done": done, "of": given.count, "set": name}) + "\n")
             sys.stdout.flush()

@@ -23,6 +23,7 @@ class Asked:
     """A bank. first: number of its first set; None: of a blind bank a secret one that the key decides, else 0, so that
     nobody can make its worlds again who has not the key. commissioning: runs of the healthy robot a set. observed:
     which draw of the camera's noise. effect: its single sets all have this effect; None: any of the first release.
+    gaits: of every set; None: 3, 5 or 8 by chance.
     """
 
     bank: Bank
@@ -33,6 +34,7 @@ class Asked:
     commissioning: int = 2
     observed: int = 0
     effect: str | None = None
+    gaits: int | None = None
     oracle: bool = True
 
 
@@ -46,7 +48,7 @@ def worlds(asked: Asked) -> tuple[Hidden, ...]:
     drawn = kinds(asked.count, np.random.default_rng([own[0], asked.count]))
     effects = () if asked.effect is None else (asked.effect,)
     return tuple(
-        hidden(asked.bank, seed, kind, commissioning=asked.commissioning,
+        hidden(asked.bank, seed, kind, commissioning=asked.commissioning, gaits=asked.gaits,
                effects=effects if kind.value == "single" else ())
         for seed, kind in zip(own, drawn, strict=True)
     )  # fmt: skip

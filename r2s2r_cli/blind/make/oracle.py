@@ -29,8 +29,8 @@ LOOK_S = 0.1
 """Between two instants that are compared."""
 STEP = 0.05
 """Relative change of friction and speed for their sensitivities."""
-MOST = 6.0
-"""Of one interval."""
+MOST = 10.0
+"""Of one interval: what happens once can be clear, and no more than that."""
 WEAK, CLEAR = 3.0, 8.0
 
 

@@ -238,7 +238,7 @@ def outside(name: str, rng: np.random.Generator, s: float) -> Outside:
     """One of OUTSIDE at size s, 1 usual. Raises KeyError for another name."""
     a = rng.uniform(0, 2 * np.pi)
     way = (float(np.cos(a)), float(np.sin(a)))
-    near = tuple(float(rng.uniform(0.03, 0.15)) * np.array(way))
+    far = float(rng.uniform(0.03, 0.15))
     begin = float(rng.uniform(2.0, 6.0))
     if name == "motor_cogging":
         return Cogging(min(0.5 * s, 0.9), float(rng.uniform(1.5, 4.0)))
@@ -247,13 +247,13 @@ def outside(name: str, rng: np.random.Generator, s: float) -> Outside:
     if name == "lateral_push":
         return Push(int(rng.integers(3)), (1.5 * s * way[0], 1.5 * s * way[1], 0.0), begin, begin + 0.5)
     if name == "floor_bump":
-        return Bump((near[0], near[1]), 0.04, 0.012 * s)
+        return Bump((far * way[0], far * way[1]), 0.04, 0.012 * s)
     if name == "rod_bending":
         return Bending(0.0004 * s)
     if name == "sensor_crosstalk":
         return CrossTalk(0.15 * s)
     if name == "magnetic_pull":
-        return Magnet((near[0], near[1]), 0.6 * s, 0.08)
+        return Magnet((far * way[0], far * way[1]), 0.6 * s, 0.08)
     if name == "gravity_sway":
         return Sway(float(np.deg2rad(4.0)) * s, float(rng.uniform(3.0, 9.0)), way)
     raise KeyError(name)

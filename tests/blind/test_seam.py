@@ -1,0 +1,42 @@
+"""Independent work through one seam, whoever does it."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from r2s2r_cli.blind.seam import each, open_executor
+from r2s2r_cli.errors import InputError, UsageError
+
+
+def test_all_is_done_and_little_is_handed_out() -> None:
+    """Every item once, with its own result; never more under way than asked for."""
+    handed: list[int] = []
+
+    def square(x: int) -> int:
+        handed.append(x)
+        return x * x
+
+    with ThreadPoolExecutor(4) as pool:
+        found = {}
+        for item, result in each(pool, square, range(20), at_once=3):
+            found[item] = result
+            assert len(handed) <= len(found) + 3
+    assert found == {x: x * x for x in range(20)}
+
+
+def test_an_error_comes_back_whole_from_another_process() -> None:
+    """Ours have keyword arguments, with which pickling alone would break the pool."""
+    with open_executor("local", 1) as pool, pytest.raises(InputError) as caught:
+        list(each(pool, refuse, ["x.csv"], at_once=1))
+    assert caught.value.where == "x.csv" and caught.value.hint == "look" and caught.value.expected == "y"
+
+
+def refuse(name: str) -> None:
+    """Says no."""
+    raise InputError("no", where=name, expected="y", received="n", hint="look")
+
+
+def test_another_address_is_refused() -> None:
+    """With what is known."""
+    with pytest.raises(UsageError, match="no such executor"), open_executor("slurm://x", 1):
+        pass

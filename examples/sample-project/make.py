@@ -57,6 +57,19 @@ cy = 120.0
 [camera.clock]
 rate_hz = 5.0
 """
+WALK = """\
+schema_version = 1
+robot = "threebar"
+name = "walk"
+description = "two shapes and back, twice: what repeats in it is the floor"
+repeat = 2
+[[steps]]
+target = [0.5, 1.0, 1.0, 1.0, 0.4, 1.0]
+[[steps]]
+target = [1.0, 0.4, 1.0, 0.5, 1.0, 1.0]
+[[steps]]
+target = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
+"""
 PICTURES = ("color", "depth")
 
 
@@ -103,17 +116,18 @@ def main(out: Path) -> None:
     bench = Bench(out.resolve())
     settle(bench.root / "project.toml")
     (bench.root / "world.toml").write_text(WORLD + SMALL)
+    (bench.root / "policies").mkdir()
+    (bench.root / "policies" / "walk.toml").write_text(WALK)
     bench.r2s2r("rig", "--world", "world.toml", "--points", "points.csv")
     bench.r2s2r("calibrate", "--points", "points.csv", "--no-draw")
     with bench.rig(SMALL) as robot:
-        bench.r2s2r("record", "--random", "4", "--seed", "4", "--no-draw", *robot)
-    for words in (("estimate",), ("identify",), ("plan",)):
+        bench.r2s2r("record", "policies/walk.toml", "--no-draw", *robot)
+    for words in (("estimate",), ("floor",), ("identify",), ("plan",)):
         bench.r2s2r(*words, "--no-draw")
     bench.execute(1, FIRST)
     bench.r2s2r(
         "simulate", "iterations/001/40-plan.h5:straight", "--model", "iterations/001/30-identify.h5", "--no-draw"
     )
-    bench.r2s2r("floor", "--no-draw")
     (bench.root / "iterations" / "002").mkdir()
     for words in (("identify",), ("plan",)):
         bench.r2s2r(*words, "--iteration", "2", "--no-draw")

@@ -15,49 +15,50 @@ from r2s2r_cli.store.write import write_artifact
 from tests.commands.conftest import invoke
 from tests.support import builders
 
-Spoil = Callable[[ArtifactData], None]
+Groups = dict[str, Group]
+Spoil = Callable[[Groups], None]
 
 
-def walked() -> ArtifactData:
+def walked() -> Groups:
     """The builders' run, both of its intervals complete."""
-    data = builders.estimate()
-    data.groups["runs/walk/intervals"].datasets["complete"][:] = True
-    return data
+    groups = dict(builders.estimate().groups)
+    groups["runs/walk/intervals"]["complete"][:] = True
+    return groups
 
 
-def rows(data: ArtifactData, name: str, count: int) -> None:
+def rows(data: Groups, name: str, count: int) -> None:
     """Keep the first rows of every dataset of a group of the run."""
-    group = data.groups[f"runs/walk/{name}"]
-    data.groups[f"runs/walk/{name}"] = Group({k: v[:count] for k, v in group.datasets.items()}, group.attributes)
+    group = data[f"runs/walk/{name}"]
+    data[f"runs/walk/{name}"] = Group({k: group[k][:count] for k in group.datasets}, group.attributes)
 
 
-def empty(data: ArtifactData) -> None:
+def empty(data: Groups) -> None:
     """No frame, no target."""
     for name in ("frames", "intervals", "segments"):
         rows(data, name, 0)
 
 
-def without_targets(data: ArtifactData) -> None:
+def without_targets(data: Groups) -> None:
     """A log of a robot that somebody moved by hand."""
     for name in ("intervals", "segments", "policy"):
-        del data.groups[f"runs/walk/{name}"]
+        del data[f"runs/walk/{name}"]
 
 
-def one_segment(data: ArtifactData) -> None:
+def one_segment(data: Groups) -> None:
     """The robot was stopped in its first shape."""
     for name in ("intervals", "segments"):
         rows(data, name, 1)
 
 
-def other_robot(data: ArtifactData) -> None:
+def other_robot(data: Groups) -> None:
     """Recorded with the six-bar one."""
-    root = data.groups["runs/walk"]
-    data.groups["runs/walk"] = replace(root, attributes={**root.attributes, "robot": "sixbar"})
+    root = data["runs/walk"]
+    data["runs/walk"] = replace(root, attributes={**root.attributes, "robot": "sixbar"})
 
 
-def nowhere(data: ArtifactData) -> None:
+def nowhere(data: Groups) -> None:
     """Where the robot was at first is not a number."""
-    data.groups["runs/walk/frames"].datasets["p_WE"][0, 2] = np.nan
+    data["runs/walk/frames"]["p_WE"][0, 2] = np.nan
 
 
 CASES = [
@@ -76,7 +77,7 @@ def test_a_run_that_cannot_be_compared_is_refused(project: Path, spoil: Spoil, w
     spoil(data)
     folder = project / "iterations" / "001"
     folder.mkdir(parents=True, exist_ok=True)
-    write_artifact(folder / "51-estimate.h5", data, builders.provenance(inputs=()))
+    write_artifact(folder / "51-estimate.h5", ArtifactData("estimate", data), builders.provenance(inputs=()))
     result = invoke("compare", "--project", str(project))
     assert result.exit_code == 4, result.stderr
     assert what in result.stderr and received in result.stderr and "hint:" in result.stderr
@@ -88,9 +89,9 @@ def test_beside_good_runs_it_is_left_out_with_the_reason(spoil: Spoil, what: str
     """The others are compared."""
     data = walked()
     spoil(data)
-    good = {path.replace("walk", "good"): group for path, group in walked().groups.items()}
+    good = {path.replace("walk", "good"): group for path, group in walked().items()}
     runs, said = real_runs(
-        ArtifactData("estimate", {**data.groups, **good}), None, builders.robot(), iteration=3, prefix="003-"
+        ArtifactData("estimate", {**data, **good}), None, builders.robot(), iteration=3, prefix="003-"
     )
     assert [run.name for run in runs] == ["003-good"]
     assert [run.iteration for run in runs] == [3]

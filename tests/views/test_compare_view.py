@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.compare_history import draw_history, history_table
 from r2s2r_cli.views.compare_page import comparison_page
 from r2s2r_cli.views.compare_playback import playback_data
@@ -149,8 +150,9 @@ def test_frames_are_drawn_of_every_run() -> None:
 
 def test_the_page_needs_nothing_else() -> None:
     """No address, no file beside it, names escaped, one script element for the data that nothing in it can end."""
-    data = builders.comparison()
-    data.groups["models"].datasets["name"] = np.array([b"</script>", b"iteration 1"])
+    plain = builders.comparison()
+    names = {**plain.groups["models"].datasets, "name": np.array([b"</script>", b"iteration 1"])}
+    data = ArtifactData("comparison", {**plain.groups, "models": Group(names)})
     said = report().model_copy(update={"warnings": ("a <b> warning",)})
     page = comparison_page(said, data, builders.robot(), {"walk": b"png"}, {"walk": b"png"}, b"png").decode()
     assert not re.search(r"https?://|<link|@import|fetch\(|XMLHttpRequest|import\(", page)

@@ -1,0 +1,4 @@
+#!/usr/bin/env bash
+# Which losses find the speed of a car that turns: minutes. Options are those of run.py; what to expect: README.md
+set -euo pipefail
+exec "${PYTHON:-python}" "$(dirname "${BASH_SOURCE[0]}")/run.py" "$@"

@@ -64,7 +64,7 @@ def each(
 
 @dataclass(frozen=True)
 class _Broken:
-    """An error of ours on its way between processes: its class asks for words by keyword, which pickling cannot give."""
+    """An error of ours on its way between processes: its class asks for keywords, which pickling cannot give."""
 
     kind: type[R2S2RError]
     facts: dict[str, str]

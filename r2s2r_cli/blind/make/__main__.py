@@ -19,7 +19,6 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m r2s2r_cli.blind.make")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--key", type=Path, required=True)
-    parser.add_argument("--tier", choices=["A", "B"], default="B")
     parser.add_argument("--bank", type=Bank, choices=list(Bank), default=Bank.CALIBRATION)
     parser.add_argument("--count", type=int, default=24)
     parser.add_argument("--first", type=int)

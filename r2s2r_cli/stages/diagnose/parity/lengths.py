@@ -41,13 +41,15 @@ def sensor_parity(runs: Sequence[Series]) -> SensorParity | None:
     since = np.concatenate([one.t - one.t[0] for one in usable])
     sensed = np.concatenate([_moved(one, shift) for one in usable])
     seen = np.concatenate([one.seen for one in usable])
-    bias, gain, drift = [], [], []
+    bias: list[Measured] = []
+    gain: list[Measured] = []
+    drift: list[Measured] = []
     about = np.full(cables, np.nan)
     for k in range(cables):
         good = np.isfinite(sensed[:, k]) & np.isfinite(seen[:, k])
         if good.sum() < 10:
-            none = Measured(float("nan"), float("nan"))
-            bias, gain, drift = [*bias, none], [*gain, none], [*drift, none]
+            for part in (bias, gain, drift):
+                part.append(Measured(float("nan"), float("nan")))
             continue
         about[k] = float(np.median(sensed[good, k]))
         x = np.stack([np.ones(int(good.sum())), sensed[good, k] - about[k]], axis=1)
@@ -94,7 +96,7 @@ def _later(runs: Sequence[Series]) -> Measured:
             cost = np.mean(away**2, axis=1)
             best = int(np.argmin(cost))
             if 0 < best < len(shifts) - 1:
-                a, b, c = cost[best - 1 : best + 2]
+                a, b, c = float(cost[best - 1]), float(cost[best]), float(cost[best + 1])
                 parts.append(shifts[best] + 0.5 * STEP_S * (a - c) / max(a - 2 * b + c, 1e-30))
     if len(parts) < 3:
         return Measured(float("nan"), float("nan"))

@@ -29,11 +29,11 @@ class Measured:
 
 @dataclass(frozen=True)
 class Series:
-    """One run. t: frames [s], (frame,); interval: target interval of each, (frame,). p_WE: observed end caps [m], (frame,
-    cap, 3), nan where not seen or an outlier; noise: sd of a coordinate, (cap,) [m]. seen: distance of the caps of every
-    cable [m], (frame, cable), less what noise adds to it; seen_sd: (cable,). sensed: what the sensors read at the frames
-    [m], (frame, cable), nan without one; sensed_rate: its rate [m/s]. heard: times of the readings [s] and what they
-    were [m], (sample,), (sample, cable), nan: none.
+    """One run. t: frames [s], (frame,); interval: target interval of each, (frame,). p_WE: observed end caps [m],
+    (frame, cap, 3), nan where not seen or an outlier; noise: sd of a coordinate, (cap,) [m]. seen: distance of the caps
+    of every cable [m], (frame, cable), less what noise adds to it; seen_sd: (cable,). sensed: what the sensors read at
+    the frames [m], (frame, cable), nan without one; sensed_rate: its rate [m/s]. heard: times of the readings [s] and
+    what they were [m], (sample,), (sample, cable), nan: none.
     """
 
     name: str

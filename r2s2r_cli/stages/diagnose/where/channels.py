@@ -46,7 +46,7 @@ def fitted(design: Design, places: np.ndarray, rows: np.ndarray) -> Spread:
         g = np.einsum("s,si->i", w, V[:, : q + K, -1])
         H[:q, :q] += design.known
         H[q:, q:] += np.eye(K)
-        both = np.linalg.solve(H + 1e-9 * np.eye(q + K), g)
+        both = np.linalg.solve(H + 1e-9 * np.trace(H) / len(H) * np.eye(q + K), g)
         nuisance, mean = both[:q], both[q:]
         if K:
             variance = _variance(T, q, K, variance, nuisance, mean, w)

@@ -1,4 +1,4 @@
-"""Whitened responses of every target interval to every probe, as products of columns: all that a fit of probes needs."""
+"""Whitened responses of every target interval to every probe, as products of columns: all that a fit needs."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from r2s2r_cli.stages.identify.predict import Predictor
 if TYPE_CHECKING:
     from r2s2r_cli.stages.identified import Identified
 
+FARTHEST = 10.0
+"""A probe of its prior's size moves what is seen by at most so many standard deviations, root mean square."""
 LATER_S = 0.03
 """[s] by which commands are shifted for the secant of the command probe."""
 
@@ -36,7 +38,7 @@ class Column:
 class Design:
     """Products of whitened columns of every stretch. gram: (stretch, q + P + 1, q + P + 1): q nuisances, P probes over
     their scales, then the innovations themselves (observed less simulated). columns: of the probes. size: data of each
-    stretch; gait: number of its gait; precision, offset: of the nuisances' prior, (q, q), mean less where they are (q,).
+    stretch; gait: number of its gait; known: how well the refit knows the nuisances, their precision (q, q).
     caps: simulated, of every stretch (F, cap, 3) [m]; innovation: whitened cap residuals, (F, cap, 3).
     """
 
@@ -81,7 +83,7 @@ def design(
         by = np.concatenate([seen.by_value[rows], later[rows][..., None], _observed(own, one.t)], axis=-1)
         whole = np.concatenate([_channels(arena, own, by), _sensing(arena, len(own))], axis=0)
         white = arena.white[k]
-        probes = _whitened(white, whole) * scale[:, None]
+        probes = _bounded(_whitened(white, whole) * scale[:, None], white.size)
         joined = np.concatenate([arena.by_nuisance[white.rows].T, probes, -residual[None, white.rows]], axis=0)
         grams.append(joined @ joined.T)
         count = own.shape[1] * 3
@@ -92,6 +94,15 @@ def design(
     # Not from their prior anew: half of the gaits may leave one of them open, far beyond where derivatives hold.
     known = arena.precision + np.einsum("s,sij->ij", w, gram[:, :q, :q])
     return Design(gram, tuple(columns), arena.sizes, arena.gait, known, tuple(caps), tuple(innovations))
+
+
+def _bounded(probes: np.ndarray, size: int) -> np.ndarray:
+    """Probes (P, row) with those made smaller that move the caps by more than derivatives hold; 0 where nothing finite
+    came out: a robot about to tip over."""
+    finite = np.isfinite(probes).all(axis=1)
+    found = np.where(finite[:, None], probes, 0.0)
+    length = np.sqrt(np.sum(found**2, axis=1) / size)
+    return np.asarray(found * np.minimum(1.0, FARTHEST / np.maximum(length, 1e-12))[:, None])
 
 
 def _columns(model: ProbeModel, arena: Arena) -> list[Column]:

@@ -15,8 +15,8 @@ class SegmentGap:
 
     interval: 1-based. order: 0, 1, ... through the evidence (runs in their order), which onset counts. t: of its start
     and end in the run [s]. nis: normalised innovation squared per degree of freedom, 1 where noise and floor explain
-    it; dof: degrees of freedom; p: chance of it; gap: whether it stands out (false discovery rate). rmse: at the key frame
-    [m]. xy_m: of the robot's middle [m].
+    it; dof: degrees of freedom; p: chance of it; gap: whether it stands out (false discovery rate). rmse: at the key
+    frame [m]. xy_m: of the robot's middle [m].
     """
 
     run: str
@@ -87,7 +87,7 @@ class ProbeGain:
 class PlaceMap:
     """The contact probe over the floor. x, y: of the grid [m], (i,), (j,). value: kernel mean of the force against the
     slip over the load, (j, i) [1]: a change of friction; weight: how much was seen there, (j, i). r2: share of the
-    probe that place, cap and gait phase explain out of sample. xy_m: where it is largest, None where nothing was seen."""
+    probe that place, cap and gait phase explain out of sample. xy_m: where it is largest."""
 
     x: np.ndarray
     y: np.ndarray

@@ -51,7 +51,7 @@ def place_map(arena: Arena, design: Design) -> PlaceMap | None:
 
 
 def _touched(arena: Arena, design: Design) -> np.ndarray:
-    """Where each cap touched the ground in each stretch on average, weighted by its slip, (stretch, cap, 2) [m]; nan."""
+    """Where each cap touched the ground in each stretch, on average over its slip, (stretch, cap, 2) [m]."""
     robot = arena.model.robot
     radius = np.repeat([rod.cap_radius_m for rod in robot.rods], 2)
     found = np.full((len(design.caps), len(radius), 2), np.nan)

@@ -1,6 +1,6 @@
 """Channel probes: free numbers where an effect of each channel would act, in one simulator with exact derivatives.
 
-No law says how large they are: they are constant over a target interval, and 0 is the nominal simulator to the last bit.
+No law says how large they are: they are constant over a target interval, and 0 is the nominal simulator bit by bit.
 """
 
 from __future__ import annotations
@@ -10,8 +10,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from r2s2r_cli.engine.hooks import CableTerms, ContactTerms, Hooks, MotorTerms, Values, WorldTerms
 from r2s2r_cli.engine.parameters import Parameters
@@ -20,15 +18,20 @@ from r2s2r_cli.stages.diagnose.which.numbers import NUMERICS, Model
 from r2s2r_cli.stages.identify.free.mapping import Observation
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from r2s2r_cli.stages.identified import Identified
 
 G = 9.81
 
 
 class Probe(Hooks):
-    """All probes of the engine. rate: winding rate of every winch, relative; force: of every cable while it is taut [N];
-    grip: friction of every cap, relative; height: radius of every cap [m]; push: force on every rod along x and y [N];
-    weight: of every rod, and lever: weight times its place along the rod [N], [N m]."""
+    """All probes of the engine.
+
+    rate: winding rate of every winch, relative; force: of every cable while it is taut [N]; grip: friction of every
+    cap, relative; height: radius of every cap [m]; push: force on every rod along x and y [N]; weight: of every rod [N], and
+    lever: weight times its place along the rod [N m].
+    """
 
     name = "probe"
 
@@ -65,15 +68,17 @@ class Probe(Hooks):
     def cable(self, x: Values, z: Values, terms: CableTerms, h: Tensor) -> tuple[Tensor, Values]:
         """Forces of taut cables; a cable never pushes."""
         del h
-        return torch.where(terms.stretch > 0, torch.relu(terms.force + x["force"]), terms.force), z
+        return (terms.force + x["force"]).relu().where(terms.stretch > 0, terms.force), z
 
     def contact(self, x: Values, terms: ContactTerms, friction: Tensor) -> Tensor:
         """Friction of every cap."""
         del terms
-        return friction * torch.relu(1.0 + x["grip"].unflatten(-1, (-1, 2)))
+        return friction * (1.0 + x["grip"].unflatten(-1, (-1, 2))).relu()
 
     def world(self, x: Values, terms: WorldTerms, force: Tensor, torque: Tensor) -> tuple[Tensor, Tensor]:
         """Pushes along the ground; weights, and where along the rod they hang."""
+        import torch
+
         push = x["push"].unflatten(-1, (-1, 2))
         down = -x["weight"]
         added = torch.cat([push, down[..., None]], dim=-1)
@@ -109,7 +114,8 @@ WINCHED_N = 5.0
 
 
 class ProbeModel:
-    """The refit nominal simulator with probes: stands where a `Mapping` does. values (n,): of the probes, 0 the nominal.
+    """The refit nominal simulator with probes: stands where a `Mapping` does. values (n,): of the probes, 0 the
+    nominal.
 
     names: `rate.3`, elements as the engine counts them. Those nuisances that are effects stay plugged in.
     """
@@ -135,6 +141,8 @@ class ProbeModel:
 
     def theta(self, values: np.ndarray | Tensor) -> Parameters:
         """Parameters at values (n,) or (B, n)."""
+        import torch
+
         x = torch.as_tensor(values, dtype=torch.float64)
         x = x if x.ndim == 2 else x[None]
         parts = torch.split(x, list(self._sizes.values()), dim=-1)
@@ -148,7 +156,9 @@ class ProbeModel:
         return flat if values.ndim == 2 else flat[0]
 
     def jacobian(self, values: np.ndarray | Tensor) -> Tensor:
-        """d packed / d values, (NP, n): every probe is a number of its own."""
+        """Derivatives d packed / d values, (NP, n): every probe is a number of its own."""
+        import torch
+
         from r2s2r_cli.engine.flat import parameter_slots
 
         slots = parameter_slots(self.structure)

@@ -23,8 +23,8 @@ WORDS = {
 
 
 def readings(arena: Arena, design: Design, seed: int) -> tuple[Reading, ...]:
-    """Best first. Of the energy of the whitened innovations, interval by interval and cap by cap: a share of its variance
-    that a gait which was left out confirms, and its chance under shuffled labels."""
+    """Best first. Of the energy of the whitened innovations, interval by interval and cap by cap: a share of its
+    variance that a gait which was left out confirms, and its chance under shuffled labels."""
     energy, rows = _table(arena, design)
     rng = np.random.default_rng(seed)
     found = []
@@ -43,8 +43,9 @@ def readings(arena: Arena, design: Design, seed: int) -> tuple[Reading, ...]:
 
 
 def _table(arena: Arena, design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """log energy of parts of intervals, (row,), and what they may follow, (row, 6): motors that run, seconds since they
-    stopped, time in the run, cap, number of the interval in its run, gait. Each interval has three parts."""
+    """Logarithm of the energy of parts of intervals, (row,), and what they may follow, (row, 6): motors that run,
+    seconds since they stopped, time in the run, cap, number of the interval in its run, gait. Each interval has
+    three parts."""
     values, rows = [], []
     for k, one in enumerate(arena.many):
         own = design.innovation[k]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 import shutil
 import subprocess
 import sys
@@ -139,6 +140,22 @@ def main(out: Path) -> None:
     print(f"{size / 1e6:.1f} MB in {bench.root}")
 
 
+def update(out: Path) -> None:
+    """Make again what is stale, in its order: after a change of a stage, without the robot. What was executed stays, and
+    so do the states whose pictures are not kept."""
+    from r2s2r_cli.store.again import command_again
+    from r2s2r_cli.store.header import read_header
+    from r2s2r_cli.store.project import Project
+
+    bench = Bench(out.resolve())
+    for path in Project.find(bench.root).artifacts():
+        made = read_header(path).provenance
+        if made.stage in ("record", "execute") or path.name.startswith("51-"):
+            continue
+        bench.r2s2r(*shlex.split(command_again(made, path))[1:], "--no-draw")
+    shutil.rmtree(bench.root / ".r2s2r", ignore_errors=True)
+
+
 def settle(path: Path) -> None:
     """Write the settings into project.toml, its comments kept."""
     import tomlkit
@@ -189,4 +206,6 @@ def _document(process: subprocess.Popen[str]) -> dict[str, str]:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "project", help="folder that is replaced")
-    main(parser.parse_args().out)
+    parser.add_argument("--update", action="store_true", help="only what is stale, without the robot")
+    asked = parser.parse_args()
+    (update if asked.update else main)(asked.out)

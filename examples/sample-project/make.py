@@ -141,8 +141,8 @@ def main(out: Path) -> None:
 
 
 def update(out: Path) -> None:
-    """Make again what is stale, in its order: after a change of a stage, without the robot. What was executed stays, and
-    so do the states whose pictures are not kept."""
+    """Make again what is stale, in its order: after a change of a stage, without the robot. What was executed stays,
+    and so do the states whose pictures are not kept."""
     from r2s2r_cli.store.again import command_again
     from r2s2r_cli.store.header import read_header
     from r2s2r_cli.store.project import Project

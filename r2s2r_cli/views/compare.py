@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.artifact import ArtifactData, Group, Scalar
 from r2s2r_cli.views.figure import new_figure, png_bytes, rod_color
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 REAL = "#111111"
 MODELS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9")
 """Colours of the simulators in their order (Okabe and Ito), used again beyond the last."""
-_WIDTH, _HEIGHT = 13.0, 7.5
+_WIDTH, _HEIGHT = 13.0, 8.0
 
 
 def model_color(k: int) -> str:
@@ -30,10 +30,20 @@ def draw_comparison(data: ArtifactData) -> Iterator[tuple[str, bytes]]:
     for run in data.runs():
         real, simulated = data.groups[f"runs/{run}/real"], data.groups[f"runs/{run}/simulated"]
         figure = new_figure(_WIDTH, _HEIGHT)
-        axes = figure.subplot_mosaic([["top", "end"], ["top", "gait"], ["top", "time"]], width_ratios=[1.2, 1])
+        axes = figure.subplot_mosaic(
+            [["top", "end"], ["top", "gait"], ["top", "key"], ["top", "time"]], width_ratios=[1.2, 1]
+        )
+        floor = data.groups["floor"].attributes
         _top(axes["top"], real, simulated, names)
-        _bars(axes["end"], 1e3 * simulated["segment_end"], names, "caps at the end\nof each interval [mm]")
-        _bars(axes["gait"], 1e3 * simulated["gait"], names, "the same, laid on\nat its start [mm]")
+        _bars(axes["end"], 1e3 * simulated["segment_end"], names, "caps at the end\nof each interval [mm]", None)
+        _bars(axes["gait"], 1e3 * simulated["gait"], names, "the same, laid on\nat its start [mm]", floor.get("gait"))
+        _bars(
+            axes["key"],
+            1e3 * simulated["keyframe"],
+            names,
+            "key frames, com-\nmand replay [mm]",
+            floor.get("keyframe_cap"),
+        )
         _times(axes["time"], real, simulated, names)
         figure.suptitle(run)
         yield run, png_bytes(figure)
@@ -65,19 +75,23 @@ def _rods(axes: Axes, p_WE: np.ndarray, alpha: float) -> None:
         axes.plot(*p_WE[a : a + 2, :2].T, color=rod_color(a), lw=3, alpha=alpha)
 
 
-def _bars(axes: Axes, values: np.ndarray, names: list[str], label: str) -> None:
-    """values: (model, interval)."""
+def _bars(axes: Axes, values: np.ndarray, names: list[str], label: str, floor: Scalar | None) -> None:
+    """values: (model, interval) [mm]; floor [m]."""
     width = 0.8 / max(len(names), 1)
     x = np.arange(1, values.shape[1] + 1)
     for k, name in enumerate(names):
         axes.bar(x - 0.4 + (k + 0.5) * width, np.nan_to_num(values[k]), width, color=model_color(k), label=name)
+    if floor is not None:
+        axes.axhline(1e3 * float(floor), color=REAL, lw=1, ls=":", label="floor")
+        axes.annotate("floor", (0.995, 1e3 * float(floor)), xycoords=("axes fraction", "data"), fontsize=8, ha="right",
+                      va="bottom")  # fmt: skip
     axes.set(ylabel=label)
     axes.tick_params(labelbottom=False)
 
 
 def _times(axes: Axes, real: Group, simulated: Group, names: list[str]) -> None:
     x = np.arange(1, len(real["duration"]) + 1)
-    axes.plot(x, real["duration"], "_", color=REAL, ms=12, mew=3)
+    axes.plot(x, real["duration"], "_", color=REAL, ms=14, mew=3)
     for k, _ in enumerate(names):
         axes.plot(x, simulated["duration"][k], "o", color=model_color(k), ms=4)
     axes.set(xlabel="target interval", ylabel="duration [s]", ylim=(0, None))

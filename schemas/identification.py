@@ -200,6 +200,20 @@ SITES = GroupSpec(
     ),
 )
 
+SENSING = GroupSpec(
+    path="sensing",
+    description="what the robot's controller reads, measured where it saw cables arrive in the training intervals: simulations with "
+    "the controller in the loop read the same",
+    attributes=(
+        AttributeSpec(name="camera_delay", type="float", unit="s", description="a frame stamped t shows what the controller read so much earlier"),
+        AttributeSpec(name="command_delay", type="float", unit="s", description="how late its commands reach the winches"),
+        AttributeSpec(name="arrivals", type="int", description="of cables at their targets, on which it rests"),
+    ),
+    datasets=(
+        column("bias", "float64", ("actuated",), "m", "reading minus distance of the cap centres, sensor of each winched cable"),
+    ),
+)  # fmt: skip
+
 HISTORY = GroupSpec(
     path="history",
     description="--online: the estimate after each run, in the order in which they came",
@@ -218,6 +232,6 @@ IDENTIFICATION = ArtifactSpec(
     level="iteration",
     groups=(
         FIT_FACTS, PARAMETERS, COVARIANCE, IDENTIFIABILITY, TRACE, STARTS, PROFILES, WINDOWS, SEGMENTS, MEASURES, SITES,
-        HISTORY, RUN, FIT, FREE_RUN,
+        SENSING, HISTORY, RUN, FIT, FREE_RUN,
     ),
 )  # fmt: skip

@@ -31,7 +31,9 @@ NARROW = 1e-9
 class Identified:
     """One simulator. words: where its numbers come from. mapping: of its free numbers; values (n,): what they are.
 
-    covariance (n, n): of their coordinates z; rows of NaN where the runs did not say it.
+    covariance (n, n): of their coordinates z; rows of NaN where the runs did not say it. bias: what the robot's
+    controller reads too much of each winched cable [m], (actuated,), and command_delay: how late its commands reach the
+    winches [s], both measured; None: as the numbers say.
     """
 
     words: str
@@ -39,6 +41,8 @@ class Identified:
     mapping: Mapping
     values: np.ndarray
     covariance: np.ndarray
+    bias: np.ndarray | None = None
+    command_delay: float | None = None
 
     @property
     def structure(self) -> Structure:
@@ -52,15 +56,24 @@ class Identified:
 
     @property
     def pid(self) -> LatchedPid:
-        """The low-level controller."""
-        return self.mapping.pid(self.values)
+        """The low-level controller, with the errors of its sensors."""
+        return self.read_by(self.mapping.pid(self.values))
+
+    def read_by(self, pid: LatchedPid) -> LatchedPid:
+        """A controller with the errors of the sensors: a cable that reads long is at position 0 where it is shorter."""
+        import torch
+
+        if self.bias is None:
+            return pid
+        return replace(pid, min_length=pid.min_length - torch.as_tensor(self.bias)[None])
 
     @property
     def link(self) -> Link | None:
         """How late commands reach the winches; None: at once."""
         from r2s2r_cli.engine import Link
 
-        delay = self.mapping.observation(self.values).command_delay
+        seen = self.mapping.observation(self.values).command_delay
+        delay = seen if self.command_delay is None else self.command_delay
         return Link(delay) if delay > 0 else None
 
     @property
@@ -135,7 +148,11 @@ def identified(found: ArtifactData, robot: Robot, *, words: str = "30-identify.h
     covariance = np.where(said[:, None] & said[None, :], covariance, np.nan)
     effects = tuple(str(fit.attributes["effects"]).split())
     mapping = Mapping(robot, frees, effects, fixed=fixed)
-    return Identified(words, robot, mapping, table["value"][free].astype(float), covariance)
+    loop = found.groups.get("sensing")
+    return Identified(
+        words, robot, mapping, table["value"][free].astype(float), covariance,
+        None if loop is None else loop["bias"], None if loop is None else float(loop.attributes["command_delay"]),
+    )  # fmt: skip
 
 
 def _free(own: Free, table: Group, k: int) -> Free:

@@ -108,3 +108,18 @@ def test_another_robots_numbers_are_refused(artifact: ArtifactData, what: str) -
     with pytest.raises(InputError, match=what) as refused:
         identified(artifact, builders.robot())
     assert refused.value.hint
+
+
+def test_its_controller_reads_what_the_robots_reads() -> None:
+    """With measured sensors a cable counts as arrived where the reading does, and commands are as late as measured."""
+    plain = identified(found(), builders.robot())
+    bias = np.array([0.003, -0.005, 0.0, 0.001, 0.0, -0.002])
+    loop = Group({"bias": bias}, {"camera_delay": 0.02, "command_delay": 0.03, "arrivals": 20})
+    model = identified(ArtifactData("identification", {**found().groups, "sensing": loop}), builders.robot())
+    length = torch.full((1, 9), 0.15, dtype=torch.float64)
+    true, read = length.clone(), length.clone()
+    true[0, list(builders.robot().actuated)] -= torch.as_tensor(bias)
+    assert torch.allclose(model.pid.position(true), plain.pid.position(read), rtol=0, atol=1e-15)
+    assert model.link is not None
+    assert model.link.delay == 0.03
+    assert model.late == 0.05, "command replay is as late as ever"

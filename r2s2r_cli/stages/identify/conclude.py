@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from r2s2r_cli import __version__
+from r2s2r_cli.stages.identify.closed_free_run import loop_of
 from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep, Update
 from r2s2r_cli.stages.identify.held_out import Judged, held_out
 from r2s2r_cli.stages.identify.predict import Predictor
@@ -73,6 +74,7 @@ def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:
         )
     judged = judged_by(task, predictor, fit.values)
     fixed = task.fixed()
+    sensing, late = loop_of(task.runs, request.train, predictor, fit.values)
     return Found(
         request=request, robot=task.robot.name, engine=f"r2s2r {__version__}", step=recipe.step, loss=made.loss,
         parameters=(*sure.parameters, *fixed),
@@ -82,6 +84,7 @@ def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:
         free_runs=judged.free_runs, closed_loop_m=judged.closed_loop_m,
         covariance=widened(sure.spread.covariance, len(fixed)), information=made.before, trace=made.trace,
         starts=made.starts, profiles=profiles, windows=start_shifts(fit), updates=made.updates, p_RS=judged.p_RS,
+        sensing=sensing if sensing.arrivals else None, command_delay=late,
         uncertainty=sure.spread.how, natures=task.natures, computed_by_torch=not predictor.native,
         warnings=(*warnings, *judged.warnings),
     )  # fmt: skip

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from r2s2r_cli.stages.identify.closed_sensing import Sensing
 from r2s2r_cli.stages.identify.free.base import Free
 from r2s2r_cli.stages.identify.request import Request
 from r2s2r_cli.stages.identify.trust.covariance import correlation_of
@@ -153,7 +154,8 @@ class Found:
     information: before the fit. train, test: rows of predictors (measures.judge) over the steps of `train_segments` and
     `test_segments`, OURS among them; test empty where nothing was held out. closed_loop_m: mean error of the free run
     with the controller in the loop. uncertainty: how sd came about, in words. natures: what runs are, by name, of those
-    that say so. p_RS: attachment points (cable, 2, 3) [m].
+    that say so. p_RS: attachment points (cable, 2, 3) [m]. sensing, command_delay [s]: of the robot's
+    controller, None where nothing was measured.
     """
 
     request: Request
@@ -182,6 +184,8 @@ class Found:
     windows: tuple[WindowFound, ...] = ()
     updates: tuple[Update, ...] = ()
     p_RS: np.ndarray | None = None
+    sensing: Sensing | None = None
+    command_delay: float = 0.0
     mask: str | None = None
     uncertainty: str = ""
     natures: Mapping[str, str] = field(default_factory=dict)

@@ -32,6 +32,7 @@ def identification(found: Found) -> ArtifactData:
         "windows": _windows(found),
         **judged_groups(found),
         "sites": None if found.p_RS is None else Group({"p_RS": found.p_RS}),
+        "sensing": _sensing(found),
         "history": _history(found),
     }
     return ArtifactData("identification", {path: group for path, group in groups.items() if group is not None})
@@ -45,6 +46,16 @@ def _fit(found: Found) -> Group:
         "residuals": int(found.residuals), "converged": bool(found.converged), "reason": found.reason,
     }  # fmt: skip
     return Group({}, facts if found.mask is None else {**facts, "mask": found.mask})
+
+
+def _sensing(found: Found) -> Group | None:
+    if found.sensing is None:
+        return None
+    facts: dict[str, Scalar] = {
+        "camera_delay": float(found.sensing.camera_delay), "command_delay": float(found.command_delay),
+        "arrivals": int(found.sensing.arrivals),
+    }  # fmt: skip
+    return Group({"bias": found.sensing.bias}, facts)
 
 
 def _parameters(parameters: Sequence[ParameterFound]) -> Group:

@@ -59,6 +59,7 @@ class Executor:
         effects = tuple(effect.name for effect in own.structure.effects)
         self.mapping = Mapping(robot, own.frees, effects, fixed=own.fixed, structure=structure)
         self.structure = self.mapping.structure
+        self._read_by = belief.model.read_by
         self.values = torch.as_tensor(draws, dtype=torch.float64)
         one = self.mapping.theta(self.values)
         self.theta = one.map(lambda x: x.expand(len(draws), *x.shape[1:]).contiguous())
@@ -69,7 +70,10 @@ class Executor:
         self.period = 1.0 / robot.pid.rate_hz
         self.whole = steps_a_tick(self.period, step)
         self.cable_caps = tuple((a, b) for a, b in (cable.caps for cable in robot.cables))
-        self.delay = torch.tensor([self.mapping.observation(row).command_delay for row in draws], dtype=torch.float64)
+        late = torch.tensor([self.mapping.observation(row).command_delay for row in draws], dtype=torch.float64)
+        measured, numbers = belief.model.command_delay, own.observation(belief.model.values).command_delay
+        # Draws differ by as much about what was measured.
+        self.delay = late if measured is None else (late + measured - numbers).clamp(min=0.0)
         limit = robot.pid.step_timeout_s if timeout_s is None else timeout_s
         self.timeout = int(ticks(torch.tensor([limit], dtype=torch.float64), self.period)[0])
         self.steps = 0
@@ -85,7 +89,7 @@ class Executor:
 
     def pid(self, draw: Tensor) -> LatchedPid:
         """The controller of environments with these draws."""
-        return self.mapping.pid(self.values[draw])
+        return self._read_by(self.mapping.pid(self.values[draw]))
 
     def standing(self, p_WE: np.ndarray, draw: np.ndarray, lengths: np.ndarray | None = None) -> Standing:
         """Robots at rest nearest to poses (B, cap, 3) [m]; lengths: of all cables [m], (B, cable). Those that do not

@@ -112,3 +112,18 @@ class BlindScoreResult(Frozen):
     recall: tuple[BlindRecall, ...]
     misses: tuple[BlindMiss, ...]
     warnings: tuple[str, ...] = ()
+
+
+class BlindCalibrateResult(Frozen):
+    """What a calibration bank taught."""
+
+    out: str
+    sets: int
+    temperature: float
+    """[nats]"""
+    commit: float
+    conformal: float
+    top1: float
+    """Share of sets whose first guess is right with numbers learned from the others."""
+    log_loss: float
+    """Of the truth there [nats]."""

@@ -181,6 +181,34 @@ def score(
         console.say(f"page: {target}")
 
 
+@blind_app.command("calibrate")
+def calibrate(
+    bank: Annotated[Path, typer.Argument(metavar="BANK", help="A calibration bank of `blind make`.")],
+    verdicts: Annotated[Path, typer.Option("--verdicts", metavar="DIR", help="Folder of `blind run`.")],
+    key: Annotated[Path, typer.Option("--key", metavar="FILE", help="Of the labels.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="JSON, for stages/diagnose/which.")],
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Learn from a calibration bank how gains become probabilities, and from which one on a name is committed to.
+
+    Example: r2s2r blind calibrate bank --verdicts verdicts --key labels.key --out calibration.json
+    """
+    import json as format_json
+
+    from r2s2r_cli.blind.labels import read_key
+    from r2s2r_cli.blind.score import calibration
+    from schemas.results_blind import BlindCalibrateResult
+
+    console = Console(json=json, quiet=quiet)
+    found = calibration(bank, verdicts, read_key(key))
+    out.write_text(format_json.dumps(found, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    result = BlindCalibrateResult.model_validate({**found, "out": str(out), **found["left_out"]}, extra="ignore")
+    console.document(result)
+    console.data(f"{result.sets} sets: temperature {result.temperature:.1f} nats, a name from {result.commit:.2f} on; "
+                 f"first guess right in {100 * result.top1:.0f} % of the sets left out")  # fmt: skip
+
+
 def _settings(items: list[str] | None, without: str | None) -> dict[str, object]:
     import tomllib
 

@@ -8,46 +8,46 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from r2s2r_cli.blind import labels
 from r2s2r_cli.blind.index import digest, read_index
+from r2s2r_cli.blind.score.calibrate import calibrated, case
 from r2s2r_cli.blind.score.facts import Said, Truth, said_of, truth_of
 from r2s2r_cli.blind.score.rows import BINS, CLASSES_LAST, CONTROL, METRICS, calibration_error, coverage, row
+from r2s2r_cli.blind.split import Bank
 from r2s2r_cli.errors import InputError
 from schemas.results_blind import BlindBin, BlindMiss, BlindRecall, BlindScoreResult
 
-__all__ = ["score", "score_of"]
+__all__ = ["calibration", "score", "score_of"]
 
 
 def score(bank: Path, verdicts: Path, key: bytes) -> BlindScoreResult:
     """The table of a bank. Raises InputError where a hash is not the published one, the key is another, or there is no
     verdict."""
-    index, own = read_index(bank / labels.INDEX)
-    found: list[tuple[str, Truth, Said]] = []
-    missing = []
-    shuffled = False
-    for name, facts in sorted(index["sets"].items()):
-        path = verdicts / f"{name}.json"
-        if not path.exists():
-            missing.append(name)
-            continue
-        verdict = _verdict(path, own)
-        if digest(bank / labels.SETS / name) != facts["logs"] or verdict["logs"] != facts["logs"]:
-            raise InputError("the logs of a set were changed after the bank was closed", where=f"{labels.SETS}/{name}",
-                             expected=facts["logs"], received=verdict["logs"],
-                             hint="r2s2r blind make --out bank")  # fmt: skip
-        shuffled = shuffled or verdict["shuffled"] is not None
-        sealed = bank / labels.LABELS / f"{name}.sealed"
-        label = labels.opened(sealed.read_bytes(), key, facts["label"], where=str(sealed))
-        found.append((name, truth_of(label), said_of(verdict)))
-    if not found:
-        raise InputError("there is no verdict to score", where=str(verdicts), expected="<set>.json of `blind run`",
-                         received="none", hint=f"r2s2r blind run {bank} --out {verdicts}")  # fmt: skip
+    opened = _opened(bank, verdicts, key)
+    found = [(name, truth_of(label), said_of(verdict)) for name, label, verdict in opened.sets]
+    missing = opened.missing
+    shuffled = any(verdict["shuffled"] is not None for _, _, verdict in opened.sets)
+    index, own = opened.index, opened.own
     warnings = (f"{len(missing)} sets have no verdict: only the others are counted",) if missing else ()
     return score_of(found, tier=index["tier"], bank=index["bank"], sets=len(index["sets"]), index=own,
                     warnings=warnings, shuffled=shuffled)  # fmt: skip
+
+
+def calibration(bank: Path, verdicts: Path, key: bytes) -> dict[str, Any]:
+    """What the verdicts on a calibration bank teach about probabilities (`calibrate`). Raises InputError as `score`
+    does, for another bank, and for too few sets."""
+    opened = _opened(bank, verdicts, key)
+    if opened.index["bank"] != Bank.CALIBRATION:
+        raise InputError("only a calibration bank may teach anything", where=str(bank), expected="calibration",
+                         received=str(opened.index["bank"]),
+                         hint="r2s2r blind make --bank calibration --count 120 --key cal.key cal")  # fmt: skip
+    told = [(truth_of(label), verdict) for _, label, verdict in opened.sets if not verdict["failed"]]
+    cases = [one for one in (case(truth, verdict["diagnosis"]) for truth, verdict in told) if one is not None]
+    return calibrated(cases, words=f"{len(cases)} sets of the calibration bank {opened.own[:12]}")
 
 
 def score_of(
@@ -64,6 +64,39 @@ def score_of(
         strata=dict(Counter(t.stratum for t, _ in pairs)), rows=tuple(rows), classes=classes, confusion=confusion,
         calibration=_bins(pairs), recall=_recall(pairs), misses=_misses(found), warnings=warnings,
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Opened:
+    """A bank with its verdicts: name, label, verdict of every set that has one; names of the others; list and hash."""
+
+    sets: tuple[tuple[str, dict[str, Any], dict[str, Any]], ...]
+    missing: tuple[str, ...]
+    index: dict[str, Any]
+    own: str
+
+
+def _opened(bank: Path, verdicts: Path, key: bytes) -> _Opened:
+    index, own = read_index(bank / labels.INDEX)
+    found: list[tuple[str, dict[str, Any], dict[str, Any]]] = []
+    missing = []
+    for name, facts in sorted(index["sets"].items()):
+        path = verdicts / f"{name}.json"
+        if not path.exists():
+            missing.append(name)
+            continue
+        verdict = _verdict(path, own)
+        if digest(bank / labels.SETS / name) != facts["logs"] or verdict["logs"] != facts["logs"]:
+            raise InputError("the logs of a set were changed after the bank was closed", where=f"{labels.SETS}/{name}",
+                             expected=facts["logs"], received=verdict["logs"],
+                             hint="r2s2r blind make --out bank")  # fmt: skip
+        sealed = bank / labels.LABELS / f"{name}.sealed"
+        label = labels.opened(sealed.read_bytes(), key, facts["label"], where=str(sealed))
+        found.append((name, label, verdict))
+    if not found:
+        raise InputError("there is no verdict to score", where=str(verdicts), expected="<set>.json of `blind run`",
+                         received="none", hint=f"r2s2r blind run {bank} --out {verdicts}")  # fmt: skip
+    return _Opened(tuple(found), tuple(missing), index, own)
 
 
 def _verdict(path: Path, index: str) -> dict[str, Any]:

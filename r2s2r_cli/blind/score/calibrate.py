@@ -1,0 +1,150 @@
+"""From verdicts on a calibration bank to the numbers that turn gains into probabilities.
+
+p(name) ~ exp((score + bias) / temperature). The score of an effect is its held-out gain; that of `none` what the best
+of the catalogue gains by chance, and `equivalent` more where the equivalence test finds no gap; that of `unknown` what
+no effect explains, less `unknown`. Linear in 1 / temperature and the products with it, so the fit (a multinomial
+regression, biases drawn to 0) has one optimum. Thresholds come from probabilities of sets left out of the fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from r2s2r_cli.blind.score.facts import NONE, UNKNOWN, Truth
+from r2s2r_cli.errors import InputError
+
+LEAST_SETS = 12
+FOLDS = 10
+COVER = 0.90
+PRECISION = 0.90
+BIAS_SD = 1.0
+"""Of a bias over the temperature: how much more often a name wins than its gains say, before anything is learned."""
+SHARPNESS = 1.0 / 8.0
+"""1 / temperature before anything is learned [1/nats], and the unit in which it is fitted."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One set. names: what was ranked; score (n,): without the numbers that are learned; equivalent: the test found no
+    gap. truth: the right name, not among `names` where the screening had lost it."""
+
+    names: tuple[str, ...]
+    score: np.ndarray
+    equivalent: bool
+    truth: str
+
+
+def case(truth: Truth, document: dict[str, Any]) -> Case | None:
+    """Of a label and a verdict's document; None for pairs, which have two right names."""
+    if truth.right is None:
+        return None
+    rows = [row for row in document["ranking"] if row["elpd_gain"] > -1e8]
+    chance = float(document["chance_nats"])
+    score = [chance if row["effect"] == NONE else float(row["elpd_gain"]) for row in rows]
+    upper, floor = document.get("refit_upper_m"), document["floor_m"]
+    equivalent = upper is not None and float(upper) < 1.25 * float(floor)
+    return Case(tuple(row["effect"] for row in rows), np.array(score), equivalent, truth.right)
+
+
+def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
+    """The numbers of `stages/diagnose/which/calibration.json`, with what they reach on sets that were left out.
+
+    Raises InputError for too few sets.
+    """
+    if len(cases) < LEAST_SETS:
+        raise InputError(
+            "there are too few sets to calibrate with", where="r2s2r blind calibrate",
+            expected=f"at least {LEAST_SETS}", received=str(len(cases)),
+            hint="r2s2r blind make --bank calibration --count 120 --key cal.key cal",
+        )  # fmt: skip
+    effects = sorted({name for one in cases for name in one.names} - {NONE, UNKNOWN})
+    whole = _fit(cases, effects)
+    out = [_left_out(cases, effects, fold) for fold in range(FOLDS)]
+    apart = [pair for fold in out for pair in fold]
+    held = np.sort([p.get(one.truth, 0.0) for one, p in apart])
+    # Split conformal: with the k-th smallest as threshold at least COVER of new sets keep their truth.
+    k = int(np.floor((len(held) + 1) * (1.0 - COVER)))
+    sharp = max(float(whole[0]) * SHARPNESS, 1e-6)
+    first = [max(p, key=lambda name: p[name]) for _, p in apart]
+    right = np.array([name == one.truth for name, (one, _) in zip(first, apart, strict=True)])
+    sure = np.array([p[name] for name, (_, p) in zip(first, apart, strict=True)])
+    return {
+        "temperature": 1.0 / sharp,
+        "equivalent": float(whole[1]) / sharp,
+        "unknown": -float(whole[2]) / sharp,
+        "bias": {name: float(b) / sharp for name, b in zip(effects, whole[3:], strict=True)},
+        "commit": _commit(sure, right),
+        "conformal": float(held[k - 1]) if k else 0.0,
+        "words": words,
+        "sets": len(cases),
+        "left_out": {
+            "top1": float(right.mean()),
+            "log_loss": float(np.mean([-np.log(max(p.get(one.truth, 0.0), 1e-6)) for one, p in apart])),
+        },
+    }
+
+
+def _design(one: Case, effects: Sequence[str]) -> np.ndarray:
+    """What multiplies (sharpness, equivalent, unknown, biases) in the exponent of every name, (name, 3 + effect)."""
+    X = np.zeros((len(one.names), 3 + len(effects)))
+    X[:, 0] = one.score * SHARPNESS
+    for row, name in zip(X, one.names, strict=True):
+        if name == NONE:
+            row[1] = float(one.equivalent)
+        elif name == UNKNOWN:
+            row[2] = 1.0
+        else:
+            row[3 + effects.index(name)] = 1.0
+    return X
+
+
+def _fit(cases: Sequence[Case], effects: Sequence[str]) -> np.ndarray:
+    """Most probable numbers (3 + effect,): the prior has sharpness about 1, the others about 0."""
+    from scipy.optimize import minimize
+
+    known = [one for one in cases if one.truth in one.names]
+    most = max((len(one.names) for one in known), default=1)
+    X, there = np.zeros((len(known), most, 3 + len(effects))), np.zeros((len(known), most), dtype=bool)
+    for k, one in enumerate(known):
+        X[k, : len(one.names)], there[k, : len(one.names)] = _design(one, effects), True
+    right = X[np.arange(len(known)), [one.names.index(one.truth) for one in known]]
+    mean = np.zeros(3 + len(effects))
+    mean[0] = 1.0
+    weight = np.r_[1.0, 0.1, 0.1, np.full(len(effects), 1.0 / BIAS_SD**2)]
+
+    def cost(w: np.ndarray) -> tuple[float, np.ndarray]:
+        x = np.where(there, X @ w, -np.inf)
+        top = x.max(axis=1, keepdims=True)
+        e = np.exp(x - top)
+        total = e.sum(axis=1, keepdims=True)
+        value = 0.5 * float(weight @ (w - mean) ** 2) + float((np.log(total) + top).sum() - (right @ w).sum())
+        return value, weight * (w - mean) + np.einsum("kn,knp->p", e / total, X) - right.sum(axis=0)
+
+    bounds = [(1e-3, None), *[(None, None)] * (2 + len(effects))]
+    return np.asarray(minimize(cost, mean, jac=True, bounds=bounds, method="L-BFGS-B").x)
+
+
+def _left_out(cases: Sequence[Case], effects: Sequence[str], fold: int) -> list[tuple[Case, dict[str, float]]]:
+    """Sets of one fold with probabilities by the numbers that the others teach."""
+    held = [one for i, one in enumerate(cases) if i % FOLDS == fold]
+    w = _fit([one for i, one in enumerate(cases) if i % FOLDS != fold], effects)
+    return [
+        (one, dict(zip(one.names, _softmax(_design(one, effects) @ w).tolist(), strict=True))) for one in held
+    ]  # fmt: skip
+
+
+def _commit(sure: np.ndarray, right: np.ndarray) -> float:
+    """The least probability from which on the first guess was right in PRECISION of the sets; 1 where there is none."""
+    order = np.argsort(-sure)
+    share = np.cumsum(right[order]) / np.arange(1, len(order) + 1)
+    good = np.flatnonzero(share >= PRECISION)
+    return float(sure[order[good[-1]]]) if len(good) else 1.0
+
+
+def _softmax(x: np.ndarray) -> np.ndarray:
+    e = np.exp(x - x.max())
+    return np.asarray(e / e.sum())

@@ -64,7 +64,10 @@ def identify(
     with_effect: Annotated[
         list[str] | None,
         typer.Option(
-            "--with-effect", metavar="ID", help="Put an effect of the catalogue into the simulator; repeatable."
+            "--with-effect",
+            metavar="ID[:K]",
+            help="Put an effect (`r2s2r effects`) into the simulator and fit its numbers, or those of element K; "
+            "repeatable. Default: the effects of the identification before; none: no effect.",
         ),
     ] = None,
     method: Annotated[

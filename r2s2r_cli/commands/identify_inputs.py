@@ -101,14 +101,27 @@ class Asked:
         earlier = [i for i in self.project.iterations() if i.number < self.iteration.number]
         return next((i for i in reversed(earlier) if i.artifact("identification").exists()), None)
 
+    @cached_property
+    def kept(self) -> Iteration | None:
+        """The latest earlier iteration with an identification, where that has effects and none are named here: its
+        effects stay in the simulator. Raises ArtifactError where it cannot be read."""
+        from r2s2r_cli.store.read import read_artifact
+
+        earlier = [] if self.effects else [i for i in self.project.iterations() if i.number < self.iteration.number]
+        found = next((i for i in reversed(earlier) if i.artifact("identification").exists()), None)
+        if found is None:
+            return None
+        fit = read_artifact(found.artifact("identification"), "identification")[1].groups["fit"]
+        return found if str(fit.attributes["effects"]).split() else None
+
     def refs(self) -> list[InputRef]:
         """The inputs. Raises ArtifactError where one cannot be read."""
         from r2s2r_cli.store.header import whole_header
         from r2s2r_cli.store.staleness import artifact_ref
 
         paths = self.artifacts()
-        if self.last is not None:
-            paths.append(self.last.artifact("identification"))
+        earlier = [one for one in (self.last, self.kept) if one is not None]
+        paths += dict.fromkeys(one.artifact("identification") for one in earlier)
         return [artifact_ref(self.project, path, whole_header(path)) for path in paths]
 
     def runs(self) -> list[RunData]:
@@ -151,14 +164,21 @@ class Asked:
 
     def request(self, runs: Sequence[RunData], train_share: float) -> Request:
         """The request, its intervals resolved. Raises UsageError for runs and intervals that do not exist."""
+        from r2s2r_cli.stages.identify.effects_asked import effects_asked, effects_kept
         from r2s2r_cli.stages.identify.request import Request
         from r2s2r_cli.stages.identify.selection import split
         from r2s2r_cli.store.read import read_artifact
 
         train, test = split(runs, self.train, self.test, train_share)
-        before = read_artifact(self.last.artifact("identification"), "identification")[1] if self.last else None
+        before, kept = (
+            read_artifact(place.artifact("identification"), "identification")[1] if place else None
+            for place in (self.last, self.kept)
+        )
+        robot = self.project.robot()
+        wanted = effects_asked(self.effects, robot) if kept is None else effects_kept(kept, robot)
         return Request(
-            train=train, test=test, free=self.free, fixed=parse_fixed(self.fix), effects=self.effects,
+            train=train, test=test, free=self.free, fixed=parse_fixed(self.fix), effects=wanted.ids,
+            of_effects=wanted.specs,
             method=self.method, drive=self.drive, seed=self.seed, online=self.online, before=before,
         )  # fmt: skip
 

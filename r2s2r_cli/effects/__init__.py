@@ -17,6 +17,7 @@ from r2s2r_cli.effects.command_latency import CommandLatency
 from r2s2r_cli.effects.dropout import Dropout
 from r2s2r_cli.effects.friction_field import FrictionField
 from r2s2r_cli.effects.ground_slope import GroundSlope
+from r2s2r_cli.effects.known import known_effects as known_effects
 from r2s2r_cli.effects.load_droop import LoadDroop
 from r2s2r_cli.effects.motor_dead_zone import MotorDeadZone
 from r2s2r_cli.effects.motor_lag import MotorLag

@@ -31,6 +31,8 @@ class EffectParameter:
     what: str
     per: str = "robot"
     """robot | rod | cap | cable | actuated | sensor (that of each cable): how many there are."""
+    fitted: bool = True
+    """Whether a trajectory tells it; what only counts frames (dropout) is measured without a simulator."""
 
     def count(self, structure: Structure) -> int:
         """How many numbers it has on a robot."""

@@ -25,8 +25,10 @@ class Dropout(Effect):
     channel = Channel.OBSERVATION
     title = "lost and mistaken end caps"
     own = (
-        EffectParameter("lost", "1", 0.0, 0.5, off=0.0, scale=0.1, what="share of caps that are missing"),
-        EffectParameter("swapped", "1", 0.0, 0.3, off=0.0, scale=0.03, what="share of rods with caps exchanged"),
+        EffectParameter("lost", "1", 0.0, 0.5, off=0.0, scale=0.1, what="share of caps that are missing", fitted=False),
+        EffectParameter(
+            "swapped", "1", 0.0, 0.3, off=0.0, scale=0.03, what="share of rods with caps exchanged", fitted=False
+        ),
     )
     look_alikes = ()
 

@@ -157,7 +157,8 @@ class Simulator:
         n = substeps or self.substeps(theta, state0, step)
         s0 = pack_state(self.structure, state0).expand(batch, -1).contiguous()
         rows = commands.shape[1]
-        u, hold, by_delay = self._arriving(theta, commands.expand(batch, -1, -1).contiguous(), step, hold)
+        given = commands.expand(batch, -1, -1).contiguous()
+        u, hold, by_delay = self._arriving(theta, given, step, hold, tangents=d_parameters is not None)
         p = pack_parameters(self.structure, theta)
 
         def spread(x: Tensor | None, axes: int) -> Tensor | None:
@@ -180,12 +181,12 @@ class Simulator:
         return Trajectory(self.structure, theta, t, unpack_state(self.structure, frames), step, n), tangents
 
     def _arriving(
-        self, theta: Parameters, commands: Tensor, step: float, hold: int
+        self, theta: Parameters, commands: Tensor, step: float, hold: int, *, tangents: bool = False
     ) -> tuple[Tensor, int, Tensor | None]:
         """Commands as they arrive at the winches, for how many steps each row is held, and derivatives by the delay;
-        None where no effect delays them."""
+        None where no effect delays them. Rows of single steps take time: not where the delay is 0 and stays so."""
         delay = delay_of(self.structure, theta)
-        if delay is None:
+        if delay is None or not (tangents or delay.requires_grad or bool((delay != 0).any())):
             return commands, hold, None
         late, by_delay = shifted(commands.repeat_interleave(hold, dim=1), delay, step)
         return late, 1, by_delay

@@ -128,7 +128,7 @@ def _caps(
     """
     import torch
 
-    from r2s2r_cli.engine import end_caps
+    from r2s2r_cli.engine import end_caps, observe
     from r2s2r_cli.engine.flat import unpack_state
     from r2s2r_cli.engine.hooks import effective
 
@@ -138,6 +138,7 @@ def _caps(
     states = flat[:, low] * (1 - share) + flat[:, low + 1] * share
     k, frames = states.shape[:2]
     theta = effective(structure, own).map(lambda x: x.expand(k, *x.shape[1:]).repeat_interleave(frames, dim=0))
-    caps = end_caps(theta, unpack_state(structure, states.flatten(0, 1))).unflatten(0, (k, frames)).numpy()
-    caps[..., 2] += up[:, None, None]
-    return np.asarray(caps)
+    caps = end_caps(theta, unpack_state(structure, states.flatten(0, 1))).unflatten(0, (k, frames))
+    seen = observe(structure, own, torch.as_tensor(window.run.t[window.frames]), caps).numpy().copy()
+    seen[..., 2] += up[:, None, None]
+    return np.asarray(seen)

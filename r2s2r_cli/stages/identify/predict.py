@@ -142,7 +142,7 @@ class Predictor:
 
         n, extra = len(x), 0 if moved is None else count(self.structure)
         d_p = torch.nn.functional.pad(self.mapping.jacobian(x), (0, extra))
-        delays = [k for k, name in enumerate(self.mapping.names) if name in ("command_delay", "camera_delay")]
+        delays = self.mapping.delays
         d_u = None
         if delays:
             d_u = torch.zeros(*by_delay.shape, n + extra, dtype=torch.float64)
@@ -160,7 +160,7 @@ class Predictor:
         import torch
         from torch.func import jacfwd, vmap
 
-        from r2s2r_cli.engine import end_caps
+        from r2s2r_cli.engine import end_caps, observe
         from r2s2r_cli.engine.flat import unpack_parameters, unpack_state
         from r2s2r_cli.engine.hooks import effective
 
@@ -173,8 +173,10 @@ class Predictor:
 
         def caps(s: Tensor, p: Tensor) -> Tensor:
             theta = effective(self.structure, unpack_parameters(self.structure, p[None]))
-            return end_caps(theta, unpack_state(self.structure, s[None]))[0]
+            seen = end_caps(theta, unpack_state(self.structure, s[None]))
+            return observe(self.structure, theta, now, seen[:, None])[0, 0]
 
+        now = torch.zeros(1, dtype=torch.float64)  # what depends on time is no number of the engine (Mapping.delays)
         p = torch.as_tensor(self.mapping.packed(x))
         p_WE = vmap(lambda s: caps(s, p))(states).numpy()
         values = x.numpy()

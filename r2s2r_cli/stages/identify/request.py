@@ -19,7 +19,8 @@ class Request:
 
     train, test: target intervals by run, complete and disjoint; test may be empty. free: what is free, as after --free;
     empty: the default set of the method. fixed: values by parameter, in its unit, not fitted. effects: ids of the
-    catalogue that are in the simulator. before: the identification to continue from (online), or None.
+    catalogue that are in the simulator. of_effects: what is free of them unless `free` or `fixed` names it, as after
+    --free. before: the identification to continue from (online), or None.
     """
 
     train: tuple[Selection, ...]
@@ -27,6 +28,7 @@ class Request:
     free: tuple[str, ...] = ()
     fixed: Mapping[str, float] = field(default_factory=dict)
     effects: tuple[str, ...] = ()
+    of_effects: tuple[str, ...] = ()
     method: Method = "default"
     drive: Drive = "command replay"
     seed: int = 0

@@ -138,9 +138,17 @@ def free_parameters(
 
 def specs_asked(request: Request, settings: IdentifySettings, default: Sequence[str]) -> tuple[str, ...]:
     """What is free, as after --free: of the request, else of the settings, else the default; where nothing was named
-    on the command line, without what is fixed there. Raises UsageError for a spec that cannot be read."""
+    on the command line, without what is fixed there. Numbers of the request's effects are free beside them, but for
+    families of which one is named or fixed. Raises UsageError for a spec that cannot be read."""
     own = tuple(spec for spec in extended(settings.free, default) if name_of(spec) not in request.fixed)
-    return extended(request.free, own)
+    specs = extended(request.free, own)
+    named = {_family(name) for name in (*map(name_of, specs), *request.fixed)}
+    return (*specs, *(spec for spec in request.of_effects if _family(name_of(spec)) not in named))
+
+
+def _family(name: str) -> str:
+    """Effect and number of EFFECT.NUMBER, EFFECT.NUMBER.K and EFFECT.NUMBER.*."""
+    return ".".join(name.split(".")[:2])
 
 
 def busy(robot: Robot, runs: Sequence[RunData], request: Request) -> tuple[tuple[str, int], ...]:

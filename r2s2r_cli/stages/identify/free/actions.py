@@ -175,17 +175,21 @@ class Slope:
 
 @dataclass(frozen=True)
 class Outside:
-    """A number that the engine's step does not read: `of` the controller (pid) or what is observed (observation)."""
+    """A number that the engine's step does not read: `of` the controller (pid) or what is observed (observation).
+
+    added: name of the effect's number that comes on top of what `key` has; "": the number is `key` itself.
+    """
 
     of: str
     key: str
+    added: str = ""
 
     affine: ClassVar[bool] = True
 
     @property
     def touches(self) -> frozenset[Place]:
         """The number."""
-        return frozenset({(f"{self.of}.{self.key}", 0)})
+        return frozenset({(self.added or f"{self.of}.{self.key}", 0)})
 
     def apply(self, theta: Parameters, own: Parameters, value: Tensor) -> Parameters:
         """Nothing."""

@@ -41,9 +41,9 @@ def own_entries(robot: Robot) -> dict[str, Entry]:
 
 def require_effects(effects: Sequence[str]) -> None:
     """Raises UsageError for an effect that is not in the catalogue of effects."""
-    from r2s2r_cli.effects import CATALOGUE
+    from r2s2r_cli.effects import known_effects
 
-    known = [effect.name for effect in CATALOGUE]
+    known = [effect.name for effect in known_effects()]
     for name in effects:
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]

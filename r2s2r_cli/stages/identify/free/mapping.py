@@ -38,9 +38,9 @@ class Mapping:
     """Free numbers of one robot at work: values x (n,) in the order of `frees` -> Parameters of `structure`.
 
     structure: laws that a free or fixed number needs are switched on, and its effects plugged in beside those named
-    in `effects`. names: of the free numbers. in_engine: (n,) bool, whether the engine reads
-    it; others are in `observation` or `pid`. Numbers that are neither free nor fixed keep what robot.toml has, effects
-    their off values; ends of the winches (`rest_min`, `rest_max`) always do.
+    in `effects`. names: of the free numbers. in_engine: (n,) bool, whether the engine reads it; others are in
+    `observation` or `pid`. delays: places of those that shift commands or frames in time. Numbers that are neither free
+    nor fixed keep what robot.toml has, effects their off values; the winches' ends (`rest_min`, `rest_max`) always do.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class Mapping:
         Raises UsageError for unknown names and for numbers that contradict each other, InputError for a fixed value
         out of its bounds or a robot that cannot be simulated.
         """
-        from r2s2r_cli.effects import CATALOGUE, with_off_values
+        from r2s2r_cli.effects import known_effects, with_off_values
         from r2s2r_cli.stages.model import parameters_of, structure_of
 
         require_effects(effects)
@@ -75,18 +75,20 @@ class Mapping:
         wanted = {*effects, *(entry.effect for entry in used)} - {effect.name for effect in base.effects}
         laws = {entry.law for entry in used}
         base = replace(base, lag=base.lag or "lag" in laws, droop=base.droop or "droop" in laws)
-        self.structure: Structure = base.with_effects(*(effect for effect in CATALOGUE if effect.name in wanted))
+        self.structure: Structure = base.with_effects(*(effect for effect in known_effects() if effect.name in wanted))
         self._own = with_off_values(self.structure, parameters_of(robot))
         # The catalogue has the whole before its parts, so that what is set last is the more special one.
         self._order = sorted((*self.names, *self.fixed), key=list(known).index)
         self._actions = {entry.free.name: entry.action for entry in used}
         self._curved = tuple(k for k, entry in enumerate(self._entries) if not entry.action.affine)
         self._constant: dict[tuple[torch.dtype, torch.device], Tensor] = {}
-        self._given_outside: dict[tuple[str, str], Any] = {
-            (entry.action.of, entry.action.key): self.fixed[entry.free.name]
-            for entry in given
-            if isinstance(entry.action, Outside)
-        }
+        self._given_outside = [
+            (entry.action, self.fixed[entry.free.name]) for entry in given if isinstance(entry.action, Outside)
+        ]
+        self.delays = tuple(
+            k for k, entry in enumerate(self._entries)
+            if isinstance(entry.action, Outside) and entry.action.key in ("command_delay", "camera_delay")
+        )  # fmt: skip
         self.in_engine = tuple(not isinstance(entry.action, Outside) for entry in self._entries)
 
     def theta(self, values: Vector) -> Parameters:
@@ -157,10 +159,14 @@ class Mapping:
 
     def _outside(self, of: str, values: Vector) -> dict[str, Any]:
         """Fixed and free numbers outside the engine, by key; of values (B, n) tensors (B, 1)."""
-        found = {key: value for (kind, key), value in self._given_outside.items() if kind == of}
+        numbers: list[tuple[Outside, Any]] = [*self._given_outside]
         for k, entry in enumerate(self._entries):
-            if isinstance(entry.action, Outside) and entry.action.of == of:
-                found[entry.action.key] = values[:, k : k + 1] if values.ndim == 2 else values[k]
+            if isinstance(entry.action, Outside):
+                numbers.append((entry.action, values[:, k : k + 1] if values.ndim == 2 else values[k]))
+        found: dict[str, Any] = {}
+        for action, value in sorted(numbers, key=lambda one: bool(one[0].added)):
+            if action.of == of:
+                found[action.key] = found.get(action.key, 0.0) + value if action.added else value
         return found
 
     def _require_fixed(self, given: list[Entry]) -> None:

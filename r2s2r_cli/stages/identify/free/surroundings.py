@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from r2s2r_cli.stages.identify.free.actions import Assign, Outside, Place, Slope
+from r2s2r_cli.stages.identify.free.actions import Action, Assign, Outside, Place, Slope
 from r2s2r_cli.stages.identify.free.base import Coordinate, Free
 from r2s2r_cli.stages.identify.free.entry import Element, Entry, Kind, common, each, inside
 from schemas.robot import Robot
+
+if TYPE_CHECKING:
+    from r2s2r_cli.engine import Structure
 
 STEEPEST = 0.1745
 """[rad] 10 degrees: on more a robot that stands does not stay."""
@@ -81,13 +86,13 @@ def pid_entries(robot: Robot) -> list[Entry]:
 
 def effect_entries(robot: Robot) -> list[Entry]:
     """Every number of every effect: EFFECT.PARAMETER for all its elements, EFFECT.PARAMETER.K for one."""
-    from r2s2r_cli.effects import CATALOGUE
+    from r2s2r_cli.effects import known_effects
     from r2s2r_cli.stages.model import structure_of
 
     structure = structure_of(robot)
     found = []
-    for effect in CATALOGUE:
-        for own in effect.own:
+    for effect in known_effects():
+        for own in (one for one in effect.own if one.fitted):
             family, count = f"{effect.name}.{own.name}", own.count(structure)
             start = inside(own.off, own.lower, own.upper, own.scale)
             parts = list(robot.actuated) if own.per == "actuated" else list(range(count))
@@ -99,20 +104,36 @@ def effect_entries(robot: Robot) -> list[Entry]:
                 where = "" if own.per == "robot" else f" ({_part(own.per, number)})"
                 what = f"Effect {effect.title}: {own.what}{where}."
                 free = Free(name, own.unit, start, own.lower, own.upper, Coordinate.LINEAR, own.scale, what)
-                alike = _alike(name, structure.n_actuated)
-                found.append(Entry(free, Assign(places), own.off, family, number, effect=effect.name, alike=alike))
+                action: Action = Assign(places)
+                if name in DELAYS:
+                    action = Outside("observation", DELAYS[name], added=name)
+                found.append(
+                    Entry(free, action, own.off, family, number, effect=effect.name, alike=_alike(name, structure))
+                )
     return found
 
 
+DELAYS = {"command_latency.tau_s": "command_delay", "camera_delay.tau_s": "camera_delay"}
+"""Numbers of effects that shift the log in time instead of being read by the step, and what they are added to."""
+
+
 def _part(per: str, number: int | None) -> str:
-    part = "winched cable" if per == "actuated" else per
+    part = {"actuated": "winched cable", "sensor": "cable sensor"}.get(per, per)
     return f"one number for every {part}" if number is None else f"{part} {number}"
 
 
-def _alike(name: str, winches: int) -> frozenset[Place]:
+def _alike(name: str, structure: Structure) -> frozenset[Place]:
     """What an effect's number adds to that a number of the robot sets."""
-    if name == "motor_lag.tau_s":
-        return frozenset(("lag", k) for k in range(winches))
+    winches, caps = range(structure.n_actuated), range(2 * structure.n_rods)
+    if name in DELAYS:
+        return frozenset({(f"observation.{DELAYS[name]}", 0)})
     if name in ("ground_slope.angle_x_rad", "ground_slope.angle_y_rad"):
         return frozenset({("gravity", 0 if "_x_" in name else 1)})
-    return frozenset()
+    whole: dict[str, list[Place]] = {
+        "motor_lag.tau_s": [("lag", k) for k in winches],
+        "load_droop.per_newton": [("droop", k) for k in winches],
+        "motor_speed_mismatch.factor": [(field, k) for field in ("speed_in", "speed_out") for k in winches],
+        "cap_friction.factor": [("friction", k) for k in caps],
+        "tendon_stiffness.factor": [("stiffness", k) for k in range(structure.n_cables)],
+    }
+    return frozenset(whole.get(name, ()))

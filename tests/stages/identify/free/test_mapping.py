@@ -25,7 +25,8 @@ APART = (
     "damping", "rest_length", "tendon_stiffness", "mass", "com.0", "com.1", "com.2", "attachment_phase.0",
     "attachment_phase.1", "attachment_phase.2", "friction", "restitution", "ground_slope_x", "ground_slope_y",
     "ground_height", "command_delay", "camera_delay", "pid_p", "pid_i", "pid_d", "pid_tolerance", "pid_min_length",
-    "pid_range", "cap_friction.factor",
+    "pid_range", "cap_friction.factor.2", "payload.mass_kg.1", "friction_field.gradient_x_per_m",
+    "camera_pose.turn_z_rad",
 )  # fmt: skip
 """Names that can all be free together."""
 
@@ -156,6 +157,20 @@ def test_a_fixed_number_holds_and_a_part_of_it_can_be_free() -> None:
     for motor, speed in zip(ROBOT.motors, theta.speed_in[0].tolist(), strict=True):
         shown = 0.9 if motor.cable == 2 else motor.speed * factor
         assert speed == pytest.approx(shown * motor.no_load_rad_per_s * motor.winch_radius_m)
+
+
+def test_delays_of_effects_come_on_top_of_what_is_given() -> None:
+    """The shift of the log is the robot's delay and the effect's; the step's own number stays off, so that nothing is
+    late twice. Free beside the robot's own it is refused."""
+    made = mapping("command_latency.tau_s", "camera_delay.tau_s", fixed={"command_delay": 0.02})
+    seen = made.observation(np.array([0.05, -0.01]))
+    assert (seen.command_delay, seen.camera_delay) == pytest.approx((0.07, -0.01))
+    assert made.delays == (0, 1)
+    assert float(made.theta(np.array([0.05, -0.01])).extra["command_latency.tau_s"]) == 0.0
+    given = mapping("friction", fixed={"command_latency.tau_s": 0.03, "command_delay": 0.02})
+    assert given.observation(np.array([0.5])).command_delay == pytest.approx(0.05)
+    with pytest.raises(UsageError, match="set the same number"):
+        mapping("command_latency.tau_s", "command_delay")
 
 
 def test_an_effect_adds_to_what_is_fixed() -> None:

@@ -1,0 +1,47 @@
+"""The effects that are known here: the catalogue, and those that installed packages bring (entry points)."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from importlib.metadata import EntryPoint, entry_points
+
+from r2s2r_cli.effects.base import Effect
+from r2s2r_cli.engine.errors import EngineInputError
+
+GROUP = "r2s2r.effects"
+"""The group of entry points. Each names an instance of a subclass of Effect, or the class itself."""
+
+
+@lru_cache
+def known_effects() -> tuple[Effect, ...]:
+    """The catalogue, then the effects of installed packages by name. Raises EngineInputError for one that is none, or
+    that takes a name that is taken."""
+    from r2s2r_cli.effects import CATALOGUE
+
+    found = list(CATALOGUE)
+    for entry in sorted(entry_points(group=GROUP), key=lambda one: one.name):
+        effect = loaded(entry)
+        if effect.name in {one.name for one in found}:
+            raise _bad(entry, "an effect of this id is there already", f"another id than {effect.name}", effect.name)
+        found.append(effect)
+    return tuple(found)
+
+
+def loaded(entry: EntryPoint) -> Effect:
+    """The effect of an entry point. Raises EngineInputError where it cannot be loaded or is no effect."""
+    try:
+        found = entry.load()
+    except Exception as error:
+        raise _bad(entry, "the effect cannot be loaded", "a module that can be imported", repr(error)) from error
+    effect = found() if isinstance(found, type) else found
+    if not isinstance(effect, Effect):
+        raise _bad(entry, "not an effect", "a subclass of r2s2r_cli.effects.Effect", type(effect).__name__)
+    if effect.name != entry.name:
+        raise _bad(entry, "the effect has another id than its entry point", entry.name, effect.name)
+    return effect
+
+
+def _bad(entry: EntryPoint, what: str, expected: str, received: str) -> EngineInputError:
+    return EngineInputError(
+        f"entry point {GROUP}: {entry.name} = {entry.value}", what, expected=expected, received=received
+    )

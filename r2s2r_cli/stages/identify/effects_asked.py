@@ -1,0 +1,71 @@
+"""Which effects an identification puts into the simulator, and which of their numbers are free then.
+
+`--with-effect ID` frees every number of the effect, `--with-effect ID:K` those of its element K (a cable, a cap, a
+rod). An iteration that names none keeps those of the identification before it, and starts from what that found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.errors import UsageError
+from r2s2r_cli.stages.identify.free.catalogue import entries, require_effects
+from r2s2r_cli.stages.identify.free.entry import inside
+from schemas.identification import FIXED_BY_HAND
+
+if TYPE_CHECKING:
+    from schemas.robot import Robot
+
+NONE = "none"
+"""`--with-effect none`: those of the identification before are left out."""
+
+
+@dataclass(frozen=True)
+class EffectsAsked:
+    """ids: of the effects in the simulator. specs: of their free numbers, as after --free."""
+
+    ids: tuple[str, ...] = ()
+    specs: tuple[str, ...] = ()
+
+
+def effects_asked(words: Sequence[str], robot: Robot) -> EffectsAsked:
+    """Of `--with-effect` words. Raises UsageError for an unknown effect, an element that is not there, or `none` beside
+    others."""
+    if NONE in words:
+        if len(words) > 1:
+            raise UsageError("none and an effect", where="--with-effect", expected="none alone, or effects",
+                             received=", ".join(words), hint="r2s2r identify --with-effect none")  # fmt: skip
+        return EffectsAsked()
+    ids, specs = list[str](), list[str]()
+    for word in words:
+        name, colon, element = word.partition(":")
+        require_effects([name])
+        ids += [] if name in ids else [name]
+        own = [one for one in entries(robot).values() if one.effect == name]
+        families = dict.fromkeys(one.family for one in own)
+        for family in families:
+            elements = [one.element for one in own if one.family == family and one.element is not None]
+            if elements and colon and element not in map(str, elements):
+                raise UsageError(
+                    f"{name} has no element {element!r}", where="--with-effect",
+                    expected=f"{name}:K with K of {', '.join(map(str, elements))}", received=word,
+                    hint=f"r2s2r identify --with-effect {name}:{elements[0]}",
+                )  # fmt: skip
+            specs.append(family + (f".{element}" if elements and colon else ".*" if elements else ""))
+    return EffectsAsked(tuple(ids), tuple(dict.fromkeys(specs)))
+
+
+def effects_kept(before: ArtifactData, robot: Robot) -> EffectsAsked:
+    """Of an earlier identification: its effects, each free number of theirs starting from what was found."""
+    known, table = entries(robot), before.groups["parameters"]
+    ids = tuple(str(before.groups["fit"].attributes["effects"]).split())
+    specs = []
+    for k, name in enumerate(one.decode() for one in table["name"].tolist()):
+        if name in known and known[name].effect in ids and int(table["trust"][k]) != FIXED_BY_HAND:
+            free = known[name].free
+            start = inside(float(table["value"][k]), free.lower, free.upper, free.prior_sd)
+            specs.append(f"{name}={start!r}")
+    return EffectsAsked(ids, tuple(specs))

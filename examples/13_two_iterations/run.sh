@@ -6,4 +6,4 @@ out=${1:-two-iterations}
 shift || true
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 export OMP_NUM_THREADS=${OMP_NUM_THREADS:-1}
-exec python "$here/run.py" --demo --out "$out" --seeds "${@:-0}"
+exec "${PYTHON:-python}" "$here/run.py" --demo --out "$out" --seeds "${@:-0}"

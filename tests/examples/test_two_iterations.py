@@ -1,0 +1,71 @@
+"""The example of two iterations: its world is another one than robot.toml, and its table says what comparisons say."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from r2s2r_cli.rig.world import World
+from r2s2r_cli.stages.init.robots import robot_toml
+from r2s2r_cli.store.toml import load_model
+from schemas.robot import Robot
+from tests.guards.listing import ROOT
+
+FOLDER = ROOT / "examples" / "13_two_iterations"
+
+
+def loaded(name: str) -> ModuleType:
+    """A module of the example."""
+    spec = importlib.util.spec_from_file_location(f"two_iterations_{name}", FOLDER / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_world_is_another_one(tmp_path: Path, seed: int) -> None:
+    """What it draws is what the rig's robot has, within what the README says, and both files can be read."""
+    world = loaded("world")
+    (tmp_path / "robot.toml").write_text(robot_toml("threebar"))
+    drawn = world.unknown(tmp_path, seed)
+    told, true = (load_model(tmp_path / name, Robot) for name in ("robot.toml", "truth.toml"))
+    assert load_model(tmp_path / "world.toml", World).seed == seed
+    assert true.contact.friction == pytest.approx(drawn["friction"], abs=1e-4)
+    assert world.FRICTION[0] <= true.contact.friction <= world.FRICTION[1] < told.contact.friction
+    for one, other in zip(told.motors, true.motors, strict=True):
+        assert other.no_load_rad_per_s / one.no_load_rad_per_s == pytest.approx(drawn["speed"], abs=1e-4)
+    for k in range(6, 9):
+        stiffness, rest = drawn[f"tendon {k}"]
+        assert true.cables[k].stiffness_n_per_m == pytest.approx(100.0 * stiffness, abs=1e-3)
+        assert true.cables[k].rest_length_m == pytest.approx(0.165 * rest, abs=1e-5)
+    assert true.cables[:6] == told.cables[:6]
+
+
+def report(refined: float, gap: float, floor: float | None = 0.01) -> dict[str, Any]:
+    """A comparison of ends under two simulators."""
+    return {"models": [
+        {"model": "initial", "runs": {"com_end_m": {"rms": 0.2, "floor": floor, "gap": 0.15 if floor else None}}},
+        {"model": "refined", "runs": {"com_end_m": {"rms": refined, "floor": floor, "gap": gap if floor else None}}},
+    ]}  # fmt: skip
+
+
+def test_the_table_says_by_what_the_gap_fell() -> None:
+    """Factor, fall to the floor, nothing without a floor; median and range over seeds."""
+    table = loaded("table")
+    rows = [row for k, gap in enumerate((0.03, 0.05, 0.0)) for row in table.rows_of(report(0.04, gap), "runs", str(k))]
+    ends = [row for row in rows if row.measure == "com_end_m"]
+    assert [row.falls("refined") for row in ends] == [pytest.approx(5.0), pytest.approx(3.0), math.inf]
+    assert ends[0].falls("initial") == 1.0
+    lines = list(table.summary(rows))
+    assert "refined 5.0 (3.0 .. to the floor)" in lines[1]
+    assert "200.00 (200.00 .. 200.00)" in lines[1]
+    (blind,) = [r for r in table.rows_of(report(0.04, 0.0, None), "runs", "0") if r.measure == "com_end_m"]
+    assert blind.falls("refined") is None

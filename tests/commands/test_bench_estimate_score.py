@@ -68,7 +68,7 @@ def test_another_choice_of_axes_and_origin_is_no_error() -> None:
 
 
 def test_a_wrong_floor_is_an_error() -> None:
-    """Floor 5 mm too near and 0.5 degrees off: heights where the robot stands are wrong by it; x, y, heading are not."""
+    """Floor 5 mm too near and 0.5 degrees off: heights where the robot stands are wrong, x, y, heading not."""
     true, angle = truth(), np.radians(0.5)
     wrong = np.eye(4)
     wrong[:3, :3] = [[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]]

@@ -16,14 +16,18 @@ from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.estimate.motion.data import Readings, Sighted
 from schemas.robot import Robot
 
-BETTER = 0.65
+BETTER = 0.7
 """Another naming fits better where it leaves less than this share of the deviations: then it is the right one."""
 TELLS = 1.3
 """A naming that leaves less than so many times the deviations is not told from the right one."""
-FRAMES = 300
-"""Frames that are compared at most, spread over the run."""
-LEAST = 30
-"""Fewest frames that show a cable for its sensor to count."""
+TOGETHER, MEANS = 5, 300
+"""Neighbouring frames whose mean is compared, so many at least; and how many means at most."""
+LEAST = 6
+"""Fewest means that show a cable for its sensor to count."""
+FAR_M = 0.03
+"""[m] A deviation from the usual counts for no more than this: sensors drop out, blobs are confused."""
+WORST = 2
+"""Sensors with the largest deviations that do not count: they may be broken."""
 SENSORS = 3
 """Fewest sensors that can tell."""
 NEAR_S = 0.1
@@ -41,8 +45,7 @@ def check_names(sighted: Sighted, readings: Readings | None, robot: Robot, *, wh
     """
     if readings is None:
         return None  # the report says what a run without sensors cannot tell
-    rows = np.unique(np.linspace(0, len(sighted.t) - 1, min(FRAMES, len(sighted.t))).round().astype(int))
-    p, shown = sighted.p_WE[rows], lengths_at(sighted.t[rows], readings)
+    p, shown = sighted.p_WE, lengths_at(sighted.t, readings)
     ends = np.array([cable.caps for cable in robot.cables])[readings.cable]
     names = list(namings(len(robot.rods)))
     found = np.array([deviation(p, shown, ends, name) for name in names])
@@ -54,7 +57,7 @@ def check_names(sighted: Sighted, readings: Readings | None, robot: Robot, *, wh
         raise InputError(
             _what(names[best], robot), where=where,
             expected="lengths of the cable sensors as the camera sees them, but for an offset each",
-            received=f"{1e3 * found[0]:.1f} mm between them in the mean, {1e3 * found[best]:.1f} mm with other names",
+            received=f"{1e3 * found[0]:.1f} mm apart, {1e3 * found[best]:.1f} mm with other names",
             hint="r2s2r doctor camera shows which rod has which colour; correct rod in [[colors]] of robot.toml",
         )  # fmt: skip
     if found[best] < TELLS * found[0]:
@@ -91,18 +94,25 @@ def namings(rods: int) -> Iterator[np.ndarray]:
 
 
 def deviation(p_WE: np.ndarray, shown: np.ndarray, ends: np.ndarray, naming: np.ndarray) -> float:
-    """Of the sensors from the distances under a naming [m], the median over sensors; NaN where too few tell.
+    """Of the sensors from the distances under a naming [m], root mean square; NaN where too few tell.
 
     p_WE: (frame, cap, 3), NaN where not sighted; shown: (frame, sensor), NaN where silent; ends: (sensor, 2).
     """
     apart = np.linalg.norm(p_WE[:, naming[ends[:, 0]]] - p_WE[:, naming[ends[:, 1]]], axis=-1)
-    off, found = shown - apart, []
+    off = shown - apart
+    starts = np.arange(0, len(off), max(TOGETHER, len(off) // MEANS))
+    good = np.isfinite(off)
+    count = np.add.reduceat(good.astype(float), starts, axis=0)
+    mean = np.add.reduceat(np.where(good, off, 0.0), starts, axis=0) / np.maximum(count, 1.0)
+    found = []
     for s in range(off.shape[1]):
-        one = off[np.isfinite(off[:, s]), s]
-        if len(one) >= min(LEAST, len(off) // 2 + 1):
+        one = mean[count[:, s] > 0, s]
+        if len(one) >= LEAST:
             middle = float(np.median(one))
-            found.append(np.hypot(1.4826 * float(np.median(np.abs(one - middle))), OFFSET_SHARE * middle))
-    return float(np.median(found)) if len(found) >= SENSORS else float("nan")
+            rest = np.clip(one - middle, -FAR_M, FAR_M)
+            found.append(float(np.mean(rest**2)) + (OFFSET_SHARE * middle) ** 2)
+    kept = np.sort(found)[: max(len(found) - WORST, SENSORS)]
+    return float(np.sqrt(np.mean(kept))) if len(found) >= SENSORS else float("nan")
 
 
 def lengths_at(t: np.ndarray, readings: Readings) -> np.ndarray:

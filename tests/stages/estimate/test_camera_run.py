@@ -171,6 +171,7 @@ def test_frames_without_the_robot_are_marked_and_bridged(
     away = (case.frames.t >= 2.0) & (case.frames.t < 2.5)
     assert marked(broken, 4)[away].all()
     assert not marked(state, 4).any()
+    assert (marked(broken, 16) == (away & (change is not spoiled.empty))).all()
     found = score(case, broken)
     assert found.lost == 0.0
     assert found.cap_mean_mm < 4.0
@@ -224,6 +225,19 @@ def test_what_cannot_be_tracked_is_refused_with_the_way_out(case: Case, name: st
     with pytest.raises(InputError, match=words) as caught:
         tracked(case, **changes)
     assert caught.value.hint.startswith("r2s2r ")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("order", [(1, 0, 2), (1, 2, 0)])
+def test_colours_of_other_rods_are_refused_and_named(case: Case, order: tuple[int, ...]) -> None:
+    """Two exchanged, three rotated: every picture fits such a robot, but the sensors do not."""
+    rods = [rod.name for rod in case.robot.rods]
+    of = {color.rod: color for color in case.robot.colors}
+    wrong = tuple(of[rods[other]].model_copy(update={"rod": rods[rod]}) for rod, other in enumerate(order))
+    robot = case.robot.model_copy(update={"colors": wrong})
+    with pytest.raises(InputError, match=r"exchanged: .*rod red has that of rod") as caught:
+        tracked_run("case", case.streams, case.frames, robot, EstimateSettings())
+    assert f"rod {rods[order[0]]} has that of rod {rods[0]}" in caught.value.what
 
 
 @pytest.mark.slow

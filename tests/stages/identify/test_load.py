@@ -192,3 +192,22 @@ def test_of_camera_images_what_was_known_at_each_frame_is_observed() -> None:
     known = run_data(recording, estimate, "walk").observed + 3e-4
     filtered = changed(estimate, "tracks", observed=known)
     assert run_data(without(recording, "caps"), filtered, "walk").observed == pytest.approx(known)
+
+
+def test_guesses_of_hidden_caps_count_as_faults() -> None:
+    """Of camera images: a cap that was hidden until it was 5 mm uncertain, and frames before the tracker began; a cap
+    that is seen is none, however noisy the camera, nor is one that was hidden for a moment."""
+    recording, estimate = artifacts()
+    frames = estimate.group("walk", "frames")
+    assert frames is not None
+    quality, sd = np.zeros_like(frames["quality"]), np.full((*frames["quality"].shape, 3), 0.001)
+    quality[10:30, 2], sd[15:30, 2, 1] = 1, 0.006
+    sd[40:, 4] = 0.009
+    known = changed(changed(estimate, "tracks", observed=frames["p_WE"], observed_sd=sd), "frames", quality=quality)
+    camera = ArtifactData(known.kind, {**known.groups, "runs/walk/camera": Group({}, {"begun": 3})})
+    found = run_data(without(recording, "caps"), camera, "walk").quality
+    fault = found == 2
+    assert fault[:3].all() and not fault[3:, [0, 1, 3, 4, 5]].any()
+    assert np.flatnonzero(fault[3:, 2]).tolist() == list(range(12, 27))
+    assert (found[10:15, 2] == 1).all()
+    assert run_data(recording, known, "walk").quality == pytest.approx(quality)

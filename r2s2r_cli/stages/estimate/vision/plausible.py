@@ -35,7 +35,7 @@ def check_sizes(frames: Sequence[ImageFrame], robot: Robot, lens: Intrinsics, sc
             "the caps do not look as large as their depth says",
             where=f"{len(frames)} frames; depth_scale {scale:g} m, fx {lens.fx:g}",
             expected="discs of the radius of the caps in robot.toml",
-            received=f"{ratio:.2f} times that; with this focal length depth_scale would be {scale / ratio:.2g} m",
+            received=f"{ratio:.2f} times that; with this focal length {_unit(scale / ratio, 2)} would fit",
             hint=HINT,
         )
 
@@ -54,7 +54,7 @@ def check_lengths(lengths: Sequence[tuple[float, float]], lens: Intrinsics, scal
     ratio = float(np.median(found[:, 0]))
     off, way = abs(ratio - 1.0), "longer" if ratio > 1 else "shorter"
     spread = 1.4826 * float(np.median(np.abs(found[:, 0] - ratio))) / np.sqrt(len(found))
-    cure = f"depth_scale {scale / ratio:.4g} m or fx {lens.fx * ratio:.1f} would fit"
+    cure = f"{_unit(scale / ratio, 4)} or fx {lens.fx * ratio:.1f} would fit"
     if off > LENGTH_FAILS + 3 * spread:
         raise InputError(
             f"the rods look {100 * off:.1f} % {way} than they are",
@@ -66,6 +66,11 @@ def check_lengths(lengths: Sequence[tuple[float, float]], lens: Intrinsics, scal
     if off > LENGTH_WARNS + 3 * spread:
         return f"the rods look {100 * off:.1f} % {way} than in robot.toml; {cure}"
     return None
+
+
+def _unit(scale: float, digits: int) -> str:
+    """A unit of depth as messages and as the config.json of an imported folder have it."""
+    return f"depth_scale {scale:.{digits}g} m ({1 / scale:.0f} counts a metre in the config.json of a folder)"
 
 
 def _ratios(frame: ImageFrame, robot: Robot, lens: Intrinsics, scale: float) -> list[float]:

@@ -15,6 +15,7 @@ from r2s2r_cli.commands.calibrate import calibrate
 from r2s2r_cli.commands.compare import compare
 from r2s2r_cli.commands.diagnose import diagnose
 from r2s2r_cli.commands.doctor import doctor_app
+from r2s2r_cli.commands.effects import effects
 from r2s2r_cli.commands.estimate import estimate
 from r2s2r_cli.commands.execute import execute
 from r2s2r_cli.commands.export import export
@@ -48,6 +49,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "floor": floor,
     "simulate": simulate,
     "rig": rig,
+    "effects": effects,
     "status": status,
     "inspect": inspect,
     "validate": validate,

@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Sequence
 
 from r2s2r_cli.errors import UsageError
+from r2s2r_cli.stages.effects import effect_of
 from r2s2r_cli.stages.identify.free.base import Free
 from r2s2r_cli.stages.identify.free.entry import Entry
 from r2s2r_cli.stages.identify.free.mechanics import cable_entries, motor_entries, rod_entries
@@ -41,16 +42,8 @@ def own_entries(robot: Robot) -> dict[str, Entry]:
 
 def require_effects(effects: Sequence[str]) -> None:
     """Raises UsageError for an effect that is not in the catalogue of effects."""
-    from r2s2r_cli.effects import known_effects
-
-    known = [effect.name for effect in known_effects()]
     for name in effects:
-        if name not in known:
-            near = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
-            raise UsageError(
-                f"unknown effect {name!r}", where="--with-effect", expected=", ".join(known), received=name,
-                hint=f"r2s2r identify --with-effect {near}",
-            )  # fmt: skip
+        effect_of(name, where="--with-effect", command="r2s2r identify --with-effect")
 
 
 def unknown(name: str, known: Sequence[str], option: str = "--free") -> UsageError:

@@ -53,7 +53,8 @@ class Mapping:
         Raises UsageError for unknown names and for numbers that contradict each other, InputError for a fixed value
         out of its bounds or a robot that cannot be simulated.
         """
-        from r2s2r_cli.effects import known_effects, with_off_values
+        from r2s2r_cli.effects import with_off_values
+        from r2s2r_cli.stages.effects import all_effects
         from r2s2r_cli.stages.model import parameters_of, structure_of
 
         require_effects(effects)
@@ -75,7 +76,7 @@ class Mapping:
         wanted = {*effects, *(entry.effect for entry in used)} - {effect.name for effect in base.effects}
         laws = {entry.law for entry in used}
         base = replace(base, lag=base.lag or "lag" in laws, droop=base.droop or "droop" in laws)
-        self.structure: Structure = base.with_effects(*(effect for effect in known_effects() if effect.name in wanted))
+        self.structure: Structure = base.with_effects(*(effect for effect in all_effects() if effect.name in wanted))
         self._own = with_off_values(self.structure, parameters_of(robot))
         # The catalogue has the whole before its parts, so that what is set last is the more special one.
         self._order = sorted((*self.names, *self.fixed), key=list(known).index)

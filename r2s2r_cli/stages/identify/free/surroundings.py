@@ -86,12 +86,12 @@ def pid_entries(robot: Robot) -> list[Entry]:
 
 def effect_entries(robot: Robot) -> list[Entry]:
     """Every number of every effect: EFFECT.PARAMETER for all its elements, EFFECT.PARAMETER.K for one."""
-    from r2s2r_cli.effects import known_effects
+    from r2s2r_cli.stages.effects import all_effects
     from r2s2r_cli.stages.model import structure_of
 
     structure = structure_of(robot)
     found = []
-    for effect in known_effects():
+    for effect in all_effects():
         for own in (one for one in effect.own if one.fitted):
             family, count = f"{effect.name}.{own.name}", own.count(structure)
             start = inside(own.off, own.lower, own.upper, own.scale)

@@ -1,0 +1,35 @@
+"""The effects that are known here, for whoever shows or uses them by name."""
+
+from __future__ import annotations
+
+import difflib
+from typing import TYPE_CHECKING
+
+from r2s2r_cli.errors import InputError, UsageError
+
+if TYPE_CHECKING:
+    from r2s2r_cli.effects import Effect
+
+
+def all_effects() -> tuple[Effect, ...]:
+    """The catalogue and the effects of installed packages. Raises InputError for a package whose effect is none."""
+    from r2s2r_cli.effects import known_effects
+    from r2s2r_cli.engine import EngineInputError
+
+    try:
+        return known_effects()
+    except EngineInputError as error:
+        raise InputError(
+            error.what, where=error.field, expected=error.expected, received=error.received,
+            hint="pip uninstall PACKAGE   # the one that brings this effect, or mend it (docs/how-to-extend.md)",
+        ) from error  # fmt: skip
+
+
+def effect_of(name: str, *, where: str, command: str) -> Effect:
+    """The effect of that id. Raises UsageError for an unknown one, with the nearest in a command to paste."""
+    found = {effect.name: effect for effect in all_effects()}
+    if name not in found:
+        near = difflib.get_close_matches(name, found, n=1, cutoff=0.0)[0]
+        raise UsageError(f"unknown effect {name!r}", where=where, expected=", ".join(found), received=name,
+                         hint=f"{command} {near}")  # fmt: skip
+    return found[name]

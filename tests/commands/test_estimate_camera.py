@@ -58,3 +58,14 @@ def test_a_folder_of_pictures_becomes_states(tmp_path: Path) -> None:
     apart = [np.linalg.norm(p[:, :, None] - p[:, None], axis=-1) for p in (frames["p_WE"], true)]
     assert np.abs(apart[0] - apart[1]).mean() < 0.003
     assert invoke("validate", "--project", str(project)).exit_code == 0
+
+
+def test_hints_name_the_recording_that_was_read() -> None:
+    """The stage knows no paths; its hints do in the end, and can be pasted in the project."""
+    from r2s2r_cli.commands.estimate import _hints_name
+    from r2s2r_cli.errors import InputError
+
+    source = "iterations/003/50-execute.h5"
+    with pytest.raises(InputError) as caught, _hints_name(source):
+        raise InputError("no", hint="r2s2r doctor camera --camera replay:10-record.h5")
+    assert caught.value.hint == f"r2s2r doctor camera --camera replay:{source}"

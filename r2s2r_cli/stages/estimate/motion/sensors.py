@@ -8,7 +8,6 @@ import numpy as np
 
 from r2s2r_cli.stages.estimate.motion.data import Readings
 
-
 LATE_S = 0.03
 """[s] By which a sensor may be late besides its usual delay: 10 ms, which ten neighbouring frames have in common. A
 sensor follows its cable as a lag does, not as a clock that is late, and no two are alike."""
@@ -32,7 +31,7 @@ class Binned:
 
 
 def sample_variance(samples: np.ndarray, noise: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """Of means of so many samples (frame, sensor) with `noise` (sensor,) [m], of lengths that change by `rate` [m/s]."""
+    """Of means of so many samples (frame, sensor) with `noise` (sensor,) [m]; lengths change by `rate` [m/s]."""
     return np.asarray(noise**2 / np.maximum(samples, 1) + (LATE_S * rate) ** 2)
 
 

@@ -1,0 +1,75 @@
+"""Settings that contradict the data are named plainly, stop the verdict, and are not seen where there are none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.stages.diagnose.evidence import Run
+from r2s2r_cli.stages.diagnose.parity import parity
+from r2s2r_cli.stages.diagnose.parity.mismatch import mismatches
+from tests.support.engine import threebar
+from tests.support.parity_log import SPEED, evidence_of, swaying, with_caps, wound
+
+
+def _runs() -> tuple[Run, ...]:
+    return tuple(swaying(f"g{k}", k) for k in range(2))
+
+
+def _caps(order: list[int]) -> Callable[[Run], Run]:
+    return lambda run: with_caps(run, observed=run.caps.observed[:, order], p_WE=run.caps.p_WE[:, order])
+
+
+def _control(by: Callable[[np.ndarray], np.ndarray]) -> Callable[[Run], Run]:
+    return lambda run: with_caps(run, control=by(run.caps.control))
+
+
+def _sensors(by: Callable[[np.ndarray], np.ndarray]) -> Callable[[Run], Run]:
+    def changed(run: Run) -> Run:
+        assert run.lengths is not None
+        return replace(run, lengths=replace(run.lengths, length=by(run.lengths.length)))
+
+    return changed
+
+
+CASES = {
+    "caps 0 and 1 are exchanged": ("order", _caps([1, 0, 2, 3, 4, 5])),
+    "caps 1 and 2 are exchanged": ("order", _caps([0, 2, 1, 3, 4, 5])),
+    "caps 0, 1, 2 and 3 are exchanged": ("order", _caps([2, 3, 0, 1, 4, 5])),
+    "motors 2 and 3 are exchanged": ("order", _control(lambda u: u[:, [0, 1, 3, 2, 4, 5]])),
+    "sensors 6 and 8 are exchanged": ("order", _sensors(lambda x: x[:, [0, 1, 2, 3, 4, 5, 8, 7, 6]])),
+    "motor 4 winds the wrong way": ("sign", _control(lambda u: u * np.array([1, 1, 1, 1, -1, 1]))),
+    "all motors wind the wrong way": ("sign", _control(lambda u: -u)),
+    "in millimetres": ("unit", lambda run: with_caps(run, observed=1e3 * run.caps.observed, p_WE=1e3 * run.caps.p_WE)),
+    "sensors read millimetres": ("unit", _sensors(lambda x: 1e3 * x)),
+    "go up to 100": ("gain", _control(lambda u: 100 * u / np.abs(u).max())),
+}
+
+
+@pytest.mark.parametrize("words", CASES)
+def test_each_mismatch_is_named(words: str) -> None:
+    """Exchanged caps, motors and sensors, wrong signs, units and gains: named, and no physics beside them."""
+    kind, change = CASES[words]
+    found = parity(evidence_of(tuple(change(run) for run in _runs())))
+    assert [one.kind for one in found.mismatches] == [kind]
+    assert words in found.mismatches[0].what
+    assert found.mismatches[0].hint.startswith("r2s2r ")
+    assert not found.findings
+
+
+def test_a_wrong_speed_of_all_winches_is_a_setting() -> None:
+    """robot.toml with motors twice as fast as they are."""
+    runs = [wound(f"g{k}", k, lambda u, h: np.cumsum(SPEED * h * u, axis=0)) for k in range(2)]
+    found, _ = mismatches(runs, threebar(), 2 * SPEED)
+    assert [one.kind for one in found] == ["rate"]
+    assert "0.5 times" in found[0].what
+    assert mismatches(runs, threebar(), SPEED)[0] == []
+
+
+def test_nothing_wrong_names_nothing() -> None:
+    """No setting is doubted where all are right, for six logs."""
+    for seed in range(6):
+        assert mismatches([swaying("g", 20 + seed)], threebar(), SPEED)[0] == []

@@ -1,0 +1,90 @@
+"""False discoveries are as rare as promised, findings of healthy logs too; and poor evidence gives what it can."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.stages.diagnose.parity import parity
+from r2s2r_cli.stages.diagnose.parity.finding import discoveries
+from r2s2r_cli.stages.diagnose.parity.series import Measured, combined, regression
+from tests.support.parity_log import evidence_of, swaying, with_caps
+
+
+def test_false_discoveries_stay_below_the_level() -> None:
+    """50 tests, 10 of them of something, 2000 times: the mean share of false among the discoveries is at most 5 %
+    (three standard errors), and of nothing at all it is the chance of any discovery."""
+    rng = np.random.default_rng(0)
+    shares, found = [], 0
+    for _ in range(2000):
+        p = rng.random(50)
+        p[:10] = rng.random(10) * 1e-3
+        kept = discoveries(p, 0.05)
+        shares.append(kept[10:].sum() / max(kept.sum(), 1))
+        found += kept[:10].sum()
+    assert np.mean(shares) < 0.05 + 3 * np.std(shares) / np.sqrt(2000)
+    assert found > 0.9 * 2000 * 10
+    none = np.mean([discoveries(rng.random(50), 0.05).any() for _ in range(2000)])
+    assert none < 0.05 + 3 * np.sqrt(0.05 * 0.95 / 2000)
+
+
+def test_nan_is_never_a_discovery() -> None:
+    """What could not be tested does not count, not even as a test."""
+    assert discoveries(np.array([np.nan, 0.04, np.nan]), 0.05).tolist() == [False, True, False]
+    assert not discoveries(np.zeros(0), 0.05).any()
+
+
+@pytest.mark.slow
+def test_healthy_logs_have_few_findings() -> None:
+    """Ten sets with nothing wrong: at most two have any significant finding."""
+    loud = [
+        bool(parity(evidence_of(tuple(swaying(f"g{k}", 100 * seed + k) for k in range(3)),
+                                tuple(swaying(f"c{k}", 100 * seed + 50 + k) for k in range(2)))).significant)
+        for seed in range(1, 11)
+    ]  # fmt: skip
+    assert sum(loud) <= 2
+
+
+def test_clusters_widen_the_error() -> None:
+    """A mean of 20 groups with an error of their own each: the stated error is that of the groups, not of the rows."""
+    rng = np.random.default_rng(3)
+    found, said = [], []
+    for _ in range(60):
+        group = np.repeat(np.arange(20), 30)
+        y = rng.standard_normal(20)[group] + 0.1 * rng.standard_normal(600)
+        beta, cov = regression(y, np.ones((600, 1)), group)
+        found.append(beta[0])
+        said.append(np.sqrt(cov[0, 0]))
+    assert 0.7 < np.std(found) / np.mean(said) < 1.4
+
+
+def test_measurements_that_disagree_are_less_sure() -> None:
+    """Two numbers five errors apart: the mean between them, and an error that says so."""
+    one = combined([Measured(0.0, 1.0), Measured(7.0, 1.0)])
+    assert one.value == 3.5
+    assert one.sd > 3.0
+    assert np.isnan(combined([Measured(np.nan, 1.0)]).value)
+
+
+def test_one_run_without_lengths_and_healthy_runs_says_what_is_missing() -> None:
+    """What is there is used: rods are measured; sensors and healthy runs are named as missing."""
+    found = parity(evidence_of((replace(swaying("g", 1), lengths=None),)))
+    assert found.of("camera_scale")
+    assert not found.of("sensor_bias")
+    assert not found.differential
+    said = " ".join(found.missing)
+    assert "no sensor was logged" in said
+    assert "healthy runs" in said
+
+
+def test_caps_that_were_lost_half_of_the_time_are_counted() -> None:
+    """Every second frame of two caps marked as an outlier: a sixth of all is missing, and the lengths are those of the
+    rest."""
+    run = swaying("g", 1)
+    quality = run.caps.quality.copy()
+    quality[::2, :2] = 2
+    found = parity(evidence_of((with_caps(run, quality=quality),)))
+    assert abs(found.of("dropout")[0].value - 1 / 6) < 0.01
+    assert next(iter(found.suspected())) == "dropout"

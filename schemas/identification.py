@@ -205,9 +205,10 @@ SENSING = GroupSpec(
     description="what the robot's controller reads, measured where it saw cables arrive in the training intervals: simulations with "
     "the controller in the loop read the same",
     attributes=(
-        AttributeSpec(name="camera_delay", type="float", unit="s", description="a frame stamped t shows what the controller read so much earlier"),
+        AttributeSpec(name="camera_delay", type="float", unit="s", description="a frame stamped t shows what the controller read so much earlier (below 0: later)"),
         AttributeSpec(name="command_delay", type="float", unit="s", description="how late its commands reach the winches"),
         AttributeSpec(name="arrivals", type="int", description="of cables at their targets, on which it rests"),
+        AttributeSpec(name="by_camera", type="bool", description="the camera showed how the sensors err (runs/RUN/sensor_fit of the estimate); else the arrivals did"),
     ),
     datasets=(
         column("bias", "float64", ("actuated",), "m", "reading minus distance of the cap centres, sensor of each winched cable"),

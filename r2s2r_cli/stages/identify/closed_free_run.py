@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.stages.identify.closed_clock import link_between, switches
-from r2s2r_cli.stages.identify.closed_sensing import Sensing, measured_sensing
+from r2s2r_cli.stages.identify.closed_sensing import Sensing, measured_sensing, seen_by_camera
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
@@ -76,7 +76,8 @@ def loop_of(
     """What the controller reads, and how late its commands reach the winches [s].
 
     Command replay knows how late a command is seen to act, and that is kept: what is measured says which part of it is
-    before the camera.
+    before the camera. Where a camera looked at the sensors, it says better how they err, and how late they read: what
+    the controller does is late by that and by what a command takes, whatever the camera's clock shows.
     """
     mapping = predictor.mapping
     seen = mapping.observation(values)
@@ -85,6 +86,11 @@ def loop_of(
     if given & set(OF_THE_LOOP):
         return Sensing(seen.camera_delay, np.zeros(len(mapping.robot.actuated))), seen.command_delay
     sensing = measured_sensing(mapping.robot, runs, train, camera_delay=seen.camera_delay, most=total)
+    bias, behind = seen_by_camera(mapping.robot, runs, train)
+    if np.isfinite(bias).any():
+        sensing = replace(sensing, bias=np.where(np.isfinite(bias), bias, sensing.bias), by_camera=True)
+    if behind is not None:
+        return replace(sensing, camera_delay=-behind), max(total + behind, 0.0)
     return sensing, max(total - sensing.camera_delay, 0.0)
 
 

@@ -33,12 +33,14 @@ RUNNING = 0.5
 @dataclass(frozen=True)
 class Sensing:
     """camera_delay: a frame stamped t shows what the controller read at t - camera_delay [s]. bias: reading minus
-    distance of the cap centres [m], (actuated,). arrivals: what it rests on; 0: nothing was measured, as given.
+    distance of the cap centres [m], (actuated,). arrivals: what it rests on; 0: nothing was measured, as given, unless
+    by_camera: the camera saw the sensors err.
     """
 
     camera_delay: float
     bias: np.ndarray
     arrivals: int = 0
+    by_camera: bool = False
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,27 @@ def measured_sensing(
             best = cost, float(delay), bias
     assert best is not None  # noqa: S101 - 0 is always tried
     return Sensing(best[1], best[2], len(seen))
+
+
+def seen_by_camera(
+    robot: Robot, runs: Sequence[RunData], train: Sequence[Selection]
+) -> tuple[np.ndarray, float | None]:
+    """Errors of the sensors of the winched cables as the camera showed them in the runs that are trained on: mean over
+    those runs [m], (actuated,), NaN where none says it; and how late they read, by the clock of the frames [s], None
+    where none says it. Nothing rests on the moments at which cables arrived, of which there are few."""
+    named = {one.run for one in train}
+    mine = [run for run in runs if run.name in named]
+    of_cable = {sensor.cable: i for i, sensor in enumerate(robot.sensors)}
+    errors = np.full((len(mine), len(robot.actuated)), np.nan)
+    for row, run in enumerate(mine):
+        if run.sensor_bias is not None:
+            for k, cable in enumerate(robot.actuated):
+                if cable in of_cable:
+                    errors[row, k] = run.sensor_bias[of_cable[cable]]
+    known = np.isfinite(errors)
+    mean = np.where(known, errors, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    late = [run.sensor_delay for run in mine if run.sensor_delay is not None]
+    return np.where(known.any(axis=0), mean, np.nan), float(np.mean(late)) if late else None
 
 
 def arrivals(robot: Robot, runs: Sequence[RunData], train: Sequence[Selection]) -> list[Arrival]:

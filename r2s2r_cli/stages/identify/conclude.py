@@ -84,7 +84,7 @@ def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:
         free_runs=judged.free_runs, closed_loop_m=judged.closed_loop_m,
         covariance=widened(sure.spread.covariance, len(fixed)), information=made.before, trace=made.trace,
         starts=made.starts, profiles=profiles, windows=start_shifts(fit), updates=made.updates, p_RS=judged.p_RS,
-        sensing=sensing if sensing.arrivals else None, command_delay=late,
+        sensing=sensing if sensing.arrivals or sensing.by_camera else None, command_delay=late,
         uncertainty=sure.spread.how, natures=task.natures, computed_by_torch=not predictor.native,
         warnings=(*warnings, *judged.warnings),
     )  # fmt: skip

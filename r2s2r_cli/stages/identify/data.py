@@ -18,7 +18,9 @@ class RunData:
     know later frames, so no test segment may start from them. quality: codes of schemas/estimate.py, (frame, cap).
     t_command: (row,) [s]; control, target: (row, actuated), a row holds until the next. intervals, segments: of the
     design. sampled: the rows are what the frames found in force, not the commands as they were sent. nature: what the
-    recording is, in words, empty where it does not say.
+    recording is, in words, empty where it does not say. sensor_bias: reading minus length of every cable sensor, mean
+    over the run as the camera shows it [m], (sensor,), NaN: dead; sensor_delay: how late they read [s], by the clock of
+    the frames, None: not known. Both None where no camera looked.
     """
 
     name: str
@@ -37,6 +39,8 @@ class RunData:
     segments: Segments
     sampled: bool = False
     nature: str = ""
+    sensor_bias: np.ndarray | None = None
+    sensor_delay: float | None = None
 
 
 @dataclass(frozen=True)

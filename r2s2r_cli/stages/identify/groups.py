@@ -53,7 +53,7 @@ def _sensing(found: Found) -> Group | None:
         return None
     facts: dict[str, Scalar] = {
         "camera_delay": float(found.sensing.camera_delay), "command_delay": float(found.command_delay),
-        "arrivals": int(found.sensing.arrivals),
+        "arrivals": int(found.sensing.arrivals), "by_camera": found.sensing.by_camera,
     }  # fmt: skip
     return Group({"bias": found.sensing.bias}, facts)
 

@@ -43,6 +43,7 @@ def run_data(recording: ArtifactData | None, estimate: ArtifactData, run: str, *
             received="no interval", hint="r2s2r import run.csv   # with columns target0, target1, ...",
         )  # fmt: skip
     caps = None if recording is None else recording.group(run, "caps")
+    bias, delay = _sensors(estimate.group(run, "sensor_fit"))
     found = RunData(
         name=name or run,
         t=frames["t"],
@@ -62,6 +63,8 @@ def run_data(recording: ArtifactData | None, estimate: ArtifactData, run: str, *
         segments=Segments.from_group(_group(estimate, run, "segments")),
         sampled=caps is not None and bool(np.isin(commands["t"], caps["t"]).all()),
         nature=str(estimate.groups[f"runs/{run}"].attributes.get("nature", "")),
+        sensor_bias=bias,
+        sensor_delay=delay,
     )
     _require_finite(found, run)
     _require_rows(found, run)
@@ -96,6 +99,14 @@ def _group(data: ArtifactData, run: str, stream: str) -> Group:
             hint="r2s2r import run.csv   # a log with end caps, targets and controls",
         )  # fmt: skip
     return group
+
+
+def _sensors(fit: Group | None) -> tuple[np.ndarray | None, float | None]:
+    """Errors of the sensors, mean over the run [m], (sensor,), and how late they read [s]."""
+    if fit is None or not len(fit["bias"]):
+        return None, None
+    bias = np.where(fit["dead"], np.nan, fit["bias"].mean(axis=0))
+    return bias, float(fit.attributes["delay"]) if fit.attributes["delay_known"] else None
 
 
 def _as_known(frames: Group, tracks: Group) -> np.ndarray:

@@ -11,9 +11,9 @@ import torch
 
 from r2s2r_cli.stages.identify.closed_clock import link_between, switches
 from r2s2r_cli.stages.identify.closed_fit import fit_closed
-from r2s2r_cli.stages.identify.closed_free_run import closed_free_run
+from r2s2r_cli.stages.identify.closed_free_run import closed_free_run, loop_of
 from r2s2r_cli.stages.identify.closed_residuals import WIDTHS, ClosedResiduals
-from r2s2r_cli.stages.identify.closed_sensing import measured_sensing
+from r2s2r_cli.stages.identify.closed_sensing import measured_sensing, seen_by_camera
 from r2s2r_cli.stages.identify.closed_surface import Surface
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.identify.predict import Predictor
@@ -138,6 +138,27 @@ def test_what_the_sensors_read_is_measured() -> None:
     found = measured_sensing(threebar(), [run], (Selection("crawl", (1, 2, 3)),), camera_delay=0.0, most=0.2)
     assert found.arrivals >= 8 and found.camera_delay == pytest.approx(0.08, abs=0.04)
     assert found.bias == pytest.approx(np.full(6, 8e-3), abs=3e-3)
+
+
+def test_what_the_camera_says_of_the_sensors_comes_first() -> None:
+    """Errors are the mean over the runs that are trained on, NaN where a sensor is dead in all; the loop is late by what
+    a command takes and by what the sensors are behind."""
+    run = crawl(2, values=LATE)
+    shown = np.array([1.0, 2, 3, 4, np.nan, 6, 7, 8, 9]) * 1e-3
+    runs = [
+        replace(run, sensor_bias=shown, sensor_delay=0.03),
+        replace(run, name="again", sensor_bias=shown + 2e-3, sensor_delay=None),
+        replace(run, name="other", sensor_bias=shown + 1.0, sensor_delay=9.0),
+    ]
+    train = (Selection("crawl", (1,)), Selection("again", (1,)))
+    bias, behind = seen_by_camera(threebar(), runs, train)
+    assert bias == pytest.approx(np.array([2.0, 3, 4, 5, np.nan, 7]) * 1e-3, nan_ok=True)
+    assert behind == pytest.approx(0.03)
+    assert np.isnan(seen_by_camera(threebar(), [run], TRAIN[:1])[0]).all()
+    predictor = predictor_of("command_delay=0.12,0..0.5")
+    sensing, late = loop_of(runs, train, predictor, values_at(predictor, command_delay=0.12))
+    assert late == pytest.approx(0.15) and sensing.by_camera
+    assert sensing.bias[[0, 1, 2, 3, 5]] == pytest.approx(np.array([2.0, 3, 4, 5, 7]) * 1e-3)
 
 
 def test_too_few_arrivals_say_nothing() -> None:

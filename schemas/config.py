@@ -137,9 +137,9 @@ class DiagnoseSettings(Frozen):
 
     model_config = ConfigDict(use_attribute_docstrings=True)
 
-    step_s: Annotated[float, Field(strict=True, gt=0, le=0.01)] = 0.001
+    step_s: Annotated[float, Field(strict=True, gt=0, le=0.01)] = 0.002
     """Step of the engine [s]. Where cables are stiff it is divided further."""
-    members: Annotated[int, Field(strict=True, ge=16, le=1024)] = 32
+    members: Annotated[int, Field(strict=True, ge=16, le=1024)] = 16
     """Members of the ensemble that finds where every target interval starts."""
 
 

@@ -18,10 +18,13 @@ from r2s2r_cli.stages.diagnose.parity import Parity
 from r2s2r_cli.stages.diagnose.parity.finding import discoveries
 from r2s2r_cli.stages.diagnose.parity.parity import parity
 from r2s2r_cli.stages.diagnose.prepare import refit
+from r2s2r_cli.stages.diagnose.starts import Starts
+from r2s2r_cli.stages.diagnose.where import Where
+from r2s2r_cli.stages.diagnose.where.where import where
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration, calibration
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
-from r2s2r_cli.stages.diagnose.which.which import Compared, compare_effects
+from r2s2r_cli.stages.diagnose.which.which import Compared, Ways, compare_effects
 from r2s2r_cli.stages.identify.start import Filter
 
 FALSE = 0.05
@@ -35,15 +38,21 @@ Told = Callable[[str, int, int], None]
 class Settings:
     """How a diagnosis is made. effects: only these are considered; None: the whole catalogue. step [s]: of the engine.
     members: of the filter that makes start states. seed: of all that is drawn. with_parity, with_where, with_much: parts
-    that can be left out. calibration: None, that of the package."""
+    that can be left out. refit_baseline: nuisances are fitted again; held_out: scores are of gaits that were left out;
+    with_floor: the covariance has one; with_unknown: an error without a name is a rival (all four: what an ablation
+    switches off). calibration: None, that of the package."""
 
     effects: tuple[str, ...] | None = None
-    step: float = 1e-3
-    members: int = 32
+    step: float = 2e-3
+    members: int = 16
     seed: int = 0
     with_parity: bool = True
     with_where: bool = True
     with_much: bool = True
+    refit_baseline: bool = True
+    held_out: bool = True
+    with_floor: bool = True
+    with_unknown: bool = True
     calibration: Calibration | None = None
     library: GaitLibrary = field(default_factory=GaitLibrary)
 
@@ -82,26 +91,35 @@ def diagnose(
             first.what, where=first.kind, expected=first.expected, received=first.received, hint=first.hint
         )
     progress("parity", 1, 1)
-    belief = Filter(members=settings.members, seed=settings.seed)
+    starts = Starts(Filter(members=settings.members, seed=settings.seed))
     model = Model(evidence.model)
     replayer = Replayer(model, step=settings.step, cache_dir=cache_dir, threads=threads)
-    fitted = refit(evidence, replayer, belief=belief, told=progress, kept=kept, keep=_keeper(checkpoint, kept))
+    fitted = refit(evidence, replayer, starts=starts, told=progress, kept=kept, keep=_keeper(checkpoint, kept),
+        again=settings.refit_baseline, with_floor=settings.with_floor,
+    )  # fmt: skip
     compared = compare_effects(
         fitted.arena, fitted.base, floor_m=fitted.floor.rmse, calibration=settings.calibration or calibration(),
-        starts={} if said is None else said.starts(), suspected=() if said is None else tuple(said.suspected()),
-        effects=settings.effects, seed=settings.seed, told=progress, kept=kept, keep=_keeper(checkpoint, kept),
+        sizes={} if said is None else said.starts(), suspected=() if said is None else tuple(said.suspected()),
+        effects=settings.effects, seed=settings.seed, told=progress,
+        ways=Ways(settings.held_out, settings.with_unknown), kept=kept, keep=_keeper(checkpoint, kept),
     )  # fmt: skip
-    found = None
+    found: Where | None = None
+    if settings.with_where:
+        found = where(
+            evidence, compared.arena, compared.base.z, seed=settings.seed, cache_dir=cache_dir, threads=threads, told=progress
+        )
     shrunk = None
     if settings.with_much and evidence.judge:
-        shrunk = much(evidence, compared, floor_m=fitted.floor.rmse, belief=belief, seed=settings.seed, told=progress)
+        shrunk = much(evidence, compared, floor_m=fitted.floor.rmse, starts=starts, seed=settings.seed, told=progress)
     after = next_gait(evidence, compared, settings.library, told=progress)
     sd = compared.refit.sd
     return Diagnosis(
         robot=evidence.robot.name, floor=fitted.floor, parity=said, where=found, which=compared.which, much=shrunk,
         next_gait=after, refit={
             name: (float(value), float(sd[k]))
-            for k, (name, value) in enumerate(zip(compared.arena.names, compared.base.z, strict=True))
+            for k, (name, value) in enumerate(
+                zip(compared.arena.names[: compared.arena.shared], compared.base.z, strict=False)
+            )
         },
         segments=_segments(compared), within_run=evidence.within_run, rollouts=replayer.rollouts, warnings=(*fitted.warnings, *compared.which.warnings),
     )  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,10 +13,9 @@ from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
-from r2s2r_cli.stages.diagnose.which.robust import minus_log
 from r2s2r_cli.stages.diagnose.which.stretches import stretches
 from r2s2r_cli.stages.identify.data import Selection
-from r2s2r_cli.stages.identify.start import Filter, states_at
+from r2s2r_cli.stages.diagnose.starts import Starts
 from r2s2r_cli.stages.measures.floor import floor_of
 from r2s2r_cli.stages.measures.steps import steps_of
 
@@ -27,6 +26,11 @@ FLOORS = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.0, 4.0)
 NOISES = (1.0, 1.4, 2.0, 2.8)
 ROUNDS = 2
 """Times that start states are made anew with the refitted numbers."""
+NO_FLOOR_M = 1e-4
+FROZEN = 1e8
+"""Times its prior's precision that a nuisance has which is not fitted."""
+JACOBIANS = 2
+"""Times that derivatives are taken anew for one set of start states."""
 AGED = 0.5
 """Of a nuisance's own prior: how far it may have moved since the healthy runs."""
 
@@ -47,13 +51,14 @@ def refit(
     evidence: Evidence,
     replayer: Replayer,
     *,
-    belief: Filter,
+    starts: Starts,
     told: Told,
     kept: Mapping[str, Any] | None = None,
-    keep: Callable[[str, Any], None] = lambda name, value: None,
+    keep: Callable[[str, Any], None] = lambda name, value: None, again: bool = True, with_floor: bool = True,
 ) -> Refit:
     """The nominal model fitted again to the intervals of `fit`, its nuisances alone. kept, keep: nuisances that were
-    reached before an interruption, and where to keep them.
+    reached before an interruption, and where to keep them. again: False, they stay as they were, with_floor: False, the
+    simulator is taken to be perfect (ablations).
 
     With healthy runs these are fitted first: they say what the numbers were, how large the floor is and how wrong the
     stated noise. Raises NumericalError where nothing can be simulated, InputError where nothing is left to fit.
@@ -61,6 +66,7 @@ def refit(
     floor, warnings = floor_for(evidence)
     simulator = np.sqrt(max(floor.rmse**2 - floor.sensor**2, (0.25 * floor.rmse) ** 2))
     kept = kept or {}
+    simulator = simulator if with_floor else NO_FLOOR_M
     begin = prior = None
     noise = 1.0
     if evidence.healthy:
@@ -69,11 +75,11 @@ def refit(
             Selection(run.name, tuple(i + 1 for i, whole in enumerate(run.caps.intervals.complete.tolist()) if whole))
             for run in evidence.healthy
         )
-        arena, base = _fitted(evidence.healthy, part, replayer, simulator, 1.0, None, belief, _known(kept, "healthy"))
-        simulator, noise = _calibrated(arena, base)
+        arena, base = _fitted(evidence.healthy, part, replayer, simulator, 1.0, None, starts, _known(kept, "healthy"), rounds=2)
+        simulator, noise = _calibrated(arena, base) if with_floor else (simulator, noise)
         arena.whiten(floor_m=simulator, noise=noise)
         prior = _posterior(arena, base)
-        begin = base.z
+        begin = base.z[: arena.shared]
         keep("healthy", base.z.tolist())
         if evidence.floor is None:
             sensor = float(np.sqrt(np.mean([np.sum(one.noise[-1] ** 2, axis=-1).mean() for one in arena.many])))
@@ -82,8 +88,10 @@ def refit(
             rmse = float(np.sqrt(np.mean(np.sum(key**2, axis=-1))))
             floor = FloorGiven(rmse, min(sensor, rmse), "the healthy runs, refitted", True)
         told("healthy runs", 1, 1)
-    arena, base = _fitted(evidence.runs, evidence.fit, replayer, simulator, noise, prior, belief,
+    arena, base = _fitted(evidence.runs, evidence.fit, replayer, simulator, noise, prior, starts,
                           begin if "refit" not in kept else _known(kept, "refit"), told)  # fmt: skip
+    if not again:
+        arena, base = _frozen(arena, base, prior)
     keep("refit", base.z.tolist())
     return Refit(arena, base, floor, tuple(warnings))
 
@@ -123,20 +131,21 @@ def _sensor(runs: Sequence[Run]) -> float:
 
 def _fitted(
     runs: Sequence[Run], part: Sequence[Selection], replayer: Replayer, simulator: float, noise: float,
-    prior: tuple[np.ndarray, np.ndarray] | None, belief: Filter, begin: np.ndarray | None, told: Told | None = None,
+    prior: tuple[np.ndarray, np.ndarray] | None, starts: Starts, begin: np.ndarray | None, told: Told | None = None,
+    rounds: int = ROUNDS,
 ) -> tuple[Arena, Fit]:  # fmt: skip
     """Nuisances and start states in turns."""
     model = replayer.model
     named = {run.name: run for run in runs}
     last = {one.run: max(one.intervals) for one in part if one.intervals}
     z = begin
-    for number in range(ROUNDS):
+    for number in range(rounds):
         if told is not None:
-            told("refit", number, ROUNDS)
+            told("refit", number, rounds)
         values = model.values0.copy()
         if z is not None:
             values[list(model.nuisances)] = z[: len(model.nuisances)]
-        states = states_at([named[name].caps for name in last], replayer, values, last, belief=belief)
+        states = starts.at([named[name] for name in last], replayer, values, last)
         many = stretches(runs, part, states)
         if not many:
             raise InputError(
@@ -144,30 +153,53 @@ def _fitted(
                 expected="an interval without a tip-over", received="none", hint="r2s2r diagnose --also N",
             )  # fmt: skip
         arena = Arena(replayer, many, floor_m=simulator, noise=noise, prior=prior)
-        z = arena.mean.copy() if z is None or len(z) != len(arena.mean) else z
-        arena.prepare(z)
-        fits = Fits(arena)
-        residual = arena.residuals(arena.values(z[None]), z[None])[0]
-        base = fits.begin(Hypothesis(), z, np.zeros(0), residual)
-        fits.run([base])
-        z = base.z
+        z = _begun(arena, z)
+        for _ in range(JACOBIANS):
+            arena.prepare(z)
+            fits = Fits(arena)
+            residual = arena.residuals(arena.values(z[None]), z[None])[0]
+            base = fits.begin(Hypothesis(), z, np.zeros(0), residual)
+            fits.run([base])
+            z = base.z
     if told is not None:
-        told("refit", ROUNDS, ROUNDS)
+        told("refit", rounds, rounds)
     return arena, base
+
+
+def _frozen(arena: Arena, base: Fit, prior: tuple[np.ndarray, np.ndarray] | None) -> tuple[Arena, Fit]:
+    """The arena in which no nuisance can move from its prior."""
+    del base
+    z = arena.mean.copy() if prior is None else np.concatenate([prior[0], arena.mean[len(prior[0]) :]])
+    arena.mean, arena.precision = z, FROZEN * arena.precision
+    arena.prepare(z)
+    residual = arena.residuals(arena.values(z[None]), z[None])[0]
+    return arena, Fits(arena).begin(Hypothesis(), z, np.zeros(0), residual)
+
+
+def _begun(arena: Arena, z: np.ndarray | None) -> np.ndarray:
+    """Nuisances to begin with: those of before, as far as they are the same ones; else the prior's."""
+    found = arena.mean.copy()
+    if z is not None:
+        count = len(z) if len(z) == len(found) else arena.shared
+        found[:count] = z[:count]
+    return np.clip(found, arena.lower, arena.upper)
 
 
 def _calibrated(arena: Arena, base: Fit) -> tuple[float, float]:
     """Floor [m] and factor on the noise under which healthy residuals are most likely."""
     own = arena.floor_m
-    values = arena.values(base.z[None])
-    found: dict[tuple[float, float], float] = {}
-    for factor in FLOORS:
-        for noise in NOISES:
-            arena.whiten(floor_m=factor * own, noise=noise)
-            squares = arena.squares(arena.residuals(values, base.z[None]))[0]
-            density = -minus_log(squares, arena.sizes) - 0.5 * np.array([white.logdet for white in arena.white])
-            found[factor * own, noise] = float(density.sum())
-    return max(found, key=lambda one: found[one])
+    raw = arena.raw(arena.values(base.z[None]), base.z[None])
+
+    def best(pairs: Iterable[tuple[float, float]]) -> tuple[float, float]:
+        found = {}
+        for floor, noise in pairs:
+            arena.whiten(floor_m=floor, noise=noise)
+            found[floor, noise] = arena.log_density(raw)
+        return max(found, key=lambda one: found[one])
+
+    floor, noise = best((factor * own, 1.0) for factor in FLOORS)
+    floor, noise = best((floor, noise) for noise in NOISES)
+    return best((factor * floor, noise) for factor in (0.6, 0.8, 1.0)) if noise > 1 else (floor, noise)
 
 
 def _posterior(arena: Arena, base: Fit) -> tuple[np.ndarray, np.ndarray]:
@@ -177,5 +209,6 @@ def _posterior(arena: Arena, base: Fit) -> tuple[np.ndarray, np.ndarray]:
         base.hypothesis, base.z, base.x, arena.residuals(arena.values(base.z[None]), base.z[None])[0]
     )  # fmt: skip
     H, _ = fits.normal(again)
-    aged = AGED**2 * np.diag(1.0 / np.diag(arena.precision))
-    return base.z, np.linalg.inv(np.linalg.inv(H) + aged)
+    n = arena.shared
+    aged = AGED**2 * np.diag(1.0 / np.diag(arena.precision)[:n])
+    return base.z[:n], np.linalg.inv(np.linalg.inv(H)[:n, :n] + aged)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +40,15 @@ def diagnose_report(found: Diagnosis) -> DiagnoseReport:
         hidden=tuple(shift.words for shift in which.shifts), parity=_parity(found), missing=_missing(found),
         refit=found.refit, rollouts=found.rollouts, within_run=found.within_run, warnings=found.warnings,
     )  # fmt: skip
+
+
+def document(found: Diagnosis) -> dict[str, Any]:
+    """design.md section 5 as JSON values, and what else a score needs."""
+    told = diagnose_report(found).model_dump(mode="json")
+    names = ("verdict", "effects", "probability", "set90", "ranking", "where", "shrinkage", "not_testable", "confusable",
+             "next_gait", "sentence", "floor_m", "refit_rmse_m", "refit_upper_m", "chance_nats", "calibrated", "rollouts")  # fmt: skip
+    return {**{name: told[name] for name in names}, "unexplained": _finite(found.which.unexplained, -1e9),
+            "wider": found.which.wider}  # fmt: skip
 
 
 def element_of(found: Diagnosis) -> Element | None:

@@ -9,18 +9,19 @@ import numpy as np
 from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.diagnose.evidence import Evidence
 from r2s2r_cli.stages.diagnose.much.blackbox import corrected
+from r2s2r_cli.stages.diagnose.starts import Starts
 from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, share_with_interval
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
-from r2s2r_cli.stages.diagnose.which.stretches import stretches
+from r2s2r_cli.stages.diagnose.which.score import Score
+from r2s2r_cli.stages.diagnose.which.stretches import Stretch, stretches
 from r2s2r_cli.stages.diagnose.which.which import Compared
-from r2s2r_cli.stages.identify.start import Filter, states_at
 
 Told = Callable[[str, int, int], None]
 
 
 def much(
-    evidence: Evidence, compared: Compared, *, floor_m: float, belief: Filter, seed: int = 0, told: Told
+    evidence: Evidence, compared: Compared, *, floor_m: float, starts: Starts, seed: int = 0, told: Told
 ) -> Shrinkage | None:
     """Of the effect that was named, else of the best one; None where nothing was fitted.
 
@@ -29,7 +30,7 @@ def much(
     """
     fit, score = _chosen(compared)
     refit = compared.refit
-    if fit is None:
+    if fit is None or score is None:
         return None
     runs = [one.run for one in compared.arena.many]
     predicted, spread = share_with_interval(refit.squared, score.squared, floor_m, groups=runs, seed=seed)
@@ -47,7 +48,7 @@ def much(
     for done, (name, (values, z)) in enumerate(models.items()):
         told("judged", done, len(models))
         try:
-            errors, judged = _judged(evidence, arena, values[0], z, belief)
+            errors, judged = _judged(evidence, arena, values[0], z, starts)
         except NumericalError as error:
             missing.append(f"{name}: {error.what}")
             continue
@@ -68,7 +69,7 @@ def much(
     )  # fmt: skip
 
 
-def _chosen(compared: Compared) -> tuple[Fit | None, object]:
+def _chosen(compared: Compared) -> tuple[Fit | None, Score | None]:
     """The fit of what was committed to, else the best one."""
     wanted = set(compared.which.effects)
     for fit, score in zip(compared.fits, compared.scores, strict=True):
@@ -78,16 +79,17 @@ def _chosen(compared: Compared) -> tuple[Fit | None, object]:
 
 
 def _judged(
-    evidence: Evidence, arena: Arena, values: np.ndarray, z: np.ndarray, belief: Filter
-) -> tuple[np.ndarray, tuple]:  # type: ignore[type-arg]
+    evidence: Evidence, arena: Arena, values: np.ndarray, z: np.ndarray, starts: Starts
+) -> tuple[np.ndarray, tuple[Stretch, ...]]:
     """Errors (segment, cap, 3) [m] at the key frames of the judged intervals, and the intervals."""
     runs = evidence.only(evidence.judge)
     last = {one.run: max(one.intervals) for one in evidence.judge}
-    states = states_at([run.caps for run in runs], arena.replayer, values, last, belief=belief)
+    states = starts.at(runs, arena.replayer, values, last)
     many = stretches(runs, evidence.judge, states, whole=True)
     if not many:
         raise NumericalError("no judged interval can be simulated", where="judge", expected="an interval",
                              received="none", hint="r2s2r identify --test RUN:8-11")  # fmt: skip
     own = Arena(arena.replayer, many, floor_m=arena.floor_m)
-    shifts = z if len(own.names) == len(arena.names) else z[: len(own.names)]
+    shifts = own.mean.copy()
+    shifts[: own.shared] = z[: own.shared]
     return own.ends(values[None], shifts[None])[0], many

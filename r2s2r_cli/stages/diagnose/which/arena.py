@@ -21,9 +21,15 @@ CAMERA = (("camera_height", "m", 2e-3), ("camera_tilt_x", "rad", 5e-3), ("camera
 where a stretch starts."""
 SENSOR_SD = 3e-3
 """[m] What a length sensor is off by, the same all the time, before anything is called an effect."""
+SECANT = 0.3
+"""Of a nuisance's prior sd, to both sides: over what its derivative is taken."""
+TRIMMED = 0.85
+"""Share of the stretches that the size of the floor is learned from."""
 ABSENT = 1e3
 """[m] Sd of a reading that is not there."""
-START = StartSpread(position=3e-3, tilt=0.015, roll=0.08, rest=4e-3)
+REST_SD = 5e-3
+"""[m] What the rest length of a winched cable is off by throughout a run: nobody sees it, and the filter hardly."""
+START = StartSpread(position=3e-3, tilt=0.015, roll=0.08, rest=3e-3)
 """Of the offsets that are free (`Replayer.moved`)."""
 
 
@@ -55,21 +61,32 @@ class Arena:
         self.floor_m, self.noise = floor_m, noise
         self.sensors = next((one.sensors for one in many if one.length is not None), ())
         self.engine = list(self.model.nuisances)
-        self.names = (
+        self.runs = tuple(dict.fromkeys(one.run for one in many))
+        winched = self.model.robot.actuated
+        shared = (
             *(self.model.names[k] for k in self.engine), *(name for name, _, _ in CAMERA),
             *(f"sensor_bias_{k}" for k in self.sensors),
         )  # fmt: skip
+        self.shared = len(shared)
+        """How many nuisances are the same in every run; the others are the rest lengths that runs began with."""
+        self.names = (*shared, *(f"rest_{run}_{cable}" for run in self.runs for cable in winched))
         own = [self.model.numbers[k] for k in self.engine]
-        sd = np.array([n.sd for n in own] + [sd for _, _, sd in CAMERA] + [SENSOR_SD] * len(self.sensors))
-        self.lower = np.concatenate([[n.lower for n in own], np.full(len(sd) - len(own), -np.inf)])
-        self.upper = np.concatenate([[n.upper for n in own], np.full(len(sd) - len(own), np.inf)])
+        sd = np.array([n.sd for n in own] + [sd for _, _, sd in CAMERA] + [SENSOR_SD] * len(self.sensors)
+                      + [REST_SD] * (len(self.runs) * len(winched)))  # fmt: skip
+        low, high = np.array([n.within for n in own]).T
+        self.lower = np.concatenate([low, np.full(len(sd) - len(own), -np.inf)])
+        self.upper = np.concatenate([high, np.full(len(sd) - len(own), np.inf)])
         own_mean = np.concatenate([self.model.values0[self.engine], np.zeros(len(sd) - len(own))])
-        self.mean, self.precision = (own_mean, np.diag(sd**-2.0)) if prior is None else prior
+        self.mean, self.precision = own_mean, np.diag(sd**-2.0)
+        if prior is not None:
+            n = self.shared
+            self.mean[:n], self.precision[:n, :n] = prior
         self.gaits = tuple(dict.fromkeys(one.gait for one in many))
         self.gait = np.array([self.gaits.index(one.gait) for one in many])
         self.white: list[White] = []
         self.by_nuisance = np.zeros((0, 0))
-        self._shifts = [self._shift_columns(one) for one in many]
+        self._constant = [self._shift_columns(one) for one in many]
+        self._shifts = self._with_rest(None)
 
     def values(self, z: np.ndarray) -> np.ndarray:
         """Values (k, n) of the model at nuisances z (k, p + q), effects off."""
@@ -78,13 +95,21 @@ class Arena:
         return found
 
     def prepare(self, z: np.ndarray, *, floor_m: float | None = None, noise: float | None = None) -> None:
-        """Derivatives at nuisances z (p + q,), and with them what makes residuals white."""
+        """Derivatives at nuisances z (p + q,), and with them what makes residuals white: exact ones by the starts, and
+        secants by the nuisances, over a share of their prior: contacts make a derivative say little of a step."""
         seen = self.replayer.derivatives(self.many, self.values(z[None])[0])
-        assert seen.by_value is not None and seen.by_offset is not None  # noqa: S101
-        self._caps_by = [
-            (seen.by_value[seen.window == k], seen.by_offset[seen.window == k]) for k in range(len(self.many))
-        ]
+        assert seen.by_offset is not None  # noqa: S101 - it was asked for
+        self._by_offset = [seen.by_offset[seen.window == k] for k in range(len(self.many))]
         self._ends = [seen.p_WE[seen.window == k] for k in range(len(self.many))]
+        self._shifts = self._with_rest(self._by_offset)
+        p = len(self.engine)
+        by = SECANT * np.array([self.model.numbers[k].sd for k in self.engine])
+        low, high = np.maximum(z[:p] - by, self.lower[:p]), np.minimum(z[:p] + by, self.upper[:p])
+        points = np.repeat(z[None], 2 * p, axis=0)
+        points[np.arange(p), np.arange(p)], points[p + np.arange(p), np.arange(p)] = low, high
+        raw = self.raw(self.values(points), points)
+        width = (high - low)[:, None, None]
+        self._by_engine = [np.nan_to_num((one[p:] - one[:p]) / width, posinf=0.0, neginf=0.0) for one in raw]
         self.whiten(floor_m=floor_m, noise=noise)
 
     def whiten(self, *, floor_m: float | None = None, noise: float | None = None) -> None:
@@ -95,7 +120,7 @@ class Arena:
         self.white, columns, begin = [], [], 0
         for k, one in enumerate(self.many):
             roots, size = self._roots(one)
-            by_value, by_offset = (self._channels(k, d) for d in self._caps_by[k])
+            by_offset = self._channels(k, self._by_offset[k])
             white = White(
                 roots, np.zeros((0, 0)), np.zeros(0), slice(begin, begin + roots.shape[0] * roots.shape[1]), size
             )
@@ -104,7 +129,7 @@ class Arena:
             logdet = float(np.log1p(s**2).sum() - 2.0 * np.log(np.diagonal(roots, axis1=1, axis2=2)).sum())
             white = White(roots, U, 1.0 - 1.0 / np.sqrt(1.0 + s**2), white.rows, size, logdet)
             self.white.append(white)
-            own = np.concatenate([by_value, self._shifts[k]], axis=0)
+            own = np.concatenate([self._by_engine[k], self._shifts[k]], axis=0)
             columns.append(_whitened(white, own))
             begin = white.rows.stop
         self.by_nuisance = np.concatenate(columns, axis=1).T  # (M, p + q)
@@ -116,27 +141,42 @@ class Arena:
 
     def residuals(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
         """White residuals (k, M), simulated minus observed, at values (k, n) of the model, with the shifts of z."""
+        return self.whitened(self.raw(values, z))
+
+    def raw(self, values: np.ndarray, z: np.ndarray) -> list[np.ndarray]:
+        """Residuals as they are, of every stretch (k, channel, F) [m]: caps by axis, then sensors."""
         seen = self.replayer.seen(self.many, values)
-        return np.concatenate([
-            _whitened(white, self._residual(k, seen[k], z)) for k, white in enumerate(self.white)
-        ], axis=1)  # fmt: skip
+        return [self._residual(k, seen[k], z) for k in range(len(self.many))]
+
+    def whitened(self, raw: Sequence[np.ndarray]) -> np.ndarray:
+        """Residuals of `raw`, white, (k, M)."""
+        return np.concatenate([_whitened(w, r) for w, r in zip(self.white, raw, strict=True)], axis=1)
 
     def look(self, values: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """White residuals as `residuals` has them, and those of the caps at the last frame of every stretch as they
         are, (k, stretch, cap, 3) [m]."""
-        seen = self.replayer.seen(self.many, values)
-        raw = [self._residual(k, seen[k], z) for k in range(len(self.many))]
-        white = np.concatenate([_whitened(w, r) for w, r in zip(self.white, raw, strict=True)], axis=1)
-        caps = self.many[0].caps.shape[1]
-        key = np.stack([r[:, : 3 * caps, -1].reshape(len(values), caps, 3) for r in raw], axis=1)
-        return white, key
+        raw = self.raw(values, z)
+        return self.whitened(raw), self._last(raw)
 
     def ends(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Simulated minus observed caps at the last frame of every stretch, (k, stretch, cap, 3) [m]."""
-        seen = self.replayer.seen(self.many, values)
+        return self._last(self.raw(values, z))
+
+    def log_density(self, raw: Sequence[np.ndarray]) -> float:
+        """Of one hypothesis's residuals under the covariance as it is, nothing left out [nats].
+
+        Normal, since Student's t over a stretch does not care how large all of it is; without the worst stretches,
+        since one tip-over must not set the floor of all.
+        """
+        squares = self.squares(self.whitened(raw))[0]
+        excess = squares / self.sizes
+        kept = excess <= np.quantile(excess, TRIMMED)
+        logdet = np.array([white.logdet for white in self.white])
+        return float(-0.5 * np.sum((squares + logdet)[kept]))
+
+    def _last(self, raw: Sequence[np.ndarray]) -> np.ndarray:
         caps = self.many[0].caps.shape[1]
-        raw = [self._residual(k, seen[k], z)[:, : 3 * caps, -1] for k in range(len(self.many))]
-        return np.stack([r.reshape(len(values), caps, 3) for r in raw], axis=1)
+        return np.stack([r[:, : 3 * caps, -1].reshape(len(r), caps, 3) for r in raw], axis=1)
 
     def squares(self, residual: np.ndarray) -> np.ndarray:
         """Sums of squares of every stretch (k, stretch) of white residuals (k, M)."""
@@ -170,6 +210,20 @@ class Arena:
         if one.length is None:
             length = np.zeros_like(length)
         return np.concatenate([caps, length], axis=1)
+
+    def _with_rest(self, by_offset: Sequence[np.ndarray] | None) -> list[np.ndarray]:
+        """What is added to the residuals per unit of all nuisances that are simple shifts, (q, channel, F) of every
+        stretch. What a run's rest lengths at its begin are off by is still so in its later stretches."""
+        found = []
+        winches = len(self.model.robot.actuated)
+        for k, one in enumerate(self.many):
+            constant = self._constant[k]
+            rest = np.zeros((len(self.runs) * winches, *constant.shape[1:]))
+            if by_offset is not None:
+                begin = self.runs.index(one.run) * winches
+                rest[begin : begin + winches] = self._channels(k, by_offset[k][..., -winches:])
+            found.append(np.concatenate([constant, rest]))
+        return found
 
     def _shift_columns(self, one: Stretch) -> np.ndarray:
         """What camera and sensor biases add, per unit, (q, channel, F)."""

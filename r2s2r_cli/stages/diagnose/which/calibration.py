@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import resources
 
 import numpy as np
@@ -16,7 +16,8 @@ FILE = "calibration.json"
 @dataclass(frozen=True)
 class Calibration:
     """temperature [nats]: of the softmax over names. equivalent, unknown [nats]: what `none` gains where the
-    equivalence test finds no gap, and what `unknown` must exceed. commit: probability from which one name is given.
+    equivalence test finds no gap, and what `unknown` must exceed. bias [nats]: of a name, what its gains are short of.
+    commit: probability from which one name is given.
     conformal: names whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many
     it rests on, 0 for the defaults."""
 
@@ -25,13 +26,14 @@ class Calibration:
     unknown: float = 25.0
     commit: float = 0.5
     conformal: float = 0.05
+    bias: Mapping[str, float] = field(default_factory=dict)
     words: str = "uncalibrated: a temperature by hand"
     sets: int = 0
 
     def probabilities(self, scores: Mapping[str, float]) -> dict[str, float]:
         """Softmax of scores [nats] by name."""
         names = list(scores)
-        x = np.array([scores[name] for name in names]) / self.temperature
+        x = np.array([scores[name] + self.bias.get(name, 0.0) for name in names]) / self.temperature
         x = np.where(np.isfinite(x), x, -1e9)
         p = np.exp(x - x.max())
         return dict(zip(names, (p / p.sum()).tolist(), strict=True))

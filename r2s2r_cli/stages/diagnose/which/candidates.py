@@ -18,8 +18,10 @@ STEPS = (0.5, 1.5)
 """Sizes, in scales of a number, at which responses are tried, to both sides of off."""
 AZIMUTHS = 6
 """Directions in which the far end of something is tried."""
-SAME_AS_NUISANCE = ("motor_speed_mismatch", "cap_friction", "tendon_stiffness")
+SAME_AS_NUISANCE = ("motor_speed_mismatch", "cap_friction", "tendon_stiffness", "tendon_set")
 """Effects that are a nuisance where all elements have them alike."""
+PASSIVE_ONLY = ("tendon_set",)
+"""Effects that a winch makes up for: nobody sees what the rest length of a winched cable is off by."""
 NO_REPLAY = ("dropout",)
 """Effects that change no prediction, only what is missing: the parity stage sees them."""
 PARTS = {
@@ -91,6 +93,8 @@ def _elements(
         found.append((Element(KIND[counted]), tuple(tuple(places) for places in fields.values())))
     for i in range(count):
         number = model.robot.actuated[i] if counted == "actuated" else i
+        if effect.name in PASSIVE_ONLY and i in model.robot.actuated:
+            continue
         own = tuple((places[i],) if len(places) > 1 else tuple(places) for places in fields.values())
         found.append((Element(KIND[counted], number), own))
     return found

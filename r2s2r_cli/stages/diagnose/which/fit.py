@@ -16,7 +16,7 @@ from r2s2r_cli.stages.diagnose.which.candidates import Candidate
 from r2s2r_cli.stages.diagnose.which.robust import minus_log, weight
 
 ITERATIONS = 6
-LENGTHS = (1.0, 0.5, 0.2, 0.05)
+LENGTHS = (1.0, 0.4, 0.1)
 """Shares of a step that are tried together."""
 SECANT = 0.25
 """Of a number's scale: length of a secant."""

@@ -21,10 +21,14 @@ if TYPE_CHECKING:
 
     from r2s2r_cli.engine import Parameters
 
-NUMERICS = ("rolling_resistance", "soft_ground")
-"""Effects that another engine's contact looks like. They are nuisances too, near their off values."""
-NUMERICS_SHARE = 0.15
-"""Of the scale of such an effect: how far from off an engine's numerics alone put it."""
+NUMERICS = {
+    "rolling_resistance": 0.15, "soft_ground": 0.15, "command_latency": 0.4, "motor_lag": 0.4, "load_droop": 0.3,
+    "camera_delay": 0.3,
+}
+"""Effects that another engine, or the robot as it was built, has a little of: nuisances too, near their off values. By
+effect, how far from off that puts them, in the scale of their numbers."""
+FARTHEST = 3.0
+"""Prior sd from off to which such a nuisance goes."""
 MOST = 1.0
 """Of a logarithm: no nuisance that is a factor leaves e^-1 .. e^1."""
 
@@ -48,9 +52,11 @@ class Number:
     what: str
 
     @property
-    def words(self) -> str:
-        """For people, without what it is of: `friction`."""
-        return self.name.replace("_", " ")
+    def within(self) -> tuple[float, float]:
+        """Bounds as a nuisance: an effect's number stays near off, where an engine's numerics may put it."""
+        if self.kind != "own":
+            return self.lower, self.upper
+        return max(self.lower, self.off - FARTHEST * self.sd), min(self.upper, self.off + FARTHEST * self.sd)
 
 
 NUISANCES = (
@@ -88,7 +94,7 @@ class Model:
                 count = one.count(self.structure)
                 for i in range(count):
                     label = "" if one.per == "robot" else f".{self._label(one.per, i)}"
-                    numerics = NUMERICS_SHARE * one.scale if effect.name in NUMERICS else 0.0
+                    numerics = NUMERICS.get(effect.name, 0.0) * one.scale
                     numbers.append(
                         Number(f"{effect.name}.{one.name}{label}", one.unit, "own", f"{effect.name}.{one.name}", (i,),
                                one.off, one.lower, one.upper, numerics, one.scale, one.what)
@@ -113,17 +119,17 @@ class Model:
 
         x = torch.as_tensor(values, dtype=torch.float64) if not isinstance(values, torch.Tensor) else values
         x = x if x.ndim == 2 else x[None]
-        changed: dict[str, Tensor] = {}
+        named: dict[str, Tensor] = {}
+        own_numbers: dict[str, list[Tensor]] = {}
         for k, number in enumerate(self.numbers):
             value = x[:, k : k + 1]
             if number.kind == "own":
-                changed.setdefault(number.field, []).append(value)  # type: ignore[arg-type, attr-defined]
+                own_numbers.setdefault(number.field, []).append(value)
                 continue
             own = getattr(self._base, number.field)
             by = value.reshape(-1, *[1] * (own.ndim - 1))
-            changed[number.field] = own * by.exp() if number.kind == "factor" else (own + by).clamp(0.0, 1.0)
-        named = {name: torch.cat(one, dim=1) if isinstance(one, list) else one for name, one in changed.items()}
-        return self._base.with_values(named)
+            named[number.field] = own * by.exp() if number.kind == "factor" else (own + by).clamp(0.0, 1.0)
+        return self._base.with_values({**named, **{name: torch.cat(one, dim=1) for name, one in own_numbers.items()}})
 
     def packed(self, values: np.ndarray | Tensor) -> Tensor:
         """The flat parameter vector, (NP,) of values (n,), (k, NP) of (k, n)."""

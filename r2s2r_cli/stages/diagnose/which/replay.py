@@ -37,7 +37,7 @@ class Seen:
 
 
 class Replayer(Predictor):
-    """Simulates stretches by command replay; derivatives by the nuisances and by where a stretch starts."""
+    """Simulates stretches by command replay, many hypotheses at once; derivatives by where a stretch starts."""
 
     def __init__(self, model: Model, **how: object) -> None:
         super().__init__(model, **how)  # type: ignore[arg-type]
@@ -63,7 +63,7 @@ class Replayer(Predictor):
         return [parts[k] for k in range(len(many))]
 
     def derivatives(self, many: Sequence[Stretch], values: np.ndarray) -> Prediction:
-        """Exact derivatives of the caps by the nuisances and the free offsets, at values (n,)."""
+        """Caps, and their exact derivatives by the free offsets of the starts, at values (n,)."""
         offsets = np.zeros((len(many), 12 * self.structure.n_rods + self.structure.n_actuated))
         return self.predict([one.window for one in many], values, offsets, jacobian=True)
 
@@ -73,12 +73,9 @@ class Replayer(Predictor):
         import torch
 
         assert moved is not None  # noqa: S101 - `derivatives` hands them in
-        n, extra = len(x), len(self.moved)
-        keep = torch.zeros(n, dtype=torch.bool)
-        keep[list(self.model.nuisances)] = True
-        d_p = torch.nn.functional.pad(self.mapping.jacobian(x)[:, keep], (0, extra))
-        d_s = displacement_jacobian(self.structure, s0, moved)[..., self.moved]
-        return d_p, None, torch.nn.functional.pad(d_s, (int(keep.sum()), 0))
+        del by_delay
+        none = torch.zeros(len(self.model.packed(x)), len(self.moved), dtype=x.dtype)
+        return none, None, displacement_jacobian(self.structure, s0, moved)[..., self.moved]
 
     def _seen(
         self, windows: Sequence[object], x: Tensor, flat: Tensor, tangents: Tensor | None, with_offsets: bool
@@ -108,8 +105,7 @@ class Replayer(Predictor):
         along = tangents[index, low] * (1 - share[..., None]) + tangents[index, low + 1] * share[..., None]
         d = torch.einsum("fcis,fsd->fcid", vmap(jacfwd(caps))(states), along).numpy()
         p_WE = vmap(caps)(states).numpy() + np.array([0.0, 0.0, self.model.observation().ground_height])
-        n = len(self.model.nuisances)
-        return Prediction(p_WE, index.numpy(), d[..., :n], d[..., n:])
+        return Prediction(p_WE, index.numpy(), None, d)
 
     def _batch(self, many: Sequence[Stretch], values: np.ndarray) -> list[Seen]:
         """K hypotheses of some stretches of about the same length."""
@@ -153,12 +149,13 @@ class Replayer(Predictor):
 
         from r2s2r_cli.engine import end_caps, observe, sense
         from r2s2r_cli.engine.flat import unpack_state
-        from r2s2r_cli.engine.hooks import effective
+        from r2s2r_cli.engine.hooks import effective, overrides
 
         stored = flat.shape[1]
         every = EVERY * self.step
-        theta = effective(self.structure, own).map(lambda x: x.expand(k, *x.shape[1:]).repeat_interleave(stored, dim=0))
-        caps = end_caps(theta, unpack_state(self.structure, flat.flatten(0, 1))).unflatten(0, (k, stored))
+        one_robot = own.map(lambda x: x[:1])  # no effect moves the caps on a rod
+        caps = end_caps(effective(self.structure, one_robot), unpack_state(self.structure, flat.flatten(0, 1)))
+        caps = caps.unflatten(0, (k, stored))
         ends = torch.as_tensor(self.cable_caps)
         length = torch.linalg.vector_norm(caps[:, :, ends[:, 0]] - caps[:, :, ends[:, 1]], dim=-1)
         t = torch.as_tensor(one.window.start + every * np.arange(stored))
@@ -166,8 +163,12 @@ class Replayer(Predictor):
             self.structure, own.map(lambda x: x.expand(k, *x.shape[1:])), t,
             caps + torch.tensor([0.0, 0.0, up], dtype=caps.dtype),
         )  # fmt: skip
-        wide = own.map(lambda x: x.expand(k, *x.shape[1:]).repeat_interleave(stored, dim=0))
-        length = sense(self.structure, wide, length.flatten(0, 1), t.repeat(k)[:, None]).unflatten(0, (k, stored))
+        sensing = {effect.name for effect in overrides(self.structure, "sensing")}
+        read = one_robot.with_values({
+            name: x.expand(k, *x.shape[1:]).repeat_interleave(stored, dim=0)
+            for name, x in own.extra.items() if name.split(".")[0] in sensing
+        })  # fmt: skip
+        length = sense(self.structure, read, length.flatten(0, 1), t.repeat(k)[:, None]).unflatten(0, (k, stored))
         at = torch.as_tensor((one.t - one.window.start) / every)
         low = (at + TINY).floor().long()
         share = at - low

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
-from r2s2r_cli.stages.diagnose.which.fit import Fit
-from r2s2r_cli.stages.diagnose.which.robust import minus_log
 from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.screen import Response
 from r2s2r_cli.stages.measures.bootstrap import upper_bound
 
 EQUIVALENT = 1.25
 """Of the floor: a refit model whose error surely stays below that leaves no gap (design.md, Measures)."""
-WIDER = (1.5, 2.0, 3.0, 5.0, 8.0)
+WIDER = (1.25, 1.5, 2.0, 3.0, 5.0, 8.0)
 """Factors on the floor: how large an error without a name may be."""
 DRAWS = 1000
 
@@ -41,26 +39,6 @@ def no_gap(refit: Score, floor_m: float) -> NoGap:
     squared = refit.squared[np.isfinite(refit.squared)]
     rmse = float(np.sqrt(squared.mean())) if len(squared) else float("inf")
     return NoGap(rmse, upper_bound(squared, level=0.90) if len(squared) else None, floor_m)
-
-
-def unnamed(arena: Arena, base: Fit, raw: Score) -> tuple[float, float]:
-    """Gain of an error of free form over the refit nominal model [nats], and by how much the floor must grow for it.
-
-    Its form is a random walk along each stretch, as the floor's is (a Kennedy-O'Hagan discrepancy); it predicts no
-    gait from another, so it is worth only what its size says.
-    """
-    own, known = arena.floor_m, raw.total
-    best, factor = 0.0, 1.0
-    values = arena.values(base.z[None])
-    for wider in WIDER:
-        arena.whiten(floor_m=wider * own)
-        squares = arena.squares(arena.residuals(values, base.z[None]))[0]
-        density = -minus_log(squares, arena.sizes) - 0.5 * np.array([white.logdet for white in arena.white])
-        gain = float(density.sum()) - known
-        if gain > best:
-            best, factor = gain, wider
-    arena.whiten(floor_m=own)
-    return best, factor
 
 
 def chance(

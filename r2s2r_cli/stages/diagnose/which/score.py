@@ -15,6 +15,9 @@ from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
 from r2s2r_cli.stages.diagnose.which.robust import minus_log, weight
 
+LOST_M = 0.5
+"""A cap that is simulated so far from where it was has left the finite numbers in all but name."""
+
 
 @dataclass(frozen=True)
 class Score:
@@ -50,8 +53,8 @@ def groups_of(arena: Arena) -> np.ndarray:
     return np.arange(len(arena.many))
 
 
-def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray) -> list[Score]:
-    """Of every fit, all hypotheses and groups in one batch."""
+def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: bool = True) -> list[Score]:
+    """Of every fit, all hypotheses and groups in one batch. held_out: False, nothing is left out (an ablation)."""
     solver = Fits(arena)
     names = np.unique(groups)
     points, covariances = [], []
@@ -60,7 +63,7 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray) -> list[Score]
         w = weight(arena.squares(fit.residual[None])[0], arena.sizes)
         for name in names:
             own, pull = np.zeros_like(H), np.zeros(len(H))
-            for k in np.flatnonzero(groups == name):
+            for k in np.flatnonzero(groups == name) if held_out else ():
                 J = fit.jacobian[arena.white[k].rows]
                 own += w[k] * J.T @ J
                 pull += w[k] * J.T @ fit.residual[arena.white[k].rows]
@@ -93,8 +96,10 @@ def _score(
         g = int(np.searchsorted(names, groups[k]))
         r, J, P = white[g, own.rows], fit.jacobian[own.rows], covariances[g]
         ends[k] = key[g, k]
-        if not np.isfinite(r).all():
-            continue
+        if not np.isfinite(r).all() or np.abs(key[g, k]).max() > LOST_M:
+            # The step left the robots that can be: what the derivatives say of it stands in.
+            by = np.concatenate(points[g]) - np.concatenate([fit.z, fit.x])
+            r, ends[k] = fit.residual[own.rows] + J @ by, np.nan
         # Woodbury: r' (1 + J P J')^-1 r, in as many numbers as there are parameters.
         inner = np.linalg.inv(P + 1e-12 * np.trace(P) * np.eye(len(P))) + J.T @ J
         along = J.T @ r

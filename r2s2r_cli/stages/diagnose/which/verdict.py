@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from r2s2r_cli.stages.diagnose.parity.finding import Element
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
@@ -116,7 +117,7 @@ def _ranked(
         if k != i and m.fits[k].hypothesis.effects == fit.hypothesis.effects
     ]  # fmt: skip
     return Ranked(
-        effect=part.effect, gain=gain, probability=probability, channel=part.channel, element=_element(m, fit),
+        effect=part.effect, gain=gain, probability=probability, channel=part.channel, element=_element(fit),
         size=dict(zip(part.names, fit.x.tolist(), strict=True)),
         ci90={n: (float(a), float(b)) for n, a, b in zip(part.names, low, high, strict=True)},
         units=dict(zip(part.names, part.units, strict=True)), moved=fit.moved, on_bound=fit.on_bound,
@@ -125,19 +126,16 @@ def _ranked(
     )  # fmt: skip
 
 
-def _element(m: Material, fit: Fit) -> object:
+def _element(fit: Fit) -> Element | None:
     """The element; an effect of the ground with a place in its numbers sits there."""
-    from r2s2r_cli.stages.diagnose.parity.finding import Element
-
     part = fit.hypothesis.parts[0]
     if part.element is not None:
         return part.element
     own = {name.rsplit(".", 1)[-1]: float(v) for name, v in zip(part.names, fit.x, strict=True)}
-    place = [own.get(key) for key in ("x_m", "y_m")]
+    place = [own.get(key) for key in ("patch_x_m", "patch_y_m")]
     if None not in place:
         return Element("place", None, (float(place[0] or 0.0), float(place[1] or 0.0)))
     kind = {"observation": "camera", "world": "world"}.get(part.channel)
-    del m
     return Element(kind) if kind else None
 
 

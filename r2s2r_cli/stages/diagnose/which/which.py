@@ -14,7 +14,6 @@ from r2s2r_cli.stages.diagnose.which.candidates import candidates
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.found import Which
 from r2s2r_cli.stages.diagnose.which.rivals import WIDER, chance, no_gap
-from r2s2r_cli.stages.diagnose.which.robust import minus_log
 from r2s2r_cli.stages.diagnose.which.score import Score, groups_of, scores
 from r2s2r_cli.stages.diagnose.which.screen import Response, screen
 from r2s2r_cli.stages.diagnose.which.verdict import Material, concluded
@@ -25,10 +24,23 @@ ELEMENTS = 2
 """Elements of each that are fitted."""
 PLACES = 8
 """Of a patch on the floor, to begin with."""
+LOOKED_AT = 4
+"""Fits that the size of an error without a name is learned from."""
+FIRST = 2
+"""Iterations of all starts of a hypothesis; the best one goes on."""
 SECOND = 3
 """Iterations after the floor was widened."""
 
 Told = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Ways:
+    """What an ablation leaves out. held_out: scores are of gaits left out of the fit; unknown: an error without a name
+    is a rival."""
+
+    held_out: bool = True
+    unknown: bool = True
 
 
 @dataclass(frozen=True)
@@ -44,16 +56,17 @@ class Compared:
 
 
 def compare_effects(
-    arena: Arena, base: Fit, *, floor_m: float, calibration: Calibration, starts: Mapping[str, Mapping[str, float]],
+    arena: Arena, base: Fit, *, floor_m: float, calibration: Calibration, sizes: Mapping[str, Mapping[str, float]],
     suspected: Sequence[str] = (), effects: Sequence[str] | None = None, seed: int = 0, told: Told,
-    kept: Mapping[str, Any] | None = None, keep: Callable[[str, Any], None] = lambda name, value: None,
+    ways: Ways | None = None, kept: Mapping[str, Any] | None = None, keep: Callable[[str, Any], None] = lambda name, value: None,
 ) -> Compared:  # fmt: skip
     """All effects against the refit nominal model `base` of this arena. floor_m: key-frame RMSE with nothing wrong.
 
-    starts, suspected: of the parity stage: sizes to begin with, and effects that are fitted whatever the screening
+    sizes, suspected: of the parity stage: sizes to begin with, and effects that are fitted whatever the screening
     says. effects: only these. Raises NumericalError where nothing can be simulated.
     """
-    known = [one for one in candidates(arena.model, starts, touched(arena)) if effects is None or one.effect in effects]
+    ways = ways or Ways()
+    known = [one for one in candidates(arena.model, sizes, touched(arena)) if effects is None or one.effect in effects]
     told("screening", 0, 1)
     responses = screen(arena, base, known)
     told("screening", 1, 1)
@@ -61,20 +74,20 @@ def compare_effects(
     picked = _picked(responses, suspected)
     fits = _fitted(arena, base, picked, told, kept or {})
     keep("fits", {fit.hypothesis.label: [fit.z.tolist(), fit.x.tolist()] for fit in fits})
-    wider, unexplained = _widened(arena, fits[0] if fits else base)
+    wider, unexplained = _widened(arena, [base, *fits[:LOOKED_AT]]) if ways.unknown else (1.0, 0.0)
     if wider > 1.0:
         arena.whiten(floor_m=wider * arena.floor_m)
         base, *fits = _again(arena, [base, *fits])
     told("left out", 0, 1)
-    refit, *own = scores(arena, [base, *fits], groups)
+    refit, *own = scores(arena, [base, *fits], groups, held_out=ways.held_out)
     pairs = _pairs(arena, base, fits, own, responses)
     if pairs:
-        fits, own = [*fits, *pairs], [*own, *scores(arena, pairs, groups)]
+        fits, own = [*fits, *pairs], [*own, *scores(arena, pairs, groups, held_out=ways.held_out)]
     told("left out", 1, 1)
     material = Material(
         arena=arena, base=base, refit=refit, fits=tuple(fits), scores=tuple(own), responses=responses,
         chance=chance(arena, responses, groups, seed=seed), no_gap=no_gap(refit, floor_m), wider=wider,
-        unexplained=unexplained, groups=groups, calibration=calibration,
+        unexplained=unexplained if ways.unknown else -np.inf, groups=groups, calibration=calibration,
     )  # fmt: skip
     which = concluded(material)
     order = np.argsort([-score.total for score in own], kind="stable")
@@ -125,6 +138,8 @@ def _fitted(arena: Arena, base: Fit, picked: Sequence[Response], told: Told, kep
         return []
     begun = _begun(arena, fits, points)
     told("fits", 0, 1)
+    fits.run(begun, iterations=FIRST)
+    begun = _best_of(begun)
     fits.run(begun, told=lambda done, total: told("fits", done, total))
     return _best_of(begun)
 
@@ -148,16 +163,15 @@ def _best_of(fits: Sequence[Fit]) -> list[Fit]:
     return sorted(best.values(), key=lambda fit: fit.cost)
 
 
-def _widened(arena: Arena, best: Fit) -> tuple[float, float]:
-    """By how much the floor must grow to explain what the best fit leaves, and what that gains [nats]."""
+def _widened(arena: Arena, fits: Sequence[Fit]) -> tuple[float, float]:
+    """By how much the floor must grow to explain what the best of some fits leaves, and what that gains [nats]."""
     own = arena.floor_m
-    values = Fits(arena).values(best.hypothesis, best.z[None], best.x[None])
+    solver = Fits(arena)
+    raws = [arena.raw(solver.values(one.hypothesis, one.z[None], one.x[None]), one.z[None]) for one in fits]
     found: dict[float, float] = {}
     for factor in (1.0, *WIDER):
         arena.whiten(floor_m=factor * own)
-        squares = arena.squares(arena.residuals(values, best.z[None]))[0]
-        density = -minus_log(squares, arena.sizes) - 0.5 * np.array([white.logdet for white in arena.white])
-        found[factor] = float(density.sum())
+        found[factor] = max(arena.log_density(raw) for raw in raws)
     arena.whiten(floor_m=own)
     factor = max(found, key=lambda one: found[one])
     return factor, found[factor] - found[1.0]

@@ -1,0 +1,79 @@
+"""Where target intervals start: the filter of `identify`, on fewer frames and with the pose at rest found once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from r2s2r_cli.stages.diagnose.evidence import Run
+from r2s2r_cli.stages.identify.data import RunData
+from r2s2r_cli.stages.identify.predict import Predictor, refused
+from r2s2r_cli.stages.identify.start import Filter, _Ensemble, _rest
+
+if TYPE_CHECKING:
+    from r2s2r_cli.engine import State
+
+APART_S = 0.25
+"""Frames that the filter looks at are at least so far apart: by its own belief errors of a tracker last 0.5 s, and
+frames nearer than that say little more."""
+
+
+class Starts:
+    """Start states of intervals, by run and number. The robot at rest before a run is found once: how it stands hangs
+    little on numbers that are fitted."""
+
+    def __init__(self, belief: Filter) -> None:
+        self.belief = belief
+        self._rest: dict[str, State] = {}
+        self._thin: dict[str, RunData] = {}
+
+    def at(
+        self, runs: Sequence[Run], predictor: Predictor, values: np.ndarray, last: dict[str, int]
+    ) -> dict[tuple[str, int], State]:
+        """Of intervals 1 to last[run]; none depends on a later frame. Raises NumericalError where the robot cannot be
+        simulated."""
+        import torch
+
+        from r2s2r_cli.engine import EngineError
+
+        theta = predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64))
+        up = np.array([0.0, 0.0, predictor.mapping.observation(values).ground_height])
+        found: dict[tuple[str, int], State] = {}
+        for run in runs:
+            if run.name not in last:
+                continue
+            caps = self._thin.setdefault(run.name, thinned(run.caps))
+            try:
+                with torch.no_grad():
+                    if run.name not in self._rest:
+                        self._rest[run.name] = _rest(predictor, theta, caps.observed[caps.intervals.first[0]] - up)
+                    rest = self._rest[run.name]
+                    states = [rest]
+                    if last[run.name] > 1:
+                        states += _Ensemble(caps, predictor, values, rest, self.belief).starts(last[run.name])
+            except EngineError as error:
+                raise refused(error, ()) from error
+            found.update({(run.name, k + 1): state for k, state in enumerate(states)})
+        return found
+
+
+def thinned(run: RunData) -> RunData:
+    """The run with the first frame of every interval and, between these, frames at least APART_S apart."""
+    first = {int(frame) for frame in run.intervals.first}
+    kept: list[int] = []
+    for k in range(len(run.t)):
+        if k in first or not kept or run.t[k] - run.t[kept[-1]] >= APART_S:
+            kept.append(k)
+    rows = np.array(kept)
+    place = {frame: k for k, frame in enumerate(kept)}
+    intervals = replace(
+        run.intervals, first=np.array([place[int(frame)] for frame in run.intervals.first]),
+        last=np.array([int(np.searchsorted(rows, frame, side="right")) - 1 for frame in run.intervals.last]),
+    )  # fmt: skip
+    return replace(
+        run, t=run.t[rows], observed=run.observed[rows], p_WE=run.p_WE[rows], sd_p=run.sd_p[rows], v_WE=run.v_WE[rows],
+        sd_v=run.sd_v[rows], quality=run.quality[rows], intervals=intervals,
+    )  # fmt: skip

@@ -66,7 +66,9 @@ def _against(first: str, last: str, side: Mapping[str, CompareMeasure]) -> str:
     words = []
     if better:
         part = f", beyond doubt in {len(sure)}" if sure else ""
-        words.append(f"Of {counted(len(better) + len(worse), 'measure')} {last} is better than {first} in {len(better)}{part}.")
+        words.append(
+            f"Of {counted(len(better) + len(worse), 'measure')} {last} is better than {first} in {len(better)}{part}."
+        )
     if worse:
         parts = []
         for name, one in worse.items():

@@ -51,6 +51,8 @@ class Session:
     watch: Watch = lambda now: None
     runs: list[RecordRun] = field(default_factory=list)
     started: dict[str, float] = field(default_factory=dict)
+    _ahead: float | None = None
+    """In lock-step: the link's clock less the camera's [s], as the freshest frame shows it."""
 
     def record(self, sink: Sink) -> None:
         """All runs. sink: takes their rows. The link is open, and stopped at the end of every run.
@@ -61,6 +63,26 @@ class Session:
         for plan in self.plans:
             with Writer(sink, lossless=self.link.facts.lock_step) as writer:
                 self._one(plan, writer)
+
+    def _stamp(self, loop: RunLoop) -> Callable[[Frame], float]:
+        """From a frame to its time in the run [s]: when it came; in lock-step by the camera's clock.
+
+        What lies between the two clocks is the same in all runs, and the freshest frame tells it: the first one of a
+        later run may have waited since the run before.
+        """
+        start = loop.link.now() - loop.elapsed()
+        if not self.link.facts.lock_step:
+            return lambda frame: frame.t_host - start
+        known: list[float] = []
+
+        def stamp(frame: Frame) -> float:
+            if not known:
+                seen = self.link.now() - frame.t_device
+                self._ahead = seen if self._ahead is None else min(self._ahead, seen)
+                known.append(self._ahead)
+            return frame.t_device + known[0] - start
+
+        return stamp
 
     def report(self) -> RecordReport:
         """What was recorded so far."""
@@ -82,7 +104,7 @@ class Session:
             with ExitStack() as stack:
                 stack.callback(self.link.stop)
                 if self.feed is not None:
-                    stamp = _stamp(loop, lock_step=self.link.facts.lock_step)
+                    stamp = self._stamp(loop)
                     pictures = Pictures(
                         self.feed, writer, f"runs/{plan.name}/camera", self.settings, stamp,
                         waits=self.link.facts.lock_step,
@@ -98,21 +120,6 @@ class Session:
                 loop.finish()
             finally:
                 self.runs.append(_report(loop, pictures, ended))
-
-
-def _stamp(loop: RunLoop, *, lock_step: bool) -> Callable[[Frame], float]:
-    """From a frame to its time in the run [s]: when it came; in lock-step by the camera's clock, from its first."""
-    start = loop.link.now() - loop.elapsed()
-    if not lock_step:
-        return lambda frame: frame.t_host - start
-    shift: list[float] = []
-
-    def stamp(frame: Frame) -> float:
-        if not shift:
-            shift.append(loop.elapsed() - frame.t_device)
-        return frame.t_device + shift[0]
-
-    return stamp
 
 
 def _report(loop: RunLoop, pictures: Pictures | None, ended: str) -> RecordRun:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -14,6 +15,7 @@ from r2s2r_cli.devices.link import Sample
 from r2s2r_cli.errors import ArtifactError, HardwareError
 from r2s2r_cli.stages.record import Session, plans
 from r2s2r_cli.stages.record.camera import Pictures, encode_color, encode_depth
+from r2s2r_cli.stages.record.run import RunLoop
 from r2s2r_cli.stages.record.writer import Writer
 from r2s2r_cli.stages.simulate.policies import random_policy
 from schemas.config import RecordSettings
@@ -215,3 +217,25 @@ def test_a_disk_that_stands_still_is_an_error_not_a_wait() -> None:
         for i in range(10_000):
             writer.put("s", {"i": i})
     assert len(rows.of["s"]) == 10_000
+
+
+def test_in_lock_step_a_frame_that_has_waited_shifts_no_clock() -> None:
+    """The first frame of a second run was taken before it: it lies before the run, and the others where they were."""
+    robot = calibrated()
+    link = FakeLink(robot, lock_step=True)
+    now = 0.0
+    link.now = lambda: now  # type: ignore[method-assign]
+    session = Session([], robot, link, RecordSettings())
+
+    def begun(at: float) -> RunLoop:
+        return SimpleNamespace(link=link, elapsed=lambda: now - at)  # type: ignore[return-value]
+
+    first = session._stamp(begun(0.0))
+    now = 0.02
+    assert first(frame(0, 0.0)) == pytest.approx(0.02)
+    assert first(frame(1, 0.1)) == pytest.approx(0.12)
+    now = 30.0
+    second = session._stamp(begun(30.0))
+    now = 30.02
+    assert second(frame(299, 29.9)) == pytest.approx(-0.08)
+    assert second(frame(300, 30.0)) == pytest.approx(0.02)

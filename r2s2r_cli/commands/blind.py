@@ -23,6 +23,13 @@ class BankName(StrEnum):
     REGRESSION = "regression"
 
 
+class Tier(StrEnum):
+    """What `--tier` takes."""
+
+    A = "A"
+    B = "B"
+
+
 Executor = Annotated[
     str, typer.Option("--executor", metavar="WHERE", help="local, or dask://host:port (extra `cluster`).")
 ]
@@ -44,6 +51,9 @@ def make(
     ],
     key: Annotated[Path, typer.Option("--key", metavar="FILE", help="Of the labels; a new one is written.")],
     bank: Annotated[BankName, typer.Option("--bank", help="Its seeds and sizes of effects.")] = BankName.CALIBRATION,
+    tier: Annotated[
+        Tier, typer.Option("--tier", help="B: the MuJoCo rig. A: our own engine, other step and laws.")
+    ] = Tier.B,
     count: Annotated[int, typer.Option("--count", min=1, help="Sets of the whole bank.")] = 24,
     commissioning: Annotated[
         int, typer.Option("--commissioning", min=0, help="Runs of the healthy robot in each set.")
@@ -77,7 +87,7 @@ def make(
     if key.resolve().is_relative_to(out.resolve()):
         raise UsageError("the key lies in the bank that it locks", where="--key", expected=f"a file outside {out}",
                          received=str(key), hint=f"r2s2r blind make --key {out.name}.key {out}")  # fmt: skip
-    asked = ["--out", str(out), "--key", str(key), "--bank", bank.value, "--count", str(count),
+    asked = ["--out", str(out), "--key", str(key), "--bank", bank.value, "--tier", tier.value, "--count", str(count),
              "--commissioning", str(commissioning), "--observed", str(observed), "--executor", executor,
              "--workers", str(workers), *(["--effect", effect] if effect else []),
              *(["--gaits", str(gaits)] if gaits else []), *([] if oracle else ["--no-oracle"])]  # fmt: skip

@@ -19,6 +19,7 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m r2s2r_cli.blind.make")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--key", type=Path, required=True)
+    parser.add_argument("--tier", choices=["A", "B"], default="B")
     parser.add_argument("--bank", type=Bank, choices=list(Bank), default=Bank.CALIBRATION)
     parser.add_argument("--count", type=int, default=24)
     parser.add_argument("--first", type=int)
@@ -34,7 +35,7 @@ def main(arguments: list[str]) -> int:
         # A key that is there belongs to a bank that was begun: go on with it.
         key = read_key(given.key) if given.key.exists() else new_key(given.key)
         asked = Asked(given.bank, given.count, given.out, key, given.first, given.commissioning, given.observed,
-                      given.effect, given.gaits, not given.no_oracle)  # fmt: skip
+                      given.effect, given.gaits, given.tier, not given.no_oracle)  # fmt: skip
         for done, name in enumerate(make(asked, executor=given.executor, workers=given.workers), 1):
             sys.stdout.write(json.dumps({"done": done, "of": given.count, "set": name}) + "\n")
             sys.stdout.flush()

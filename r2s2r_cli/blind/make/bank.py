@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -23,7 +24,7 @@ class Asked:
     """A bank. first: number of its first set; None: of a blind bank a secret one that the key decides, else 0, so that
     nobody can make its worlds again who has not the key. commissioning: runs of the healthy robot a set. observed:
     which draw of the camera's noise. effect: its single sets all have this effect; None: any of the first release.
-    gaits: of every set; None: 3, 5 or 8 by chance.
+    gaits: of every set; None: 3, 5 or 8 by chance. tier: A, our engine; B, the rig.
     """
 
     bank: Bank
@@ -35,6 +36,7 @@ class Asked:
     observed: int = 0
     effect: str | None = None
     gaits: int | None = None
+    tier: Literal["A", "B"] = "B"
     oracle: bool = True
 
 
@@ -48,7 +50,7 @@ def worlds(asked: Asked) -> tuple[Hidden, ...]:
     drawn = kinds(asked.count, np.random.default_rng([own[0], asked.count]))
     effects = () if asked.effect is None else (asked.effect,)
     return tuple(
-        hidden(asked.bank, seed, kind, commissioning=asked.commissioning, gaits=asked.gaits,
+        hidden(asked.bank, seed, kind, commissioning=asked.commissioning, gaits=asked.gaits, tier=asked.tier,
                effects=effects if kind.value == "single" else ())
         for seed, kind in zip(own, drawn, strict=True)
     )  # fmt: skip
@@ -82,7 +84,7 @@ def close(asked: Asked) -> None:
             "label": labels.commitment_of(_sealed(asked.out, name).read_bytes(), asked.key),
             "logs": digest(asked.out / labels.SETS / name),
         }
-    text = index_text("B", asked.bank.value, sets, f"r2s2r {__version__}")
+    text = index_text(asked.tier, asked.bank.value, sets, f"r2s2r {__version__}")
     (asked.out / labels.INDEX).write_text(text, encoding="utf-8")
 
 

@@ -1,4 +1,4 @@
-"""The rig's robot runs a gait in a hidden world: plant, boards and our controller in one process, as fast as it goes.
+"""The robot runs a gait in a hidden world: body, boards and our controller in one process, as fast as it goes.
 
 Samples reach the controller as they are taken; the camera is a list of instants at which the caps are looked at.
 """
@@ -9,14 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from r2s2r_cli.blind.make.body import Boards, Body, boards_of, body_of
 from r2s2r_cli.blind.make.worlds import Hidden
 from r2s2r_cli.blind.split import TARGETS
-from r2s2r_cli.devices.lengths import Lengths
 from r2s2r_cli.devices.pid import WirePid, WireSteps, ticks
-from r2s2r_cli.rig.effects.base import Law, Scene
-from r2s2r_cli.rig.firmware import Firmware
-from r2s2r_cli.rig.plant import Plant
-from r2s2r_cli.rig.world import World
 from schemas.robot import Robot
 
 REST_S = 1.0
@@ -35,19 +31,6 @@ class Gait:
     targets: np.ndarray
     position: np.ndarray
     heading: float
-
-
-@dataclass(frozen=True)
-class Moment:
-    """A state of the plant that can be put back: MuJoCo's, and that of the winches."""
-
-    t: float
-    qpos: np.ndarray
-    qvel: np.ndarray
-    ctrl: np.ndarray
-    rest: np.ndarray
-    acting: np.ndarray
-    angle: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -71,30 +54,7 @@ class Driven:
     t_frame: np.ndarray
     p_WE: np.ndarray
     starts: np.ndarray
-    moments: tuple[Moment, ...]
-
-
-class HiddenPlant(Plant):
-    """The rig's plant with the laws of a hidden world beside those of its world file."""
-
-    def __init__(self, robot: Robot, world: World, hidden: Hidden, gait: int) -> None:
-        self._hidden, self._gait = hidden, gait
-        super().__init__(robot, world)
-
-    def _laws(self) -> tuple[Law, ...]:
-        scene = Scene(self.robot, self.sim, self.winches.r, np.random.default_rng([self._hidden.seed, 12]))
-        return (*super()._laws(), *self._hidden.laws(scene, self._gait))
-
-
-def hidden_plant(robot: Robot, hidden: Hidden, gait: int, position: np.ndarray, heading: float) -> HiddenPlant:
-    """The robot put down in a hidden world, its motors as fast as that world makes them."""
-    return HiddenPlant(with_speed(robot, hidden.speed), hidden.world(gait, position, heading), hidden, gait)
-
-
-def with_speed(robot: Robot, factor: float) -> Robot:
-    """The robot with motors that are faster by a factor."""
-    motors = tuple(m.model_copy(update={"no_load_rad_per_s": factor * m.no_load_rad_per_s}) for m in robot.motors)
-    return robot.model_copy(update={"motors": motors})
+    moments: tuple[object, ...]
 
 
 def random_gait(name: str, rng: np.random.Generator, actuated: int = 6) -> Gait:
@@ -114,9 +74,9 @@ def drive(robot: Robot, hidden: Hidden, gait: Gait, number: int, *, exposures: f
 
     Raises NumericalError where MuJoCo breaks down.
     """
-    plant = hidden_plant(robot, hidden, number, gait.position, gait.heading)
-    firmware = Firmware(plant.robot, plant.world, plant)
-    log = _Log(robot, firmware, plant)
+    body = body_of(robot, hidden, number, gait.position, gait.heading)
+    boards = boards_of(robot, body, hidden, number)
+    log = _Log(body, boards)
     period = 1.0 / robot.pid.rate_hz
     n = len(robot.actuated)
     targets = np.concatenate([np.ones((1, n)), gait.targets])
@@ -129,14 +89,14 @@ def drive(robot: Robot, hidden: Hidden, gait: Gait, number: int, *, exposures: f
     while not steps.finished:
         due = (frame + phase) / exposures
         if due < k * period - 1e-9:
-            log.hear(due)
+            boards.hear(due)
             log.look(due)
             frame += 1
             continue
-        log.hear(k * period)
-        target = targets[steps.index]
-        control = pid.tick(log.length()[winched], target)
-        log.tick(k * period, steps.index, target, control, scale[:, 0] * control[scale[:, 1].astype(int)])
+        boards.hear(k * period)
+        target, length = targets[steps.index], boards.length()
+        control = pid.tick(length[winched], target)
+        log.tick(k * period, steps.index, target, control, length, scale[:, 0] * control[scale[:, 1].astype(int)])
         if steps.advance(pid.done)[0]:
             pid.restart()
         k += 1
@@ -146,36 +106,27 @@ def drive(robot: Robot, hidden: Hidden, gait: Gait, number: int, *, exposures: f
 class _Log:
     """What the host and the maker write down."""
 
-    def __init__(self, robot: Robot, firmware: Firmware, plant: Plant) -> None:
-        self._firmware, self._plant, self._lengths = firmware, plant, Lengths.of(robot)
-        self._latest = np.full(len(robot.sensors), np.nan)
+    def __init__(self, body: Body, boards: Boards) -> None:
+        self._body, self._boards = body, boards
         names = ("t", "target", "control", "length", "sensed", "caps", "duty", "t_frame", "p_WE")
         self._rows: dict[str, list[np.ndarray]] = {name: [] for name in names}
         self._starts: list[int] = []
-        self._moments: list[Moment] = []
-
-    def hear(self, t: float) -> None:
-        """Go on to t [s]; the newest sample of every sensor counts."""
-        for sample in self._firmware.tick(t):
-            heard = 1e-12 * sample.pF
-            self._latest = np.where(np.isfinite(heard), heard, self._latest)
-
-    def length(self) -> np.ndarray:
-        """As the host knows it [m], (cable,)."""
-        return self._lengths(self._latest)
+        self._moments: list[object] = []
 
     def look(self, t: float) -> None:
         """The camera exposes."""
-        self._add(t_frame=np.array(t), p_WE=self._plant.truth().p_WE)
+        self._add(t_frame=np.array(t), p_WE=self._body.caps())
 
-    def tick(self, t: float, index: int, target: np.ndarray, control: np.ndarray, duty: np.ndarray) -> None:
+    def tick(
+        self, t: float, index: int, target: np.ndarray, control: np.ndarray, length: np.ndarray, duty: np.ndarray
+    ) -> None:  # fmt: skip
         """The controller has decided; index: of the target."""
         if index == len(self._starts):
             self._starts.append(len(self._rows["t"]))
-            self._moments.append(moment(self._plant))
-        self._firmware.command(duty, self._plant.t)
-        self._add(t=np.array(t), target=target.copy(), control=control.copy(), length=self.length(),
-                  sensed=self._plant.sensed(), caps=self._plant.truth().p_WE, duty=self._firmware.duty)  # fmt: skip
+            self._moments.append(self._body.keep())
+        self._boards.command(duty)
+        self._add(t=np.array(t), target=target.copy(), control=control.copy(), length=length,
+                  sensed=self._body.sensed(), caps=self._body.caps(), duty=self._boards.duty)  # fmt: skip
 
     def done(self, gait: Gait) -> Driven:
         """The run."""
@@ -185,17 +136,3 @@ class _Log:
     def _add(self, **values: np.ndarray) -> None:
         for name, value in values.items():
             self._rows[name].append(value)
-
-
-def moment(plant: Plant) -> Moment:
-    """The state of a plant now."""
-    data, winches = plant.sim.data, plant.winches
-    return Moment(plant.t, np.array(data.qpos), np.array(data.qvel), np.array(data.ctrl), winches.rest.copy(),
-                  winches.acting.copy(), winches.angle.copy())  # fmt: skip
-
-
-def put_back(plant: Plant, at: Moment) -> None:
-    """A plant in another one's state; what laws remember stays theirs."""
-    data, winches = plant.sim.data, plant.winches
-    data.qpos[:], data.qvel[:], data.ctrl[:] = at.qpos, at.qvel, at.ctrl
-    winches.rest, winches.acting, winches.angle = at.rest.copy(), at.acting.copy(), at.angle.copy()

@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from r2s2r_cli.blind.make.drive import Driven, hidden_plant, put_back
+from r2s2r_cli.blind.make.body import body_of
+from r2s2r_cli.blind.make.drive import Driven
 from r2s2r_cli.blind.make.observe import through
 from r2s2r_cli.blind.make.worlds import DAY_SD_M, OFFSET_SHARE, Hidden
 from schemas.robot import Robot
@@ -163,23 +164,23 @@ def _recorded(hidden: Hidden, run: Driven, gait: int) -> list[_Looks]:
 
 def _replayed(robot: Robot, hidden: Hidden, run: Driven, gait: int) -> list[_Looks]:
     """Every interval of a run in another world, from its true start under its duties."""
-    plant = hidden_plant(robot, hidden, gait, run.gait.position, run.gait.heading)
+    body = body_of(robot, hidden, gait, run.gait.position, run.gait.heading)
     world = hidden.world(gait, run.gait.position, run.gait.heading)
     camera, late = world.seen(), world.seen().clock.stamp_delay_s
     found = []
     for t, moment, first in zip(_times(run), run.moments, run.starts, strict=True):
-        put_back(plant, moment)
+        body.restore(moment)
         k, now = int(first), float(run.t[first])
         p, length = [], []
         for due in t:
             while k < len(run.t) and run.t[k] <= due + 1e-9:
-                plant.advance(float(run.t[k]) - now, run.duty[k - 1] if k > first else run.duty[k])
+                body.advance(float(run.t[k]) - now, run.duty[k - 1] if k > first else run.duty[k])
                 now = float(run.t[k])
                 k += 1
-            plant.advance(float(due) - now, run.duty[k - 1])
+            body.advance(float(due) - now, run.duty[k - 1])
             now = float(due)
-            p.append(plant.truth().p_WE)
-            length.append(plant.sensed())
+            p.append(body.caps())
+            length.append(body.sensed())
         caps = _between(np.maximum(t - late, t[0]), t, np.array(p))
         found.append(_Looks(t, through(camera, t - late, caps), np.array(length)))
     return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -17,6 +17,11 @@ DAY_SD_M = 0.001
 """Every sensor is calibrated on the day: what is left of its offset."""
 OFFSET_SHARE = 0.3
 """A tracker's error that stays over a target interval, as a part of its noise."""
+
+
+WITHOUT_RIG = frozenset({"rolling_resistance", "soft_ground", "tether_drag"})
+"""Effects that need a force inside the step: tier A has no other form for them than the catalogue's."""
+STRANGE_WITHOUT_RIG = ("motor_cogging", "cable_snag", "sensor_crosstalk", "gravity_sway")
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,8 @@ class Hidden:
     commissioning: int
     planted: tuple[Planted, ...] = ()
     strange: tuple[str, Outside, int | None] | None = None
+    tier: Literal["A", "B"] = "B"
+    """A: our engine, B: the rig."""
     factor: float | None = None
     """Size of what is wrong, 1 usual; of pairs that of the first."""
 
@@ -86,7 +93,7 @@ class _Day(Law):
 
 def hidden(
     bank: Bank, seed: int, kind: Kind, *, effects: tuple[str, ...] = (), strange: str | None = None,
-    commissioning: int = 2, gaits: int | None = None, factor: float | None = None,
+    commissioning: int = 2, gaits: int | None = None, factor: float | None = None, tier: Literal["A", "B"] = "B",
 ) -> Hidden:  # fmt: skip
     """The world of a seed. effects, strange, gaits, factor: instead of what the seed would draw."""
     rng = np.random.default_rng([seed, 10])
@@ -95,18 +102,19 @@ def hidden(
         bank=bank, seed=seed, kind=kind, friction=float(rng.uniform(0.45, 1.0)), speed=float(rng.uniform(0.85, 1.15)),
         tolerance=round(float(rng.uniform(0.05, 0.12)), 3), day=DAY_SD_M * rng.standard_normal(9),
         noise_m=float(rng.choice(NOISE_M)), ar1=float(rng.choice(AR1)), rate_hz=float(rng.choice(RATES_HZ)),
-        gaits=count, commissioning=commissioning,
+        gaits=count, commissioning=commissioning, tier=tier,
     )  # fmt: skip
     wrong = np.random.default_rng([seed, 11])
     s = size(bank, wrong) if factor is None else factor
     if kind is Kind.OUTSIDE:
-        name = strange or str(wrong.choice(OUTSIDE))
+        name = strange or str(wrong.choice(OUTSIDE if tier == "B" else STRANGE_WITHOUT_RIG))
         once = name in ("cable_snag", "lateral_push")
         limited = int(wrong.integers(count)) if once else None
         # What happens once must be larger to be seen at all.
         return replace(plain, strange=(name, outside(name, wrong, 1.5 * s if once else s), limited), factor=s)
     number = {Kind.NONE: 0, Kind.SINGLE: 1, Kind.PAIR: 2}[kind]
-    names = effects or tuple(str(name) for name in wrong.choice(list(STARRED), size=number, replace=False))
+    known = [name for name in STARRED if tier == "B" or name not in WITHOUT_RIG]
+    names = effects or tuple(str(name) for name in wrong.choice(known, size=number, replace=False))
     sizes = [s if i == 0 or factor is not None else size(bank, wrong) for i in range(len(names))]
     planted = tuple(
         STARRED[name](Draw(wrong, USUAL.get(name, 1.0) * one, count)) for name, one in zip(names, sizes, strict=True)

@@ -53,7 +53,8 @@ def label(hidden: Hidden, runs: list[Driven], found: Detectable | None, observed
     return {
         "bank": hidden.bank.value, "seed": hidden.seed, "tier": hidden.tier, "kind": hidden.kind.value,
         "observed": observed, "factor": hidden.factor, "friction": hidden.friction, "speed": hidden.speed,
-        "tolerance": hidden.tolerance, "noise_m": hidden.noise_m, "ar1": hidden.ar1, "rate_hz": hidden.rate_hz, "gaits": hidden.gaits,
+        "tolerance": hidden.tolerance, "noise_m": hidden.noise_m, "ar1": hidden.ar1, "rate_hz": hidden.rate_hz,
+        "gaits": hidden.gaits,
         "commissioning": hidden.commissioning,
         "effects": [
             {"id": one.id, "channel": one.channel, "element": one.element, "sizes": one.sizes, "table": one.table,

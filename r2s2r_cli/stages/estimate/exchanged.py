@@ -55,10 +55,10 @@ def check_names(sighted: Sighted, readings: Readings | None, robot: Robot, *, wh
     best = 1 + int(np.argmin(others))
     if found[best] < BETTER * found[0]:
         raise InputError(
-            _what(names[best], robot), where=where,
+            _what(names[best], robot), where=f"robot.toml [[colors]]; {where}",
             expected="lengths of the cable sensors as the camera sees them, but for an offset each",
             received=f"{1e3 * found[0]:.1f} mm apart, {1e3 * found[best]:.1f} mm with other names",
-            hint="r2s2r doctor camera shows which rod has which colour; correct rod in [[colors]] of robot.toml",
+            hint="r2s2r doctor camera --camera replay:10-record.h5 --preview see.png",
         )  # fmt: skip
     if found[best] < TELLS * found[0]:
         return (
@@ -76,7 +76,7 @@ def _what(naming: np.ndarray, robot: Robot) -> str:
     name = [rod.name for rod in robot.rods]
     hue = {color.rod: f" (hue {color.hue[0]:g} to {color.hue[1]:g})" for color in robot.colors}
     parts = [f"rod {name[r]} has that of rod {name[of]}{hue.get(name[of], '')}" for r, of in enumerate(rods) if r != of]
-    return f"the colours in robot.toml are exchanged: by the cables {', '.join(parts)}"
+    return f"the colours in robot.toml are exchanged: by the cables, {', '.join(parts)}"
 
 
 def namings(rods: int) -> Iterator[np.ndarray]:

@@ -24,6 +24,8 @@ FREEDOM = 4.0
 """Of Student's t of the distance from where a cap was expected: it may be far off after it was lost."""
 HERE_M = 0.02
 """[m] A blob no farther from where a cap in sight is expected is a cap of that rod."""
+MOST = 20_000
+"""Labellings that are tried at most: of robots with many rods, only the likeliest pairs of each rod."""
 FIT = 5.0
 """Most that half the squared deviations may be per constraint; beyond, the blobs are not the robot."""
 
@@ -70,6 +72,10 @@ def label(
         pairs = [_with_those_here(of_rod, one, at[here]) for of_rod, one, at, here in near]
     if not all(pairs):
         return None
+    most = max(int(MOST ** (1 / len(pairs))), 2)
+    pairs = [
+        _likeliest(of_rod, one, rod.length_m, most) for of_rod, one, rod in zip(pairs, blobs, robot.rods, strict=True)
+    ]
     picks = np.array([np.concatenate(choice) for choice in itertools.product(*pairs)])
     # The last row stands for a cap that is missing: pick -1.
     sets = [np.vstack([blobs[cap // 2], np.full((1, 3), np.nan)])[picks[:, cap]] for cap in range(robot.n_caps)]
@@ -111,6 +117,18 @@ def _pairs(blobs: np.ndarray, length: float, partly: bool) -> list[tuple[int, in
         return alone
     apart = np.linalg.norm(blobs[:, None] - blobs[None], axis=-1)
     return [(int(i), int(j)) for i, j in np.argwhere(np.abs(apart - length) < 5 * ROD_SD)] + alone
+
+
+def _likeliest(pairs: list[tuple[int, int]], blobs: np.ndarray, length: float, most: int) -> list[tuple[int, int]]:
+    """So many pairs that fit the rod best by themselves."""
+
+    def cost(pair: tuple[int, int]) -> float:
+        a, b = pair
+        if a < 0 or b < 0:
+            return MISSING_COST * sum(i < 0 for i in pair)
+        return 0.5 * float((np.linalg.norm(blobs[b] - blobs[a]) - length) / ROD_SD) ** 2
+
+    return sorted(pairs, key=cost)[:most]
 
 
 def _with_those_here(pairs: list[tuple[int, int]], blobs: np.ndarray, at: np.ndarray) -> list[tuple[int, int]]:

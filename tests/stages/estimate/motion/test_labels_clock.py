@@ -17,6 +17,7 @@ from r2s2r_cli.stages.estimate.motion.sensor_clock import find_clock, hermite
 from r2s2r_cli.stages.estimate.motion.sensors import bin_readings
 from r2s2r_cli.stages.estimate.motion.touching import touching_probability
 from tests.support.camera_motion import Motion, motion, readings
+from tests.support.rig_robots import known
 
 
 @cache
@@ -169,3 +170,19 @@ def test_noise_is_what_residuals_show() -> None:
     shown = 2e-3 * rng.standard_normal(n)
     factor = sensor_variance(shown, np.full(n, 1e-6), np.zeros(n), np.ones(n, dtype=bool))
     assert factor == pytest.approx(4.0, rel=0.1)
+
+
+def test_a_robot_of_six_rods_with_strange_blobs_is_labelled() -> None:
+    """Three blobs a colour of six rods would be millions of labellings; the likely ones hold the right one."""
+    robot = known("sixbar")
+    rest = np.array(robot.rest_caps_m)
+    rng = np.random.default_rng(100)
+    blobs = []
+    for rod in range(6):
+        strange = rest[2 * rod] + np.array([0.0, 0.0, 0.9]) + 0.05 * rng.standard_normal(3)
+        blobs.append(np.stack([rest[2 * rod + 1], strange, rest[2 * rod]]))
+    length = np.linalg.norm(np.diff(rest[[cable.caps for cable in robot.cables]], axis=1)[:, 0], axis=-1)
+    predicted = (rest, np.tile(1e-4 * np.eye(3), (12, 1, 1)))
+    found = label(blobs, robot, length, predicted=predicted, partly=True)
+    assert found is not None
+    np.testing.assert_allclose(found.p_WE, rest)

@@ -160,6 +160,10 @@ def score(
     bank: Annotated[Path, typer.Argument(metavar="BANK", help="Folder of `blind make`.")],
     verdicts: Annotated[Path, typer.Option("--verdicts", metavar="DIR", help="Folder of `blind run`.")],
     key: Annotated[Path, typer.Option("--key", metavar="FILE", help="Of the labels.")],
+    again: Annotated[
+        Path | None,
+        typer.Option("--again", metavar="DIR", help="Verdicts on the same worlds under other noise: how many agree."),
+    ] = None,
     page: Annotated[
         Path | None, typer.Option("--page", metavar="FILE", help="HTML page; default: score.html beside the verdicts.")
     ] = None,
@@ -176,7 +180,7 @@ def score(
     from r2s2r_cli.views.blind import blind_page, blind_tables, draw_blind
 
     console = Console(json=json, quiet=quiet)
-    result = judge(bank, verdicts, read_key(key))
+    result = judge(bank, verdicts, read_key(key), again=again)
     console.document(result)
     for table in blind_tables(result):
         console.table(table.title, table.columns, table.rows)

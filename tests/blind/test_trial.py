@@ -77,6 +77,10 @@ def test_verdicts_are_resumed_and_scored(bank: Path, tmp_path: Path) -> None:
     assert result.scored == result.sets == 2 and result.failed == 0 and not result.warnings
     with pytest.raises(InputError, match="cannot be opened"):
         score(bank, out, labels.new_key(tmp_path / "other.key"))
+    agreed = {row.name: row for row in score(bank, out, key, again=out).rows}["same_verdict"]
+    assert agreed.value == 1.0 and agreed.n == 2
+    with pytest.raises(InputError, match="no second verdict"):
+        score(bank, out, key, again=tmp_path / "none")
     with pytest.raises(InputError, match="answers another question"):
         left(all_jobs(bank, out, settings={"seed": 1}))
 

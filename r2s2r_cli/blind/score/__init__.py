@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,25 +16,30 @@ from r2s2r_cli.blind import labels
 from r2s2r_cli.blind.index import digest, read_index
 from r2s2r_cli.blind.score.calibrate import calibrated, case
 from r2s2r_cli.blind.score.facts import Said, Truth, said_of, truth_of
-from r2s2r_cli.blind.score.rows import BINS, CLASSES_LAST, CONTROL, METRICS, calibration_error, coverage, row
+from r2s2r_cli.blind.score.rows import AGAIN, BINS, CLASSES_LAST, CONTROL, METRICS, calibration_error, coverage, row
 from r2s2r_cli.blind.split import Bank
 from r2s2r_cli.errors import InputError
-from schemas.results_blind import BlindBin, BlindMiss, BlindRecall, BlindScoreResult
+from schemas.results_blind import BlindBin, BlindMiss, BlindRecall, BlindRow, BlindScoreResult
 
 __all__ = ["calibration", "score", "score_of"]
 
 
-def score(bank: Path, verdicts: Path, key: bytes) -> BlindScoreResult:
-    """The table of a bank. Raises InputError where a hash is not the published one, the key is another, or there is no
-    verdict."""
+def score(bank: Path, verdicts: Path, key: bytes, *, again: Path | None = None) -> BlindScoreResult:
+    """The table of a bank. again: verdicts on the same worlds under other noise (a bank of the same key, made with
+    another `--observed`), to be compared. Raises InputError where a hash is not the published one, the key is another,
+    or there is no verdict.
+    """
     opened = _opened(bank, verdicts, key)
     found = [(name, truth_of(label), said_of(verdict)) for name, label, verdict in opened.sets]
     missing = opened.missing
     shuffled = any(verdict["shuffled"] is not None for _, _, verdict in opened.sets)
     index, own = opened.index, opened.own
     warnings = (f"{len(missing)} sets have no verdict: only the others are counted",) if missing else ()
-    return score_of(found, tier=index["tier"], bank=index["bank"], sets=len(index["sets"]), index=own,
+    result = score_of(found, tier=index["tier"], bank=index["bank"], sets=len(index["sets"]), index=own,
                     warnings=warnings, shuffled=shuffled)  # fmt: skip
+    if again is None:
+        return result
+    return result.model_copy(update={"rows": (*result.rows, _same(found, again, result.tier))})
 
 
 def calibration(bank: Path, verdicts: Path, key: bytes) -> dict[str, Any]:
@@ -113,6 +118,21 @@ def _verdict(path: Path, index: str) -> dict[str, Any]:
         raise InputError("a verdict reached for the truth", where=str(path), expected="nothing refused",
                          received=str(verdict["refused"][0]), hint=f"rm {path}")  # fmt: skip
     return verdict
+
+
+def _same(found: Sequence[tuple[str, Truth, Said]], again: Path, tier: Any) -> BlindRow:
+    """How often other noise on the same world leaves the verdict as it is."""
+    pairs = []
+    for name, truth, said in found:
+        path = again / f"{name}.json"
+        if path.exists():
+            other = said_of(json.loads(path.read_text(encoding="utf-8")))
+            pairs.append((truth, replace(said, failed=(said.verdict, said.named) != (other.verdict, other.named))))
+    if not pairs:
+        raise InputError("there is no second verdict on any of these sets", where=str(again),
+                         expected="verdicts on a bank of the same key, made with --observed 1", received="none",
+                         hint="r2s2r blind make --observed 1 --key SAME.key again")  # fmt: skip
+    return row(AGAIN, pairs, tier)
 
 
 def _decided(t: Truth) -> bool:

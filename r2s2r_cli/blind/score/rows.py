@@ -186,4 +186,7 @@ METRICS = (
 CONTROL = Metric("shuffled_named", "a name is committed to although the commands were exchanged (negative control)",
                  {"A": 0.0, "B": 0.0}, lambda p: bool(p[1].named), above=False)  # fmt: skip
 """The only row where commands were exchanged between target intervals: nothing may be named."""
+AGAIN = Metric("same_verdict", "the same verdict under other noise on the same world (negative control)",
+               {"A": 0.95, "B": 0.95}, lambda p: not p[1].failed)  # fmt: skip
+"""Where `failed` says that both verdicts differ."""
 CLASSES_LAST = (NONE, UNKNOWN)

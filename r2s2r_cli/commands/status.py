@@ -171,16 +171,16 @@ def _forward(project: Project) -> str:
         return "r2s2r import run.csv"
     place = every[-1]
     if not place.artifact("recording").exists():  # it learns from the iteration before
-        return _planned(place, ("identification", "plan"))
+        return _planned(project, place, ("identification", "plan"))
     held = list(read_header(place.artifact("recording")).datasets)
     if not any(name.endswith("/caps/p_WE") or "/camera/depth" in name for name in held):
         # Nothing to estimate states from yet; sensors alone tell how far the robot repeats itself.
         repeats = len({name.split("/")[1] for name in held if name.startswith("runs/")}) > 1
         return "r2s2r floor" if repeats and not project.artifact("floor", None).exists() else ""
-    return _planned(place, ("estimate", "identification", "plan"))
+    return _planned(project, place, ("estimate", "identification", "plan"))
 
 
-def _planned(place: Iteration, kinds: Sequence[str]) -> str:
+def _planned(project: Project, place: Iteration, kinds: Sequence[str]) -> str:
     """The next command of an iteration whose robot has done what it can without a plan."""
     for kind in kinds:
         if not place.artifact(kind).exists():
@@ -190,7 +190,18 @@ def _planned(place: Iteration, kinds: Sequence[str]) -> str:
             return f"r2s2r estimate --of execute --iteration {place.number}"
         if not place.artifact("comparison").exists():
             return f"r2s2r compare --iteration {place.number}"
+    elif place.artifact("plan").exists() and _moved_by_us(project):
+        return f"r2s2r execute --iteration {place.number} --dry-run"
     return ""
+
+
+def _moved_by_us(project: Project) -> bool:
+    """Whether any run of the project was recorded here: a robot can be asked for more, a log cannot."""
+    from r2s2r_cli.commands.stage import MEASURED
+
+    places = project.iterations()
+    found = [place.artifact("recording", executed=executed) for place in places for executed in (False, True)]
+    return any(path.exists() and read_header(path).provenance.stage in MEASURED for path in found)
 
 
 def _size(count: int) -> str:

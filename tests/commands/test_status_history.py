@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from r2s2r_cli.commands.status import _forward
+from r2s2r_cli.store.project import Iteration
 from r2s2r_cli.store.write import write_artifact
 from schemas.results_compare import CompareFloor, CompareHistory, CompareMeasure, CompareReport
 from tests.commands.conftest import document, invoke
@@ -57,3 +60,16 @@ def test_without_a_report_nothing_is_told(project: Path, broken: bool) -> None:
         path = project / "iterations" / "001" / "60-compare.h5"
         path.write_bytes(path.read_bytes()[:300])
     assert document("status")["history"] == []
+
+
+@pytest.mark.parametrize(("stage", "hint"), [("record", "r2s2r execute --iteration 1 --dry-run"), ("import", "")])
+def test_a_plan_is_executed_where_there_is_a_robot(tmp_path: Path, stage: str, hint: str) -> None:
+    """After the plan its execution is proposed, in a project whose runs came from a robot and not from a log."""
+    place = Iteration(1, tmp_path / "iterations" / "001")
+    place.path.mkdir(parents=True)
+    (tmp_path / "project.toml").write_text("")
+    write_artifact(place.artifact("recording"), builders.recording(), builders.provenance(stage=stage, inputs=()))
+    for kind, data in (("estimate", builders.estimate()), ("identification", builders.identification()),
+                       ("plan", builders.plan())):  # fmt: skip
+        write_artifact(place.artifact(kind), data, builders.provenance(stage="x", inputs=()))
+    assert _forward(SimpleNamespace(iterations=lambda: [place], artifact=None)) == hint  # type: ignore[arg-type]

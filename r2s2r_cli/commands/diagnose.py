@@ -146,12 +146,18 @@ def _compute(
     begun = time.monotonic()
     with _shown(console, seconds) as progress:
         data, report = stage.diagnosed(
-            evidence, settings, seed=asked.seed, effects=asked.effects or None,
+            evidence, settings, seed=asked.seed, effects=asked.effects or None, policies=asked.policies(),
             cache_dir=asked.project.cache, progress=progress, checkpoint=checkpoint,
         )  # fmt: skip
+    if report.next_gait is not None:
+        target = asked.project.artifact("diagnosis", asked.iteration)
+        file = asked.project.relative(target.with_name(target.stem + NEXT))
+        report = report.model_copy(update={"next_gait": report.next_gait.model_copy(update={"file": file})})
     return data, report.model_copy(update={"wall_s": time.monotonic() - begun, "seconds": seconds})
 
 
+NEXT = "-next.toml"
+"""What is added to the artifact's name for the policy that should be run next."""
 PARTS = ("parity", "healthy runs", "refit", "screening", "fits", "left out", "where", "judged", "next gait")
 """Of the work, in its order."""
 
@@ -197,11 +203,28 @@ def _draw(data: ArtifactData, report: DiagnoseReport) -> Iterator[tuple[str, byt
     from r2s2r_cli.views.diagnose import draw_diagnosis
     from r2s2r_cli.views.diagnose_page import diagnose_page
 
+    if report.next_gait is not None:
+        yield NEXT, _policy(report)
     pictures = []
     for name, title, png in draw_diagnosis(data, report):
         yield f"-{name}.png", png
         pictures.append((title, png))
     yield ".html", diagnose_page(report, pictures)
+
+
+def _policy(report: DiagnoseReport) -> bytes:
+    """The next gait as a policy file."""
+    import tomlkit
+
+    one = report.next_gait
+    assert one is not None  # noqa: S101 - asked by the caller
+    pairs = ", ".join(sorted({name for pair in report.confusable for name in pair[:2]}))
+    head = {
+        "schema_version": 1, "robot": report.robot, "name": "next-gait",
+        "description": f"{one.name}: separates what diagnose could not decide between ({pairs})",
+        "steps": [{"target": list(target)} for target in one.targets],
+    }  # fmt: skip
+    return tomlkit.dumps(head).encode()
 
 
 def _show(report: DiagnoseReport, console: Console) -> None:

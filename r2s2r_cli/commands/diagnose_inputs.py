@@ -54,6 +54,11 @@ class Asked:
         """The floor of the project, there or not."""
         return self.project.artifact("floor", None)
 
+    @property
+    def plan_file(self) -> Path:
+        """The plan of the iteration, there or not: its policies may be what to run next."""
+        return self.iteration.artifact("plan")
+
     @cached_property
     def sources(self) -> tuple[Source, ...]:
         """Where the runs lie. Raises ArtifactError, UsageError as `identify`."""
@@ -67,7 +72,7 @@ class Asked:
         require_input(self.identification, f"r2s2r identify --iteration {self.iteration.number}")
         paths = [path for source in self.sources for path in (source.recording, source.estimate)]
         paths.append(self.identification)
-        paths += [path for path in (self.floor_file,) if path.exists()]
+        paths += [path for path in (self.floor_file, self.plan_file) if path.exists()]
         return [artifact_ref(self.project, path, whole_header(path)) for path in paths]
 
     def evidence(self) -> Evidence:
@@ -90,6 +95,16 @@ class Asked:
         made = Evidence(robot, model, diagnosed, fit, judge, self._floor(), healthy)
         require_enough(made)
         return made
+
+    def policies(self) -> dict[str, list[list[float]]]:
+        """Target vectors of the planned policies by name; none where nothing was planned."""
+        from r2s2r_cli.store.read import read_artifact
+
+        if not self.plan_file.exists():
+            return {}
+        groups = read_artifact(self.plan_file, "plan")[1].groups
+        own = {path.partition("/")[2]: group for path, group in groups.items() if path.startswith("policies/")}
+        return {name: group["target"].tolist() for name, group in own.items() if "target" in group.datasets}
 
     def _runs(self) -> tuple[Run, ...]:
         """All runs, named as `identify` names them."""

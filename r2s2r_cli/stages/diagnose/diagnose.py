@@ -106,7 +106,13 @@ def diagnose(
     found: Where | None = None
     if settings.with_where:
         found = where(
-            evidence, compared.arena, compared.base.z, seed=settings.seed, cache_dir=cache_dir, threads=threads, told=progress
+            evidence,
+            compared.arena,
+            compared.base.z,
+            seed=settings.seed,
+            cache_dir=cache_dir,
+            threads=threads,
+            told=progress,
         )
     shrunk = None
     if settings.with_much and evidence.judge:

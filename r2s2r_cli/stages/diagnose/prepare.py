@@ -13,7 +13,8 @@ from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
-from r2s2r_cli.stages.diagnose.which.stretches import stretches
+from r2s2r_cli.stages.diagnose.which.score import LOST_M
+from r2s2r_cli.stages.diagnose.which.stretches import Stretch, stretches
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.diagnose.starts import Starts
 from r2s2r_cli.stages.measures.floor import floor_of
@@ -26,6 +27,8 @@ FLOORS = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.0, 4.0)
 NOISES = (1.0, 1.4, 2.0, 2.8)
 ROUNDS = 2
 """Times that start states are made anew with the refitted numbers."""
+KEPT = 0.9
+"""Share of healthy stretches that the floor is taken from: a tip-over that went the other way is not the floor."""
 NO_FLOOR_M = 1e-4
 FROZEN = 1e8
 """Times its prior's precision that a nuisance has which is not fitted."""
@@ -54,7 +57,9 @@ def refit(
     starts: Starts,
     told: Told,
     kept: Mapping[str, Any] | None = None,
-    keep: Callable[[str, Any], None] = lambda name, value: None, again: bool = True, with_floor: bool = True,
+    keep: Callable[[str, Any], None] = lambda name, value: None,
+    again: bool = True,
+    with_floor: bool = True,
 ) -> Refit:
     """The nominal model fitted again to the intervals of `fit`, its nuisances alone. kept, keep: nuisances that were
     reached before an interruption, and where to keep them. again: False, they stay as they were, with_floor: False, the
@@ -75,7 +80,9 @@ def refit(
             Selection(run.name, tuple(i + 1 for i, whole in enumerate(run.caps.intervals.complete.tolist()) if whole))
             for run in evidence.healthy
         )
-        arena, base = _fitted(evidence.healthy, part, replayer, simulator, 1.0, None, starts, _known(kept, "healthy"), rounds=2)
+        arena, base = _fitted(
+            evidence.healthy, part, replayer, simulator, 1.0, None, starts, _known(kept, "healthy"), rounds=2
+        )
         simulator, noise = _calibrated(arena, base) if with_floor else (simulator, noise)
         arena.whiten(floor_m=simulator, noise=noise)
         prior = _posterior(arena, base)
@@ -85,7 +92,9 @@ def refit(
             sensor = float(np.sqrt(np.mean([np.sum(one.noise[-1] ** 2, axis=-1).mean() for one in arena.many])))
             ends = Fits(arena)
             key = arena.ends(ends.values(base.hypothesis, base.z[None], np.zeros((1, 0))), base.z[None])[0]
-            rmse = float(np.sqrt(np.mean(np.sum(key**2, axis=-1))))
+            squared = np.sum(key**2, axis=-1).mean(axis=-1)
+            usual = squared[squared <= np.quantile(squared, KEPT)]
+            rmse = float(np.sqrt(np.mean(usual)))
             floor = FloorGiven(rmse, min(sensor, rmse), "the healthy runs, refitted", True)
         told("healthy runs", 1, 1)
     arena, base = _fitted(evidence.runs, evidence.fit, replayer, simulator, noise, prior, starts,
@@ -93,6 +102,12 @@ def refit(
     if not again:
         arena, base = _frozen(arena, base, prior)
     keep("refit", base.z.tolist())
+    asked = sum(len(one.intervals) for one in evidence.fit)
+    if len(arena.many) < asked:
+        warnings.append(
+            f"{asked - len(arena.many)} of {asked} intervals to fit were left out: the robot tips over in them, or they "
+            "could not be simulated from where they start"
+        )
     return Refit(arena, base, floor, tuple(warnings))
 
 
@@ -154,6 +169,10 @@ def _fitted(
             )  # fmt: skip
         arena = Arena(replayer, many, floor_m=simulator, noise=noise, prior=prior)
         z = _begun(arena, z)
+        kept = _simulated(arena, z)
+        if 2 <= len(kept) < len(many):
+            arena = Arena(replayer, kept, floor_m=simulator, noise=noise, prior=prior)
+            z = _begun(arena, z[: arena.shared])
         for _ in range(JACOBIANS):
             arena.prepare(z)
             fits = Fits(arena)
@@ -164,6 +183,13 @@ def _fitted(
     if told is not None:
         told("refit", rounds, rounds)
     return arena, base
+
+
+def _simulated(arena: Arena, z: np.ndarray) -> list[Stretch]:
+    """The stretches that the nominal simulator does not throw across the room: where a start is tangled, nothing can be
+    learned from what follows."""
+    away = np.abs(arena.ends(arena.values(z[None]), z[None])[0]).max(axis=(1, 2))
+    return [one for one, far in zip(arena.many, away, strict=True) if far < LOST_M]
 
 
 def _frozen(arena: Arena, base: Fit, prior: tuple[np.ndarray, np.ndarray] | None) -> tuple[Arena, Fit]:

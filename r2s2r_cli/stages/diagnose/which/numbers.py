@@ -22,7 +22,11 @@ if TYPE_CHECKING:
     from r2s2r_cli.engine import Parameters
 
 NUMERICS = {
-    "rolling_resistance": 0.15, "soft_ground": 0.15, "command_latency": 0.4, "motor_lag": 0.4, "load_droop": 0.3,
+    "rolling_resistance": 0.15,
+    "soft_ground": 0.15,
+    "command_latency": 0.4,
+    "motor_lag": 0.4,
+    "load_droop": 0.3,
     "camera_delay": 0.3,
 }
 """Effects that another engine, or the robot as it was built, has a little of: nuisances too, near their off values. By

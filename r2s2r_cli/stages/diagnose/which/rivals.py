@@ -74,5 +74,6 @@ def chance(
     for g in range(len(names)):
         without = G.sum(axis=0) - G[g] + prior
         a = (b.sum(axis=0) - b[g]) / without
-        gain += a * b[g] - 0.5 * a**2 * G[g] - 0.5 * np.log1p(G[g] / without)
+        left = b[g] - a * G[g]
+        gain += a * b[g] - 0.5 * a**2 * G[g] + 0.5 * left**2 / (without + G[g]) - 0.5 * np.log1p(G[g] / without)
     return float(np.quantile(gain.max(axis=1), level))

@@ -15,7 +15,7 @@ from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
 from r2s2r_cli.stages.diagnose.which.robust import minus_log, weight
 
-LOST_M = 0.5
+LOST_M = 0.25
 """A cap that is simulated so far from where it was has left the finite numbers in all but name."""
 
 
@@ -57,9 +57,9 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: b
     """Of every fit, all hypotheses and groups in one batch. held_out: False, nothing is left out (an ablation)."""
     solver = Fits(arena)
     names = np.unique(groups)
-    points, covariances = [], []
+    points, precisions = [], []
     for fit in fits:
-        H, _ = solver.normal(fit)
+        H, gradient = solver.normal(fit)
         w = weight(arena.squares(fit.residual[None])[0], arena.sizes)
         for name in names:
             own, pull = np.zeros_like(H), np.zeros(len(H))
@@ -68,14 +68,14 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: b
                 own += w[k] * J.T @ J
                 pull += w[k] * J.T @ fit.residual[arena.white[k].rows]
             P = np.linalg.pinv(H - own, hermitian=True)
-            points.append(_placed(arena, fit, P @ pull))
-            covariances.append(P)
+            points.append(_placed(arena, fit, P @ (pull - gradient)))
+            precisions.append(H - own)
     values = np.concatenate([
         solver.values(fits[i // len(names)].hypothesis, z[None], x[None]) for i, (z, x) in enumerate(points)
     ])  # fmt: skip
     white, key = arena.look(values, np.array([z for z, _ in points]))
     return [
-        _score(arena, fit, groups, names, points[rows], covariances[rows], white[rows], key[rows], solver)
+        _score(arena, fit, groups, names, points[rows], precisions[rows], white[rows], key[rows], solver)
         for fit, rows in ((fit, slice(i * len(names), (i + 1) * len(names))) for i, fit in enumerate(fits))
     ]
 
@@ -88,23 +88,23 @@ def _placed(arena: Arena, fit: Fit, by: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 def _score(
     arena: Arena, fit: Fit, groups: np.ndarray, names: np.ndarray, points: Sequence[tuple[np.ndarray, np.ndarray]],
-    covariances: Sequence[np.ndarray], white: np.ndarray, key: np.ndarray, solver: Fits,
+    precisions: Sequence[np.ndarray], white: np.ndarray, key: np.ndarray, solver: Fits,
 ) -> Score:  # fmt: skip
     elpd, misfit = np.full(len(groups), -np.inf), np.full(len(groups), np.inf)
     ends = np.full(key.shape[1:], np.nan)
     for k, own in enumerate(arena.white):
         g = int(np.searchsorted(names, groups[k]))
-        r, J, P = white[g, own.rows], fit.jacobian[own.rows], covariances[g]
+        r, J, without = white[g, own.rows], fit.jacobian[own.rows], precisions[g]
         ends[k] = key[g, k]
         if not np.isfinite(r).all() or np.abs(key[g, k]).max() > LOST_M:
             # The step left the robots that can be: what the derivatives say of it stands in.
             by = np.concatenate(points[g]) - np.concatenate([fit.z, fit.x])
             r, ends[k] = fit.residual[own.rows] + J @ by, np.nan
         # Woodbury: r' (1 + J P J')^-1 r, in as many numbers as there are parameters.
-        inner = np.linalg.inv(P + 1e-12 * np.trace(P) * np.eye(len(P))) + J.T @ J
+        inner = without + J.T @ J
         along = J.T @ r
-        square = max(float(r @ r - along @ np.linalg.solve(inner, along)), 0.0)
-        spread = float(np.linalg.slogdet(np.eye(len(P)) + P @ (J.T @ J))[1])
+        square = max(float(r @ r - along @ np.linalg.pinv(inner, hermitian=True) @ along), 0.0)
+        spread = float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(without)[1])
         elpd[k] = -float(minus_log(np.array(square), np.array(own.size))) - 0.5 * spread - 0.5 * own.logdet
         misfit[k] = square / own.size
     H, _ = solver.normal(fit)

@@ -1,0 +1,64 @@
+"""The model of a diagnosis: off is nominal to the last bit, factors are factors, every effect has candidates."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from r2s2r_cli.effects import CATALOGUE
+from r2s2r_cli.engine.flat import pack_parameters
+from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY, candidates
+from r2s2r_cli.stages.diagnose.which.numbers import Model
+from r2s2r_cli.stages.identified import nominal
+from tests.support.builders import robot
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    """Of the example robot, the whole catalogue at hand."""
+    return Model(nominal(robot()))
+
+
+def test_off_values_are_the_nominal_simulator(model: Model) -> None:
+    """With nothing changed the parameters are those of robot.toml, bit by bit."""
+    base = nominal(robot()).theta
+    theta = model.theta(model.values0)
+    assert torch.equal(theta.friction, base.friction) and torch.equal(theta.speed_in, base.speed_in)
+    assert torch.equal(theta.stiffness, base.stiffness) and torch.equal(theta.restitution, base.restitution)
+
+
+def test_a_factor_multiplies_and_a_batch_is_its_rows(model: Model) -> None:
+    """exp(x) times the nominal number; several hypotheses at once are the same as one by one."""
+    two = np.repeat(model.values0[None], 2, axis=0)
+    two[1, model.place["friction"]] = np.log(1.5)
+    both = model.theta(two)
+    assert both.friction[1] == pytest.approx((1.5 * both.friction[0]).numpy())
+    alone = pack_parameters(model.structure, model.theta(two[1]))
+    assert torch.equal(pack_parameters(model.structure, both)[1], alone[0])
+
+
+def test_every_effect_but_those_of_parity_can_be_a_hypothesis(model: Model) -> None:
+    """Each has tries within its bounds, none of which is off."""
+    made = candidates(model)
+    assert {one.effect for one in made} == {effect.name for effect in CATALOGUE} - set(NO_REPLAY)
+    for one in made:
+        assert len(one.tries), one.label
+        assert np.all(one.tries >= one.lower) and np.all(one.tries <= one.upper), one.label
+        assert np.all(np.any(one.tries != one.off, axis=1)), one.label
+
+
+def test_what_parity_suspects_is_tried_first(model: Model) -> None:
+    """A size by element goes to that element alone."""
+    made = candidates(model, {"motor_speed_mismatch": {"factor.2": 0.83}})
+    by_motor = {one.element.index: one for one in made if one.effect == "motor_speed_mismatch" and one.element}
+    assert by_motor[2].tries[0] == pytest.approx([0.83])
+    assert by_motor[1].tries[0] != pytest.approx([0.83])
+
+
+def test_a_patch_is_tried_where_caps_stood(model: Model) -> None:
+    """The centre of a patch starts at the places that were touched, and nowhere else."""
+    touched = np.array([[0.1, 0.2], [-0.3, 0.4]])
+    patch = next(one for one in candidates(model, None, touched) if any("patch_x_m" in name for name in one.names))
+    centres = {tuple(row) for row in patch.tries[:, 1:3].round(6).tolist()}
+    assert centres == {(0.1, 0.2), (-0.3, 0.4)}

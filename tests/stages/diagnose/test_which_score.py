@@ -1,0 +1,163 @@
+"""Scores without a simulator: a linear arena, of which everything can be worked out by hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.stages.diagnose.which.arena import White
+from r2s2r_cli.stages.diagnose.which.candidates import Candidate
+from r2s2r_cli.stages.diagnose.which.fit import Fits, Hypothesis
+from r2s2r_cli.stages.diagnose.which.rivals import chance, no_gap
+from r2s2r_cli.stages.diagnose.which.robust import DOF, minus_log, weight
+from r2s2r_cli.stages.diagnose.which.score import Score, scores
+from r2s2r_cli.stages.diagnose.which.screen import Response, screen
+
+STRETCHES, EACH = 6, 60
+
+
+class LinearArena:
+    """residual = y - (A z + B x), white; stretches of EACH numbers, two a gait. The model's values are [z | x]."""
+
+    def __init__(self, truth: float, *, noise: float = 1.0, seed: int = 0) -> None:
+        rng = np.random.default_rng(seed)
+        M = STRETCHES * EACH
+        self.A, self.B = rng.standard_normal((M, 2)), rng.standard_normal((M, 2))
+        self.y = self.A @ [0.3, -0.2] + self.B[:, 0] * truth + noise * rng.standard_normal(M)
+        self.mean, self.precision = np.zeros(2), np.eye(2)
+        self.lower, self.upper = np.full(2, -10.0), np.full(2, 10.0)
+        self.by_nuisance = self.A.copy()
+        self.engine = [0, 1]
+        self.many = tuple(range(STRETCHES))
+        self.gait = np.arange(STRETCHES) // 2
+        self.white = [
+            White(np.zeros((0, 0, 0)), np.zeros((0, 0)), np.zeros(0), slice(k * EACH, (k + 1) * EACH), EACH)
+            for k in range(STRETCHES)
+        ]
+        self.sizes = np.full(STRETCHES, float(EACH))
+
+    def values(self, z: np.ndarray) -> np.ndarray:
+        """Off."""
+        return np.concatenate([z, np.zeros((len(z), 2))], axis=1)
+
+    def residuals(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """(k, M)."""
+        return np.asarray(z @ self.A.T + values[:, 2:] @ self.B.T - self.y)
+
+    def look(self, values: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """With key frames of one cap."""
+        white = self.residuals(values, z)
+        return white, np.zeros((len(white), STRETCHES, 1, 3))
+
+    def squares(self, residual: np.ndarray) -> np.ndarray:
+        """By stretch."""
+        return np.asarray((residual.reshape(len(residual), STRETCHES, EACH) ** 2).sum(axis=-1))
+
+
+def candidate(name: str, place: int) -> Candidate:
+    """Number `place` of B, off at 0."""
+    one = np.ones(1)
+    return Candidate(name, "motor", None, ((2 + place,),), (f"{name}.x",), ("1",), 0 * one, -5 * one, 5 * one, one,
+                     np.array([[0.5], [-0.5], [1.5], [-1.5]]))  # fmt: skip
+
+
+@dataclass
+class Tried:
+    """Fits of the refit model, the true effect and a wrong one, with their scores."""
+
+    arena: LinearArena
+    fits: list
+    scores: list[Score]
+
+
+def tried(truth: float, seed: int = 0) -> Tried:
+    """All three, fitted from the same start."""
+    arena = LinearArena(truth, seed=seed)
+    solver = Fits(arena)  # type: ignore[arg-type]
+    made = []
+    for hypothesis in (Hypothesis(), Hypothesis((candidate("right", 0),)), Hypothesis((candidate("wrong", 1),))):
+        x = np.zeros(len(hypothesis.parts))
+        residual = arena.residuals(solver.values(hypothesis, np.zeros((1, 2)), x[None]), np.zeros((1, 2)))[0]
+        made.append(solver.begin(hypothesis, np.zeros(2), x, residual))
+    solver.run(made)
+    return Tried(arena, made, scores(arena, made, arena.gait))  # type: ignore[arg-type]
+
+
+def test_a_fit_finds_the_planted_size_and_the_nuisances() -> None:
+    """A linear problem is solved in a step or two, within the errors of its noise."""
+    found = tried(0.8)
+    assert found.fits[1].x == pytest.approx([0.8], abs=0.15)
+    assert found.fits[1].z == pytest.approx([0.3, -0.2], abs=0.15)
+    assert found.fits[1].moved and not found.fits[1].on_bound
+
+
+def test_the_right_effect_predicts_better_and_the_wrong_one_does_not() -> None:
+    """Held-out gain: large for what was planted, below what chance gives for the other."""
+    found = tried(0.8)
+    none, right, wrong = (one.total for one in found.scores)
+    assert right - none > 50
+    assert wrong - none < 3
+
+
+def test_leaving_a_gait_out_is_fitting_without_it() -> None:
+    """The one step to the numbers without a gait lands where a weighted fit of the others is."""
+    found = tried(0.8)
+    fit, arena = found.fits[1], found.arena
+    w = weight(arena.squares(fit.residual[None])[0], arena.sizes)
+    rows = np.repeat(w, EACH)
+    keep = np.repeat(arena.gait != 0, EACH)
+    J = np.concatenate([arena.A, arena.B[:, :1]], axis=1)[keep]
+    prior = np.diag([1.0, 1.0, 0.25])
+    direct = np.linalg.solve(J.T @ (rows[keep, None] * J) + prior, J.T @ (rows[keep] * arena.y[keep]))
+    assert found.scores[1].without[0] == pytest.approx(direct, abs=2e-3)
+
+
+def test_without_an_effect_chance_is_not_beaten_often() -> None:
+    """Of 40 sets without an effect, the better of two candidates beats the 95 % bound of chance in few."""
+    beaten = 0
+    for seed in range(40):
+        found = tried(0.0, seed=seed)
+        base = found.fits[0]
+        responses = screen(found.arena, base, [candidate("right", 0), candidate("wrong", 1)])  # type: ignore[arg-type]
+        bound = chance(found.arena, responses, found.arena.gait)  # type: ignore[arg-type]
+        beaten += max(one.total for one in found.scores[1:]) - found.scores[0].total > bound
+    assert beaten <= 6
+
+
+def test_one_bad_stretch_does_not_decide() -> None:
+    """A stretch that is off by a hundred sd costs about as much under every hypothesis."""
+    squares, size = np.array([60.0, 60.0 * 1e4]), np.array([60.0, 60.0])
+    better = np.array([60.0, 60.0 * 0.9e4])
+    gained = minus_log(squares, size) - minus_log(better, size)
+    assert gained[1] == pytest.approx(0.5 * (DOF + 60) * np.log(1 / 0.9), rel=1e-3)
+    assert weight(squares, size)[1] < 1e-3
+
+
+def test_equivalence_needs_data() -> None:
+    """Errors at the floor of many stretches show that there is no gap; two stretches do not."""
+
+    def of(count: int) -> Score:
+        key = np.random.default_rng(1).normal(0, 0.005 / np.sqrt(3), (count, 6, 3))
+        return Score(np.zeros(count), np.ones(count), key, np.zeros(1), np.zeros((1, 1)))
+
+    assert no_gap(of(40), 0.005).equivalent
+    assert not no_gap(of(40), 0.003).equivalent
+    two = Score(np.zeros(2), np.ones(2), np.stack([np.full((6, 3), 0.001), np.full((6, 3), 0.006)]), np.zeros(1),
+                np.zeros((1, 1)))  # fmt: skip
+    assert not no_gap(two, 0.005).equivalent
+
+
+def test_a_response_that_nuisances_explain_is_absorbed() -> None:
+    """A candidate along a nuisance is absorbed whole, an unrelated one hardly."""
+    arena = LinearArena(0.0)
+    arena.B[:, 0] = arena.A[:, 0]
+    solver = Fits(arena)  # type: ignore[arg-type]
+    base = solver.begin(Hypothesis(), np.zeros(2), np.zeros(0), arena.residuals(np.zeros((1, 4)), np.zeros((1, 2)))[0])
+    found: dict[str, Response] = {
+        one.candidate.effect: one
+        for one in screen(arena, base, [candidate("along", 0), candidate("across", 1)])  # type: ignore[arg-type]
+    }
+    assert found["along"].absorbed == pytest.approx(1.0, abs=1e-9)
+    assert found["across"].absorbed < 0.05

@@ -27,11 +27,12 @@ def open_executor(spec: str, workers: int) -> Iterator[Executor]:
     Raises UsageError for another kind of address or where dask is not installed, HardwareError where no scheduler
     answers.
     """
+    close: Callable[[], object] = lambda: None  # noqa: E731 - what an executor of somebody else's needs beside shutdown
     if spec == LOCAL:
         # Fresh interpreters: nothing of this process (loaded modules, threads of torch) goes along.
         executor: Executor = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
     elif spec.startswith(DASK):
-        executor = _dask(spec)
+        executor, close = _dask(spec)
     else:
         raise UsageError(
             "there is no such executor", where="--executor", expected="local, or dask://host:port", received=spec,
@@ -42,7 +43,10 @@ def open_executor(spec: str, workers: int) -> Iterator[Executor]:
     except BaseException:
         executor.shutdown(wait=False, cancel_futures=True)
         raise
-    executor.shutdown()
+    else:
+        executor.shutdown()
+    finally:
+        close()
 
 
 def each(
@@ -81,7 +85,7 @@ def _held(work: Callable[[Item], Result], item: Item) -> Result | _Broken:
         return _Broken(type(error), {name: getattr(error, name) for name in names})
 
 
-def _dask(spec: str) -> Executor:
+def _dask(spec: str) -> tuple[Executor, Callable[[], object]]:
     try:
         from distributed import Client
     except ImportError as error:
@@ -98,4 +102,4 @@ def _dask(spec: str) -> Executor:
             hint="dask scheduler --port 8786",
         ) from error  # fmt: skip
     executor: Executor = client.get_executor()
-    return executor
+    return executor, client.close

@@ -40,3 +40,24 @@ def test_another_address_is_refused() -> None:
     """With what is known."""
     with pytest.raises(UsageError, match="no such executor"), open_executor("slurm://x", 1):
         pass
+
+
+@pytest.mark.slow
+def test_two_workers_of_dask_do_the_same() -> None:
+    """A scheduler on this machine with two workers; needs the extra `cluster`, and is left out without it."""
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None, protocol="tcp"
+        ) as cluster,
+        open_executor(cluster.scheduler_address.replace("tcp://", "dask://"), 1) as pool,
+    ):
+        found = dict(each(pool, doubled, range(6), at_once=2))
+        with pytest.raises(InputError, match="no"):
+            list(each(pool, refuse, ["x.csv"], at_once=1))
+    assert found == {x: 2 * x for x in range(6)}
+
+
+def doubled(x: int) -> int:
+    """Twice as much."""
+    return 2 * x

@@ -194,8 +194,8 @@ def _answer(result: Any, report: DiagnoseReport | None) -> DiagnoseResult:
     shared: dict[str, Any] = result.model_dump(exclude={"schema_"})
     if report is None:
         return DiagnoseResult(**shared)
-    names = ("verdict", "effects", "probability", "set90", "ranking", "where", "shrinkage", "not_testable", "confusable",
-             "next_gait")  # fmt: skip
+    names = ("verdict", "effects", "probability", "set90", "ranking", "where", "shrinkage", "not_testable",
+             "confusable", "next_gait")  # fmt: skip
     return DiagnoseResult(**shared, **{name: getattr(report, name) for name in names})
 
 

@@ -88,8 +88,9 @@ class Asked:
         healthy = tuple(run for run in runs if run.name in self.healthy)
         missing = [name for name in self.healthy if name not in {run.name for run in runs}]
         if missing:
+            known = [run.name for run in runs]
             raise UsageError("there is no such run", where="--healthy", received=missing[0],
-                             expected=", ".join(run.name for run in runs), hint=f"--healthy {runs[0].name}")  # fmt: skip
+                             expected=", ".join(known), hint=f"--healthy {known[0]}")  # fmt: skip
         diagnosed = tuple(run for run in runs if run.name not in self.healthy)
         fit, judge = self._split(diagnosed, found)
         made = Evidence(robot, model, diagnosed, fit, judge, self._floor(), healthy)

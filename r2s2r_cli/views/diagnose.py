@@ -44,8 +44,8 @@ def _gap(data: ArtifactData, report: DiagnoseReport) -> bytes:
             t0, t1 = rows["t"][row]
             stands_out = bool(rows["gap"][row])
             own.axvspan(t0, t1, color=GUILTY if stands_out else PLAIN, alpha=0.14, lw=0)
-            own.annotate(str(rows["interval"][row]), ((t0 + t1) / 2, 1.0), xycoords=("data", "axes fraction"), ha="center",
-                         va="bottom", fontsize=7, color=PLAIN)  # fmt: skip
+            own.annotate(str(rows["interval"][row]), ((t0 + t1) / 2, 1.0), xycoords=("data", "axes fraction"),
+                         ha="center", va="bottom", fontsize=7, color=PLAIN)  # fmt: skip
         middle = rows["t"][at].mean(axis=1)
         own.plot(middle, 1e3 * rows["refit"][at], "o-", color=BEFORE, label="refit", lw=1.4)
         if np.isfinite(rows["effect"][at]).any():
@@ -112,8 +112,8 @@ def _drawn(axes: Axes, group: Group, p: np.ndarray, element: object) -> None:
     for rod in range(len(p) // 2):
         bad = guilty(("rod",), rod)
         ends = p[2 * rod : 2 * rod + 2]
-        axes.plot(ends[:, 0], ends[:, 1], color=GUILTY if bad else rod_color(2 * rod), lw=9 if bad else 5, alpha=0.9, zorder=2,
-                  solid_capstyle="round")  # fmt: skip
+        axes.plot(ends[:, 0], ends[:, 1], color=GUILTY if bad else rod_color(2 * rod), lw=9 if bad else 5, alpha=0.9,
+                  zorder=2, solid_capstyle="round")  # fmt: skip
     for cap, (x, y) in enumerate(p):
         bad = guilty(("cap",), cap)
         axes.plot(x, y, "o", ms=19 if bad else 12, color=GUILTY if bad else rod_color(cap), zorder=5)
@@ -133,8 +133,8 @@ def _ranking(data: ArtifactData, report: DiagnoseReport) -> bytes:
         if one not in others:
             left.barh(y, one.elpd_gain, color=color, height=0.6)
         right.barh(y, one.probability, color=color, height=0.6)
-        right.annotate(f"{one.probability:.2f}", (one.probability, y), xytext=(4, 0), textcoords="offset points", va="center",
-                       fontsize=8)  # fmt: skip
+        right.annotate(f"{one.probability:.2f}", (one.probability, y), xytext=(4, 0), textcoords="offset points",
+                       va="center", fontsize=8)  # fmt: skip
         where = "" if one.element is None else f", {_words(one.element)}"
         names.append(f"{one.effect}{where}")
         y += 1
@@ -167,8 +167,10 @@ def _judged(data: ArtifactData, report: DiagnoseReport) -> bytes:
             all_.bar(k, float(np.sqrt(np.nanmean(values**2))), 0.7, color=color)
     for axes in (each, all_):
         axes.axhline(1e3 * report.floor_m, color="#111111", lw=1, ls=":", label="floor")
-    each.set_xticks(range(len(names)), names, rotation=45 if len(names) > 6 else 0, ha="right" if len(names) > 6 else "center",
-                    fontsize=8)  # fmt: skip
+    turned = len(names) > 6
+    each.set_xticks(
+        range(len(names)), names, rotation=45 if turned else 0, ha="right" if turned else "center", fontsize=8
+    )
     each.set_ylabel("cap error at the key frame [mm]")
     all_.set_xticks(
         range(len(series)), ["identified", "refit", "+ effect", "black box"], rotation=45, ha="right", fontsize=8

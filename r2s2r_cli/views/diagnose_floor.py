@@ -1,4 +1,4 @@
-"""The floor from above: where the robot was, how far off the simulation was there, and what contacts say of the place."""
+"""The floor from above: where the robot was, how far off the simulation was there, and what contacts say of it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ARROW = 5.0
 
 
 def floor_picture(data: ArtifactData, report: DiagnoseReport) -> bytes:
-    """Errors at the ends of all fitted intervals as arrows at the caps; the map of the contact probe where there is one."""
+    """Errors at the ends of all fitted intervals as arrows at the caps; the map of the contact probe."""
     rows = data.groups["segments"]
     figure = new_figure(7.5, 6.2)
     axes = figure.subplots()
@@ -36,7 +36,7 @@ def floor_picture(data: ArtifactData, report: DiagnoseReport) -> bytes:
         for cap in range(xy.shape[1]):
             if np.isfinite(error[row, cap]).all():
                 axes.annotate("", xy=xy[row, cap] - ARROW * error[row, cap, :2], xytext=xy[row, cap],
-                              arrowprops={"arrowstyle": "->", "color": rod_color(cap), "lw": 0.9, "alpha": 0.8})  # fmt: skip
+                              arrowprops={"arrowstyle": "->", "color": rod_color(cap), "lw": 0.9})  # fmt: skip
     for cap in range(xy.shape[1]):
         axes.plot(xy[:, cap, 0], xy[:, cap, 1], ".", ms=4, color=rod_color(cap))
     element = report.where.element

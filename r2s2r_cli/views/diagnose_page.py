@@ -73,8 +73,8 @@ def _ranked(one: RankedName) -> list[str]:
     remarks += [f"{name.split('.', 1)[1]} on a bound" for name in one.on_bound]
     rmse = "" if one.rmse_m is None else f"{1e3 * one.rmse_m:.1f}"
     where = element_words(one.element) or (one.channel or "")
-    return [one.effect, where, f"{one.elpd_gain:.1f}", f"{one.probability:.2f}", "; ".join(sizes), "; ".join(wide), rmse,
-            "; ".join(remarks)]  # fmt: skip
+    return [one.effect, where, f"{one.elpd_gain:.1f}", f"{one.probability:.2f}", "; ".join(sizes), "; ".join(wide),
+            rmse, "; ".join(remarks)]  # fmt: skip
 
 
 def _shrinkage(report: DiagnoseReport) -> PageTable:

@@ -37,10 +37,10 @@ Told = Callable[[str, int, int], None]
 @dataclass(frozen=True)
 class Settings:
     """How a diagnosis is made. effects: only these are considered; None: the whole catalogue. step [s]: of the engine.
-    members: of the filter that makes start states. seed: of all that is drawn. with_parity, with_where, with_much: parts
-    that can be left out. refit_baseline: nuisances are fitted again; held_out: scores are of gaits that were left out;
-    with_floor: the covariance has one; with_unknown: an error without a name is a rival (all four: what an ablation
-    switches off). calibration: None, that of the package."""
+    members: of the filter that makes start states. seed: of all that is drawn. with_parity, with_where, with_much:
+    parts that can be left out. refit_baseline: nuisances are fitted again; held_out: scores are of gaits that were
+    left out; with_floor: the covariance has one; with_unknown: an error without a name is a rival (all four: what an
+    ablation switches off). calibration: None, that of the package."""
 
     effects: tuple[str, ...] | None = None
     step: float = 2e-3
@@ -127,7 +127,8 @@ def diagnose(
                 zip(compared.arena.names[: compared.arena.shared], compared.base.z, strict=False)
             )
         },
-        segments=_segments(compared), within_run=evidence.within_run, rollouts=replayer.rollouts, warnings=(*fitted.warnings, *compared.which.warnings),
+        segments=_segments(compared), within_run=evidence.within_run, rollouts=replayer.rollouts,
+        warnings=(*fitted.warnings, *compared.which.warnings),
     )  # fmt: skip
 
 

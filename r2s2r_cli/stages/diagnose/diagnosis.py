@@ -16,9 +16,9 @@ from r2s2r_cli.stages.diagnose.which.found import Which
 
 @dataclass(frozen=True)
 class SegmentSeen:
-    """One fitted target interval, left out of the fit. refit, effect: cap RMSE at its end [m], without and with the best
-    effect, None where none was fitted. misfit: squares over what noise and floor explain; gap: it stands out. t [s]: of
-    start and end. key, error (cap, 3) [m]: observed caps there, and simulated minus observed ones."""
+    """One fitted target interval, left out of the fit. refit, effect: cap RMSE at its end [m], without and with the
+    best effect, None where none was fitted. misfit: squares over what noise and floor explain; gap: it stands out. t
+    [s]: of start and end. key, error (cap, 3) [m]: observed caps there, and simulated minus observed ones."""
 
     run: str
     interval: int

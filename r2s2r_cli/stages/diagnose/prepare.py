@@ -10,13 +10,13 @@ import numpy as np
 
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run
+from r2s2r_cli.stages.diagnose.starts import Starts
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
 from r2s2r_cli.stages.diagnose.which.score import LOST_M
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch, stretches
 from r2s2r_cli.stages.identify.data import Selection
-from r2s2r_cli.stages.diagnose.starts import Starts
 from r2s2r_cli.stages.measures.floor import floor_of
 from r2s2r_cli.stages.measures.steps import steps_of
 
@@ -105,8 +105,8 @@ def refit(
     asked = sum(len(one.intervals) for one in evidence.fit)
     if len(arena.many) < asked:
         warnings.append(
-            f"{asked - len(arena.many)} of {asked} intervals to fit were left out: the robot tips over in them, or they "
-            "could not be simulated from where they start"
+            f"{asked - len(arena.many)} of {asked} intervals to fit were left out: the robot tips over in them, or "
+            "they could not be simulated from where they start"
         )
     return Refit(arena, base, floor, tuple(warnings))
 
@@ -140,7 +140,7 @@ def floor_for(evidence: Evidence) -> tuple[FloorGiven, list[str]]:
 
 
 def _sensor(runs: Sequence[Run]) -> float:
-    """What noise alone makes of the cap RMSE at a key frame that was started from a frame [m]: the start is filtered."""
+    """What noise alone makes of the cap RMSE at a key frame that was started from a frame [m]."""
     return float(np.sqrt(np.mean([np.sum(run.caps.noise**2, axis=-1).mean() for run in runs])))
 
 

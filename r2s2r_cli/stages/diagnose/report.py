@@ -45,8 +45,9 @@ def diagnose_report(found: Diagnosis) -> DiagnoseReport:
 def document(found: Diagnosis) -> dict[str, Any]:
     """design.md section 5 as JSON values, and what else a score needs."""
     told = diagnose_report(found).model_dump(mode="json")
-    names = ("verdict", "effects", "probability", "set90", "ranking", "where", "shrinkage", "not_testable", "confusable",
-             "next_gait", "sentence", "floor_m", "refit_rmse_m", "refit_upper_m", "chance_nats", "calibrated", "rollouts")  # fmt: skip
+    names = ("verdict", "effects", "probability", "set90", "ranking", "where", "shrinkage", "not_testable",
+             "confusable", "next_gait", "sentence", "floor_m", "refit_rmse_m", "refit_upper_m", "chance_nats",
+             "calibrated", "rollouts")  # fmt: skip
     return {**{name: told[name] for name in names}, "unexplained": _finite(found.which.unexplained, -1e9),
             "wider": found.which.wider}  # fmt: skip
 

@@ -22,8 +22,8 @@ RANDOM_GAITS, RANDOM_STEPS = 8, 8
 
 def diagnosed(
     evidence: Evidence, settings: DiagnoseSettings, *, seed: int = 0, effects: tuple[str, ...] | None = None,
-    policies: Mapping[str, Sequence[Sequence[float]]] | None = None, cache_dir: Path | None = None, progress: Callable[[str, int, int], None],
-    checkpoint: Checkpoint | None = None,
+    policies: Mapping[str, Sequence[Sequence[float]]] | None = None, cache_dir: Path | None = None,
+    progress: Callable[[str, int, int], None], checkpoint: Checkpoint | None = None,
 ) -> tuple[ArtifactData, DiagnoseReport]:  # fmt: skip
     """Diagnose, and lay out what was found. policies: more to choose the next gait from. Raises as `diagnose`."""
     how = Settings(

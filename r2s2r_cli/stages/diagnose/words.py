@@ -30,8 +30,8 @@ def _verdict(found: Diagnosis) -> str:
     if which.verdict == "unknown":
         where = "" if found.channel is None else f" It acts most like something in channel {found.channel}."
         return (
-            f"Something that is not in the catalogue is wrong: {refit:.1f} mm after refitting, floor {floor:.1f} mm, and "
-            f"no named effect explains it (p = {which.probability:.2f}).{where}"
+            f"Something that is not in the catalogue is wrong: {refit:.1f} mm after refitting, floor {floor:.1f} mm, "
+            f"and no named effect explains it (p = {which.probability:.2f}).{where}"
         )
     if which.verdict == "ambiguous" or best is None:
         names = ", ".join(_named(name) for name in which.set90)

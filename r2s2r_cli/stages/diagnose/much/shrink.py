@@ -18,10 +18,10 @@ class Shrinkage:
     """Key-frame cap RMSE [m] over judged segments, each from its own causal start by command replay.
 
     names: of the judged segments, `RUN:3`; squared: by model (nominal, refit, effect, ceiling), mean squared 3-D
-    distance of the caps (segment,) [m^2]. effects: whose effect it is, best guess where nothing was committed to. share:
-    own share of the effect, None at the floor; ci90 by bootstrap over segments; predicted: the same from intervals that
-    were left out of the fit, before the judged ones were looked at, with its interval. within_run: judged segments share
-    their run with fitted ones.
+    distance of the caps (segment,) [m^2]. effects: whose effect it is, best guess where nothing was committed to.
+    share: own share of the effect, None at the floor; ci90 by bootstrap over segments; predicted: the same from
+    intervals that were left out of the fit, before the judged ones were looked at, with its interval. within_run:
+    judged segments share their run with fitted ones.
     """
 
     effects: tuple[str, ...]

@@ -48,8 +48,8 @@ class White:
 
 
 class Arena:
-    """Stretches, the engine, and the covariance at one nominal point. Unknowns z of the nuisances (p + q,): those of the
-    engine, then camera and sensor biases, which are simple shifts of what is seen."""
+    """Stretches, the engine, and the covariance at one nominal point. Unknowns z of the nuisances (p + q,): those of
+    the engine, then camera and sensor biases, which are simple shifts of what is seen."""
 
     def __init__(
         self, replayer: Replayer, many: Sequence[Stretch], *, floor_m: float, noise: float = 1.0,

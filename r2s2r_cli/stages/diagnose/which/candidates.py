@@ -122,7 +122,8 @@ def _candidate(
     return Candidate(
         effect=effect.name, channel=str(effect.channel), element=element, spread=spread, names=names,  # type: ignore[attr-defined]
         units=tuple(n.unit for n in numbers), off=off, lower=lower, upper=upper, scale=scale,
-        tries=_distinct(tries, [k for k, key in enumerate(keys) if not _only_shape(key, keys)], off, lower, upper, scale),
+        tries=_distinct(tries, [k for k, key in enumerate(keys) if not _only_shape(key, keys)], off, lower, upper,
+                        scale),
     )  # fmt: skip
 
 

@@ -64,7 +64,7 @@ class Which:
     """verdict: effect | pair | ambiguous | no_gap | unknown. effects: ids it commits to. probability: of them.
     set90: names that hold the truth with 90 %. ranking: best first. chance: gain that the best of the catalogue reaches
     by chance in one of twenty cases [nats]. wider: by how much the floor must grow to explain what the best effect
-    leaves. within: groups that were left out, in words. calibrated: where probabilities come from. fits, rollouts: work.
+    leaves. within: groups that were left out, in words. calibrated: where probabilities come from.
     """
 
     verdict: str

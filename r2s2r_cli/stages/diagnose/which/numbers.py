@@ -39,9 +39,10 @@ MOST = 1.0
 
 @dataclass(frozen=True)
 class Number:
-    """One number. kind: `factor`, the field times exp(x), `shift`, the field plus x within 0..1, or `own`, of an effect.
-    field: of Parameters; index: which of its numbers, () for all. off: where it changes nothing. sd: of its prior as a
-    nuisance, from what the nominal model has; scale: of an effect's number, how far from off it usually is."""
+    """One number. kind: `factor`, the field times exp(x), `shift`, the field plus x within 0..1, or `own`, of an
+    effect. field: of Parameters; index: which of its numbers, () for all. off: where it changes nothing. sd: of its
+    prior as a nuisance, from what the nominal model has; scale: of an effect's number, how far from off it usually
+    is."""
 
     name: str
     unit: str
@@ -66,7 +67,8 @@ class Number:
 NUISANCES = (
     Number("friction", "log", "factor", "friction", (), 0.0, -MOST, MOST, 0.3, 0.3, "friction of all caps"),
     Number("motor_speed_in", "log", "factor", "speed_in", (), 0.0, -MOST, MOST, 0.15, 0.15, "speed of all winches in"),
-    Number("motor_speed_out", "log", "factor", "speed_out", (), 0.0, -MOST, MOST, 0.15, 0.15, "speed of all winches out"),
+    Number("motor_speed_out", "log", "factor", "speed_out", (), 0.0, -MOST, MOST, 0.15, 0.15,
+           "speed of all winches out"),
     Number("restitution", "1", "shift", "restitution", (), 0.0, -1.0, 1.0, 0.1, 0.1, "restitution"),
     Number("stiffness", "log", "factor", "stiffness", (), 0.0, -MOST, MOST, 0.15, 0.15, "stiffness of all cables"),
 )  # fmt: skip

@@ -29,8 +29,8 @@ TINY = 1e-6
 
 @dataclass(frozen=True)
 class Seen:
-    """Of one stretch, for k hypotheses: caps (k, F, cap, 3) [m], as the camera sees them, and length (k, F, sensor) [m],
-    as the sensors read them. What left the finite numbers is nan."""
+    """Of one stretch, for k hypotheses: caps (k, F, cap, 3) [m], as the camera sees them, and length (k, F, sensor)
+    [m], as the sensors read them. What left the finite numbers is nan."""
 
     caps: np.ndarray
     length: np.ndarray

@@ -1,4 +1,4 @@
-"""The whole catalogue at a glance: finite responses of every effect and element, with what nuisances explain taken off."""
+"""The whole catalogue at a glance: finite responses of every effect and element, less what nuisances explain."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ def concluded(m: Material) -> Which:
     none = m.chance + (calibration.equivalent if m.no_gap.equivalent else 0.0)
     table = {**names, NONE: none, UNKNOWN: m.unexplained - calibration.unknown}
     probability = calibration.probabilities(table)
-    pair, pair_gain = _pair(m, order, gains, best)
+    pair = _pair(m, order, gains, best)
     ranking = [_ranked(m, best[name], gains[best[name]], probability[name], singles, gains) for name in names]
     ranking += [
         Ranked(NONE, 0.0, probability[NONE], rmse=m.no_gap.rmse, misfit=_misfit(m.refit)),
@@ -91,17 +91,14 @@ def _verdict(
     return "effect", (first.effect,), first.probability
 
 
-def _pair(
-    m: Material, order: list[int], gains: dict[int, float], best: dict[str, int]
-) -> tuple[tuple[str, ...] | None, float]:
-    """The pair that predicts most, where each of its effects is needed beside the other."""
+def _pair(m: Material, order: list[int], gains: dict[int, float], best: dict[str, int]) -> tuple[str, ...] | None:
+    """The pair that predicts most, where each of its effects is needed beside the other; None: there is none."""
     for i in order:
         effects = m.fits[i].hypothesis.effects
         if len(effects) == 2:
-            alone = max((gains[best[name]] for name in effects if name in best), default=0.0)
-            more = gains[i] - max(alone, max((gains[k] for k in best.values()), default=0.0))
-            return (effects, gains[i]) if more > m.chance + PAIR else (None, gains[i])
-    return None, 0.0
+            alone = max((gains[k] for k in best.values()), default=0.0)
+            return effects if gains[i] - alone > m.chance + PAIR else None
+    return None
 
 
 def _ranked(
@@ -219,6 +216,6 @@ def _warnings(m: Material, rows: list[int]) -> tuple[str, ...]:
             said.append(f"{', '.join(fit.on_bound)} ended on a bound: another size, or another effect")
     if m.wider > 1.0:
         said.append(
-            f"what the best effect leaves is {m.wider:g} times the floor: scores count an error of that size as possible"
+            f"what the best effect leaves is {m.wider:g} times the floor: scores count errors of that size as possible"
         )
     return tuple(said)

@@ -58,7 +58,8 @@ class Compared:
 def compare_effects(
     arena: Arena, base: Fit, *, floor_m: float, calibration: Calibration, sizes: Mapping[str, Mapping[str, float]],
     suspected: Sequence[str] = (), effects: Sequence[str] | None = None, seed: int = 0, told: Told,
-    ways: Ways | None = None, kept: Mapping[str, Any] | None = None, keep: Callable[[str, Any], None] = lambda name, value: None,
+    ways: Ways | None = None, kept: Mapping[str, Any] | None = None,
+    keep: Callable[[str, Any], None] = lambda name, value: None,
 ) -> Compared:  # fmt: skip
     """All effects against the refit nominal model `base` of this arena. floor_m: key-frame RMSE with nothing wrong.
 

@@ -16,7 +16,7 @@ from r2s2r_cli.engine.flat import (
 )
 from r2s2r_cli.engine.ground import Ground as Ground, tilted as tilted
 from r2s2r_cli.engine.hooks import Channel as Channel, Hooks as Hooks
-from r2s2r_cli.engine.late import delay_of as delay_of, observe as observe, sense as sense
+from r2s2r_cli.engine.late import delay_of as delay_of, observe as observe, sense as sense, unseen as unseen
 from r2s2r_cli.engine.link import Link as Link
 from r2s2r_cli.engine.parameters import Parameters as Parameters, check_parameters as check_parameters
 from r2s2r_cli.engine.pid import LatchedPid as LatchedPid

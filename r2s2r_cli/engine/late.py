@@ -49,3 +49,17 @@ def observe(structure: Structure, theta: Parameters, t: Tensor, p_WE: Tensor) ->
     for effect in overrides(structure, "observation"):
         p_WE = effect.observation(theta.of(effect.name), t, p_WE)
     return p_WE
+
+
+def unseen(structure: Structure, theta: Parameters, p_WE: Tensor) -> Tensor:
+    """Where end caps (B, cap, 3) [m] are that a camera sees at p_WE: the inverse of `observe` for effects that move all
+    points by one affine law (camera pose and scale). What shifts in time, or loses caps, is left as it is."""
+    if not overrides(structure, "observation"):
+        return p_WE
+    basis = torch.cat([torch.zeros_like(p_WE[:1, :1]), torch.eye(3, dtype=p_WE.dtype, device=p_WE.device)[None]], dim=1)
+    now = torch.zeros(1, dtype=p_WE.dtype, device=p_WE.device)
+    # A single frame at a time of its own: nothing to interpolate. An even number of points, as caps come in pairs.
+    shown = observe(structure, theta, now, basis[:, None])[:, 0]
+    shift, turn = shown[:, :1], (shown[:, 1:] - shown[:, :1]).mT
+    known = torch.isfinite(turn).all()
+    return torch.linalg.solve(turn[:, None], (p_WE - shift)[..., None])[..., 0] if bool(known) else p_WE

@@ -16,7 +16,7 @@ from r2s2r_cli.effects.camera_scale import CameraScale
 from r2s2r_cli.effects.dropout import Dropout
 from r2s2r_cli.effects.sensor_bias import SensorBias
 from r2s2r_cli.effects.sensor_gain import SensorGain
-from r2s2r_cli.engine import LatchedPid, Simulator, closed_loop, observe, sense
+from r2s2r_cli.engine import LatchedPid, Simulator, closed_loop, observe, sense, unseen
 from tests.support.variants import Variant, pair, plugged
 
 
@@ -80,6 +80,17 @@ def test_camera_pose_is_a_rigid_motion(plain: Variant) -> None:
     assert yawed.numpy() == pytest.approx([np.cos(0.1) + 0.01, np.sin(0.1), 0.0], abs=1e-15)
     tilted = seen(with_(plain, CameraPose(), turn_y_rad=0.1), t[:1], along)[0, 0, 0]
     assert tilted.numpy() == pytest.approx([np.cos(0.1), 0.0, -np.sin(0.1)], abs=1e-15)
+
+
+def test_what_was_seen_is_taken_back(plain: Variant) -> None:
+    """Pose and scale together, and their inverse; without effects of the camera bit by bit what was given."""
+    p_WE = torch.randn(1, 4, 3, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
+    values = {"turn_x_rad": 0.05, "turn_z_rad": -0.1, "shift_x_m": 0.02, "factor": 1.03}
+    model = with_(plain, CameraPose(), CameraScale(), CameraDelay(), Dropout(), **values)
+    shown = seen(model, torch.zeros(1, dtype=torch.float64), p_WE[:, None])[:, 0]
+    assert float((shown - p_WE).abs().max()) > 0.01
+    assert torch.allclose(unseen(model.structure, model.theta, shown), p_WE, rtol=0, atol=1e-13)
+    assert unseen(plain.structure, plain.theta, p_WE) is p_WE
 
 
 def test_camera_scale_stretches_rods(plain: Variant) -> None:

@@ -106,9 +106,11 @@ def _rest(predictor: Predictor, theta: Parameters, p_WE: np.ndarray) -> State:
     """The robot at rest in an observed pose; its caps stay where they were seen."""
     import torch
 
+    from r2s2r_cli.engine.late import unseen
     from r2s2r_cli.engine.settle import settled, window_state
 
-    caps = torch.as_tensor(p_WE)[None]
+    caps = unseen(predictor.structure, theta, torch.as_tensor(p_WE)[None])
+    p_WE = caps[0].numpy()
     found = settled(
         predictor.simulator, theta, caps, torch.as_tensor(rod_frames(p_WE))[None], predictor.cable_caps,
         step=predictor.step,
@@ -177,11 +179,15 @@ class _Ensemble:
 
     def _see(self, frame: int, since: float) -> None:
         """Analysis of one frame, `since` seconds after the one before."""
-        from r2s2r_cli.engine import end_caps
+        import torch
+
+        from r2s2r_cli.engine import end_caps, observe
         from r2s2r_cli.engine.flat import unpack_state
 
         reference, deviation = mean(self.structure, self.flat)
-        p_WE = end_caps(self.in_view, unpack_state(self.structure, self.flat)).numpy() + self.ground
+        caps = end_caps(self.in_view, unpack_state(self.structure, self.flat))
+        now = torch.zeros(1, dtype=caps.dtype)
+        p_WE = observe(self.structure, self.in_view, now, caps[:, None])[:, 0].numpy() + self.ground
         middle = p_WE.mean(axis=0)
         innovation, seen = self.run.observed[frame] - middle, p_WE - middle
         white = np.maximum(self.run.noise, self.belief.noise) ** 2

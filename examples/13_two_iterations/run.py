@@ -78,13 +78,14 @@ def iterate(project: Path, number: int, seed: int, profile: Profile) -> None:
               *names, "--repeats", str(profile.repeats), "--yes", quiet=False)  # fmt: skip
 
 
-def compared(project: Path, number: int, models: dict[str, Path]) -> dict[str, object]:
-    """The executed runs of an iteration beside these simulators and that of robot.toml; kept as comparison-N.json."""
+def compared(project: Path, models: Mapping[str, Path]) -> dict[str, object]:
+    """The executed runs of both iterations beside these simulators and that of robot.toml; none named: those of both
+    iterations. Kept as comparison.json."""
     words = [word for name, path in models.items() for word in ("--model", f"{name}={path}")]
-    command = [*COMMAND, "compare", "--iteration", str(number), "--of", "execute", *words, "--json", "--force"]
+    command = [*COMMAND, "compare", "--iteration", "2", "--of", "execute", *words, "--json"]
     done = subprocess.run(command, cwd=project, check=True, stdout=subprocess.PIPE, text=True)
     report: dict[str, object] = json.loads(done.stdout)["report"]
-    (project / f"comparison-{number}.json").write_text(json.dumps(report, indent=1), "utf-8")
+    (project / "comparison.json").write_text(json.dumps(report, indent=1), "utf-8")
     return report
 
 
@@ -106,15 +107,10 @@ def papers(project: Path) -> Path:
 
 
 def measured(project: Path, *, paper: bool) -> list[Row]:
-    """The rows of one seed: runs of iteration 1 (iteration 2 learned from them), and new ones of iteration 2."""
-    models = {"refined": project / "iterations" / "002" / "30-identify.h5"}
-    if paper:
-        models["paper"] = papers(project)
-    return [
-        row
-        for number, words in ((1, "the same runs"), (2, "new policies"))
-        for row in rows_of(compared(project, number, models), words, project.name)
-    ]
+    """The rows of one seed: runs of iteration 1, from which iteration 2 learned, and new ones of iteration 2."""
+    found = {f"iteration {n}": project / "iterations" / f"{n:03d}" / "30-identify.h5" for n in (1, 2)}
+    models = {**found, "paper": papers(project)} if paper else {}
+    return list(rows_of(compared(project, models), project.name))
 
 
 def main(out: Path, seeds: Sequence[int], profile: Profile, *, paper: bool, say: Callable[[str], None] = print) -> None:

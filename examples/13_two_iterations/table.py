@@ -31,22 +31,27 @@ class Row:
         return first / now if now > 0 else inf
 
 
-def rows_of(report: Mapping[str, Any], runs: str, seed: str) -> Iterator[Row]:
-    """The rows of one comparison."""
-    for measure in MEASURES:
-        found = {one["model"]: one["runs"].get(measure) for one in report["models"]}
-        known = {name: one for name, one in found.items() if one is not None}
-        floor = next((one["floor"] for one in known.values()), None)
-        yield Row(
-            seed, runs, measure, floor, {name: one["rms"] for name, one in known.items()},
-            {name: one["gap"] for name, one in known.items() if one["gap"] is not None},
-        )  # fmt: skip
+RUNS = {1: "the same runs", 2: "new policies"}
+"""By the iteration in which they were executed: iteration 2 learned from the first, nothing from the second."""
+
+
+def rows_of(report: Mapping[str, Any], seed: str) -> Iterator[Row]:
+    """The rows of one comparison, of the runs of both iterations."""
+    for number, runs in RUNS.items():
+        mine = [one for one in report["history"] if one["iteration"] == number]
+        for measure in MEASURES:
+            known = {one["model"]: one["runs"][measure] for one in mine if measure in one["runs"]}
+            floor = next((one["floor"] for one in known.values()), None)
+            yield Row(
+                seed, runs, measure, floor, {name: one["rms"] for name, one in known.items()},
+                {name: one["gap"] for name, one in known.items() if one["gap"] is not None},
+            )  # fmt: skip
 
 
 def summary(rows: Sequence[Row]) -> Iterator[str]:
     """The table, median and range over seeds."""
     models = list(dict.fromkeys(name for row in rows for name in row.error))
-    yield f"{'':14} {'':26} {'floor':>8}" + "".join(f"{name:>24}" for name in models) + "   initial gap / refined"
+    yield f"{'':14} {'':26} {'floor':>8}" + "".join(f"{name:>24}" for name in models) + "   by what factor the gap fell"
     for runs in dict.fromkeys(row.runs for row in rows):
         for measure, (words, scale, unit) in MEASURES.items():
             mine = [row for row in rows if row.runs == runs and row.measure == measure]

@@ -51,21 +51,24 @@ def test_the_world_is_another_one(tmp_path: Path, seed: int) -> None:
 
 def report(refined: float, gap: float, floor: float | None = 0.01) -> dict[str, Any]:
     """A comparison of ends under two simulators."""
-    return {"models": [
-        {"model": "initial", "runs": {"com_end_m": {"rms": 0.2, "floor": floor, "gap": 0.15 if floor else None}}},
-        {"model": "refined", "runs": {"com_end_m": {"rms": refined, "floor": floor, "gap": gap if floor else None}}},
-    ]}  # fmt: skip
+    ends = {"initial": (0.2, 0.15), "iteration 2": (refined, gap)}
+    return {
+        "history": [
+            {"iteration": 1, "model": name, "runs": {"com_end_m": {"rms": rms, "floor": floor, "gap": floor and left}}}
+            for name, (rms, left) in ends.items()
+        ]
+    }
 
 
 def test_the_table_says_by_what_the_gap_fell() -> None:
     """Factor, fall to the floor, nothing without a floor; median and range over seeds."""
     table = loaded("table")
-    rows = [row for k, gap in enumerate((0.03, 0.05, 0.0)) for row in table.rows_of(report(0.04, gap), "runs", str(k))]
-    ends = [row for row in rows if row.measure == "com_end_m"]
-    assert [row.falls("refined") for row in ends] == [pytest.approx(5.0), pytest.approx(3.0), math.inf]
+    rows = [row for k, gap in enumerate((0.03, 0.05, 0.0)) for row in table.rows_of(report(0.04, gap), str(k))]
+    ends = [row for row in rows if row.measure == "com_end_m" and row.error]
+    assert [row.falls("iteration 2") for row in ends] == [pytest.approx(5.0), pytest.approx(3.0), math.inf]
     assert ends[0].falls("initial") == 1.0
     lines = list(table.summary(rows))
-    assert "refined 5.0 (3.0 .. to the floor)" in lines[1]
+    assert "iteration 2 5.0 (3.0 .. to the floor)" in lines[1]
     assert "200.00 (200.00 .. 200.00)" in lines[1]
-    (blind,) = [r for r in table.rows_of(report(0.04, 0.0, None), "runs", "0") if r.measure == "com_end_m"]
-    assert blind.falls("refined") is None
+    (blind,) = [r for r in table.rows_of(report(0.04, 0.0, None), "0") if r.measure == "com_end_m" and r.error]
+    assert blind.falls("iteration 2") is None

@@ -1,0 +1,35 @@
+"""The page of a score says what the table says."""
+
+import numpy as np
+
+from r2s2r_cli.blind.score import score_of
+from r2s2r_cli.views.blind import blind_page, blind_tables, draw_blind
+from tests.support import blind_bank
+
+
+def test_tables_and_page_hold_every_figure() -> None:
+    """A row a metric with interval and verdict, `not shown` where the interval holds the target; both pictures in it."""
+    labels = blind_bank.bank(60)
+    result = score_of(blind_bank.answered(labels, blind_bank.by_chance), tier="B", bank="test", sets=60, index="f00")
+    figures, recall, misses = blind_tables(result)
+    assert len(figures.rows) == len(result.rows) and len(recall.rows) == len(result.recall)
+    assert len(misses.rows) == len(result.misses)
+    for row, shown in zip(result.rows, figures.rows, strict=True):
+        assert shown[3] == str(row.n)
+        assert ("not shown" in shown[5]) == (row.shown is False)
+        if row.passed is not None:
+            assert shown[5].startswith("reached" if row.passed else "missed")
+    pictures = dict(draw_blind(result))
+    assert set(pictures) == {"confusion", "calibration"}
+    assert all(png.startswith(b"\x89PNG") for png in pictures.values())
+    page = blind_page(result, pictures).decode()
+    assert page.count("data:image/png") == 2 and "f00" in page and all(row.what in page for row in result.rows[:5])
+
+
+def test_confusion_counts_every_decided_set_once() -> None:
+    """Rows are truths, columns first guesses; pairs, weak and faint sets stand nowhere in it."""
+    labels = blind_bank.bank(200, seed=3)
+    result = score_of(blind_bank.answered(labels, blind_bank.right), tier="B", bank="test", sets=200, index="0")
+    counts = np.array(result.confusion)
+    assert counts.shape == (len(result.classes),) * 2 and np.array_equal(counts, np.diag(np.diag(counts)))
+    assert counts[result.classes.index("none")].sum() == sum(one["kind"] == "none" for one in labels)

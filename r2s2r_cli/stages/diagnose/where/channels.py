@@ -35,7 +35,8 @@ class Spread:
 def fitted(design: Design, places: np.ndarray, rows: np.ndarray) -> Spread:
     """Of the probes `places` (K,) from the stretches `rows`."""
     q, K = design.q, len(places)
-    mean, variance, nuisance = np.zeros(K), np.full(K, 0.25), np.zeros(q)
+    varies = np.array([design.columns[k].varies for k in places], dtype=bool)
+    mean, variance, nuisance = np.zeros(K), np.where(varies, 0.25, LEAST), np.zeros(q)
     T = _part(design, places)[rows]
     size = design.size[rows]
     for _ in range(ROUNDS if K else 3):
@@ -46,10 +47,11 @@ def fitted(design: Design, places: np.ndarray, rows: np.ndarray) -> Spread:
         g = np.einsum("s,si->i", w, V[:, : q + K, -1])
         H[:q, :q] += design.known
         H[q:, q:] += np.eye(K)
-        both = np.linalg.solve(H + 1e-9 * np.trace(H) / len(H) * np.eye(q + K), g)
+        unit = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-12))
+        both = unit * np.linalg.solve(unit[:, None] * H * unit + 1e-9 * np.eye(q + K), unit * g)
         nuisance, mean = both[:q], both[q:]
         if K:
-            variance = _variance(T, q, K, variance, nuisance, mean, w)
+            variance = np.where(varies, _variance(T, q, K, variance, nuisance, mean, w), LEAST)
     return Spread(nuisance, mean, variance)
 
 

@@ -17,21 +17,28 @@ from r2s2r_cli.stages.identify.predict import Predictor
 if TYPE_CHECKING:
     from r2s2r_cli.stages.identified import Identified
 
+TIMING = {"sensor_lag": 0.04, "command_delay": 0.015}
+"""Further nuisances and prior sd [s]: sensors have a lag of their own, and half a control tick is in no log."""
+TILTED_RAD = 0.1
 FARTHEST = 10.0
 """A probe of its prior's size moves what is seen by at most so many standard deviations, root mean square."""
+CAMERA_ONLY = 2
+"""The last columns of `_observed` move what is seen, and no cable."""
 LATER_S = 0.03
 """[s] by which commands are shifted for the secant of the command probe."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """One number of a probe. scale: sd of its prior, in `unit`."""
+    """One number of a probe. scale: sd of its prior, in `unit`. varies: from interval to interval; else it is the same
+    in all of them."""
 
     probe: str
     channel: str
     element: Element
     unit: str
     scale: float
+    varies: bool = True
 
 
 @dataclass(frozen=True)
@@ -75,6 +82,7 @@ def design(
     residual = arena.residuals(values[None], z[None])[0]
     columns = _columns(model, arena)
     scale = np.array([one.scale for one in columns])
+    spread = 1.0 / np.sqrt(np.diag(arena.precision))
     grams, caps, innovations = [], [], []
     for k, one in enumerate(arena.many):
         rows = seen.window == k
@@ -84,16 +92,42 @@ def design(
         whole = np.concatenate([_channels(arena, own, by), _sensing(arena, len(own))], axis=0)
         white = arena.white[k]
         probes = _bounded(_whitened(white, whole) * scale[:, None], white.size)
-        joined = np.concatenate([arena.by_nuisance[white.rows].T, probes, -residual[None, white.rows]], axis=0)
+        timing = _whitened(white, _timing(arena, own, one.t, later[rows]))
+        nuisances = _bounded(arena.by_nuisance[white.rows].T * spread[:, None], white.size) / spread[:, None]
+        joined = np.concatenate([nuisances, timing, probes, -residual[None, white.rows]], axis=0)
         grams.append(joined @ joined.T)
         count = own.shape[1] * 3
         innovation = -residual[white.rows].reshape(-1, len(own))[:count]
         innovations.append(innovation.reshape(own.shape[1], 3, len(own)).transpose(2, 0, 1))
-    gram, q = np.array(grams), len(z)
+    gram, q = np.array(grams), len(z) + len(TIMING)
     w = weight(gram[:, -1, -1], arena.sizes)
     # Not from their prior anew: half of the gaits may leave one of them open, far beyond where derivatives hold.
-    known = arena.precision + np.einsum("s,sij->ij", w, gram[:, :q, :q])
+    known = np.zeros((q, q))
+    known[: len(z), : len(z)] = _levelled(arena) + np.einsum("s,sij->ij", w, gram[:, : len(z), : len(z)])
+    known[range(len(z), q), range(len(z), q)] = [sd**-2.0 for sd in TIMING.values()]
     return Design(gram, tuple(columns), arena.sizes, arena.gait, known, tuple(caps), tuple(innovations))
+
+
+def _timing(arena: Arena, caps: np.ndarray, t: np.ndarray, later: np.ndarray) -> np.ndarray:
+    """Responses to TIMING: sensors that show what was, and commands that act later, (2, channel, F)."""
+    late = _channels(arena, caps, np.concatenate([later[..., None], np.zeros((*caps.shape, CAMERA_ONLY))], axis=-1))[:1]
+    lag = np.zeros_like(late)
+    for place, cable in enumerate(arena.sensors):
+        a, b = arena.replayer.cable_caps[cable]
+        length = np.linalg.norm(caps[:, a] - caps[:, b], axis=-1)
+        lag[0, 3 * caps.shape[1] + place] = -np.gradient(length, t) if len(t) > 1 else 0.0
+    return np.concatenate([lag, late], axis=0)
+
+
+def _levelled(arena: Arena) -> np.ndarray:
+    """The prior of an arena's nuisances, but for the camera's tilt: a floor that is not level tilts what is seen as
+    much as it leans the robot, and only the latter is to be explained here."""
+    precision = arena.precision.copy()
+    for k, name in enumerate(arena.names):
+        if name.startswith("camera_tilt"):
+            precision[k], precision[:, k] = 0.0, 0.0
+            precision[k, k] = TILTED_RAD**-2.0
+    return precision
 
 
 def _bounded(probes: np.ndarray, size: int) -> np.ndarray:
@@ -108,11 +142,11 @@ def _bounded(probes: np.ndarray, size: int) -> np.ndarray:
 def _columns(model: ProbeModel, arena: Arena) -> list[Column]:
     robot = model.robot
     found = []
-    for name in (*model.names, "delay.all", "scale.all", "late.all", "tilt_x.all", "tilt_y.all"):
+    for name in (*model.names, "delay.all", "scale.all", "late.all"):
         probe, _, index = name.partition(".")
         kind = KINDS[probe]
         if index == "all":
-            found.append(Column(probe, kind.channel, Element(kind.kind), kind.unit, kind.scale))
+            found.append(Column(probe, kind.channel, Element(kind.kind), kind.unit, kind.scale, False))
             continue
         k = int(index)
         scale = kind.scale
@@ -124,7 +158,9 @@ def _columns(model: ProbeModel, arena: Arena) -> list[Column]:
             k //= 2
         found.append(Column(probe, kind.channel, Element(kind.kind, k), kind.unit, scale))
     bias = KINDS["bias"]
-    return found + [Column("bias", bias.channel, Element(bias.kind, k), bias.unit, bias.scale) for k in arena.sensors]
+    return found + [
+        Column("bias", bias.channel, Element(bias.kind, k), bias.unit, bias.scale, False) for k in arena.sensors
+    ]
 
 
 def _later(predictor: Predictor, model: ProbeModel, arena: Arena) -> np.ndarray:
@@ -140,17 +176,10 @@ def _later(predictor: Predictor, model: ProbeModel, arena: Arena) -> np.ndarray:
 
 
 def _observed(caps: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """What scale, delay and tilt of the camera do to caps (F, cap, 3), per unit, (F, cap, 3, 4)."""
+    """What scale and delay of the camera do to caps (F, cap, 3), per unit, (F, cap, 3, 2)."""
     away = caps - caps.mean(axis=(0, 1))
     rate = np.gradient(caps, t, axis=0) if len(t) > 1 else np.zeros_like(caps)
-    x, y, z = away[..., 0], away[..., 1], away[..., 2]
-    zero = np.zeros_like(x)
-    about_x, about_y = np.stack([zero, -z, y], axis=-1), np.stack([z, zero, -x], axis=-1)
-    return np.stack([away, -rate, about_x, about_y], axis=-1)
-
-
-CAMERA_ONLY = 4
-"""The last columns of `_observed` move what is seen, and no cable."""
+    return np.stack([away, -rate], axis=-1)
 
 
 def _channels(arena: Arena, caps: np.ndarray, by: np.ndarray) -> np.ndarray:

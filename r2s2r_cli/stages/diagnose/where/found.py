@@ -59,8 +59,9 @@ class Reading:
 class ProbeGain:
     """A channel probe: free numbers, constant over each segment, where an effect of the channel would act.
 
-    probe: winch_rate | cable_force | contact_force | rod_wrench | observation. channel: of the design. gain: held-out
-    log density over the refit nominal, leave-one-gait-out, per segment [nats]; gain_sd: of its mean over segments.
+    probe: the channel, or `all`, the free-form rival of every named effect. channel: of the design. gain: held-out log
+    density over the refit nominal, leave-one-gait-out, per segment [nats]: the mean of what the channel gains alone and
+    beside all others, since channels explain each other's gaps; gain_sd: of its mean over segments.
     share: of the whitened innovations that it explains where it was fitted. elements: what it is made of, with
     `scores` (element,): share of the explained part (group-sparse). sizes: fitted numbers (segment, number) in `unit`;
     columns: element of each, (number,).

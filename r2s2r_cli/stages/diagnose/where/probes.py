@@ -29,8 +29,8 @@ class Probe(Hooks):
     """All probes of the engine.
 
     rate: winding rate of every winch, relative; force: of every cable while it is taut [N]; grip: friction of every
-    cap, relative; height: radius of every cap [m]; push: force on every rod along x and y [N]; weight: of every rod [N], and
-    lever: weight times its place along the rod [N m].
+    cap, relative; height: radius of every cap [m]; push: force on every rod along x and y [N]; weight: of every rod
+    [N], and lever: weight times its place along the rod [N m].
     """
 
     name = "probe"
@@ -106,8 +106,7 @@ KINDS = {
     "push": Kind("world", "rod", "N", 0.1), "weight": Kind("mass", "rod", "N", 0.3),
     "lever": Kind("mass", "rod", "N m", 0.02), "delay": Kind("command", "motor", "s", 0.08),
     "bias": Kind("sensing", "sensor", "m", 5e-3), "scale": Kind("observation", "camera", "1", 0.02),
-    "late": Kind("observation", "camera", "s", 0.06), "tilt_x": Kind("observation", "camera", "rad", 0.02),
-    "tilt_y": Kind("observation", "camera", "rad", 0.02),
+    "late": Kind("observation", "camera", "s", 0.06),
 }  # fmt: skip
 WINCHED_N = 5.0
 """[N] The same for a winched cable, which is twenty times as stiff."""
@@ -138,6 +137,7 @@ class ProbeModel:
         self._observation: Observation = model.observation(values)
         self.names = tuple(f"{name}.{k}" for name, n in self._sizes.items() for k in range(n))
         self.frees = ()
+        self.delays = ()
 
     def theta(self, values: np.ndarray | Tensor) -> Parameters:
         """Parameters at values (n,) or (B, n)."""

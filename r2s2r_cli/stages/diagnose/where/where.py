@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Evidence
-from r2s2r_cli.stages.diagnose.parity.finding import Element, discoveries
-from r2s2r_cli.stages.diagnose.where.channels import explained, fitted, gains, held_out, sizes
+from r2s2r_cli.stages.diagnose.parity.finding import Element, Parity, discoveries
+from r2s2r_cli.stages.diagnose.where.channels import ENOUGH_NATS, explained, fitted, gains, held_out, sizes
 from r2s2r_cli.stages.diagnose.where.columns import Design, design
 from r2s2r_cli.stages.diagnose.where.found import PlaceMap, ProbeGain, SegmentGap, Where
 from r2s2r_cli.stages.diagnose.where.onset import onset
@@ -20,8 +20,11 @@ from r2s2r_cli.stages.diagnose.which.arena import Arena
 CHANNELS = ("command", "motor", "cable", "mass", "contact", "world", "sensing", "observation")
 ALL = "all"
 """Name of the probe of all channels together: the free-form rival."""
-LEAST_GAIN = 2.0
-"""[nats] over all intervals: a channel below explains nothing."""
+LEAST_GAIN = 20.0
+"""[nats] over all intervals, of probe and parity together: sets of the rig without an effect reach 19 (development
+bank, 16 sets)."""
+MOST_PARITY = 60.0
+"""[nats] A finding says no more than this of its channel."""
 
 Told = Callable[[str, int, int], None]
 
@@ -32,11 +35,13 @@ def silent(part: str, done: int, total: int) -> None:
 
 def where(
     evidence: Evidence, arena: Arena, z: np.ndarray, *, level: float = 0.05, seed: int = 0,
-    cache_dir: Path | None = None, threads: int = 2, told: Told = silent,
+    cache_dir: Path | None = None, threads: int = 2, told: Told = silent, found: Parity | None = None,
 ) -> Where:  # fmt: skip
     """Where the gap of the refit nominal model lies. arena: at the nuisances z (p + q,), prepared there.
 
-    level: false discovery rate of the intervals that stand out. Raises NumericalError where nothing can be simulated.
+    level: false discovery rate of the intervals that stand out. found: of the parity stage, which hears of sensing,
+    actuation and the camera what end caps do not show; its findings count for their channels. Raises NumericalError
+    where nothing can be simulated.
     """
     told("where", 0, 3)
     made = design(evidence.model, arena, z, cache_dir=cache_dir, threads=threads)
@@ -46,15 +51,24 @@ def where(
     plain = held_out(made, np.zeros(0, dtype=int), groups)
     probes = []
     by_channel: dict[str, np.ndarray] = {}
-    for channel in (*CHANNELS, ALL):
-        places = np.arange(len(made.columns)) if channel == ALL else made.of(channel)
+    whole = np.arange(len(made.columns))
+    by_channel[ALL] = gains(made, whole, groups, plain)
+    probes.append(_probe(made, ALL, whole, by_channel[ALL], groups, plain))
+    for channel in CHANNELS:
+        places = made.of(channel)
         if len(places):
-            by_channel[channel] = gains(made, places, groups, plain)
+            alone = gains(made, places, groups, plain)
+            beside = by_channel[ALL] - gains(made, np.setdiff1d(whole, places), groups, plain)
+            by_channel[channel] = (alone + beside) / 2
             probes.append(_probe(made, channel, places, by_channel[channel], groups, plain))
     probes.sort(key=lambda one: -one.gain)
     told("where", 2, 3)
     single = [one for one in probes if one.probe != ALL]
-    best = single[0] if single and single[0].gain * len(segments) > LEAST_GAIN else None
+    said = _said(found)
+    total = {one.probe: one.gain * len(segments) + said.get(one.channel, (0.0, None))[0] for one in single}
+    best = max(single, key=lambda one: total[one.probe], default=None)
+    if best is not None and total[best.probe] < LEAST_GAIN:
+        best = None
     place = place_map(arena, made)
     if place is None:
         missing.append("place: no interval says how well the caps grip")
@@ -67,7 +81,7 @@ def where(
         readings=readings(arena, made, seed),
         probes=tuple(probes),
         channel=None if best is None else best.channel,
-        element=_element(best, place),
+        element=_element(best, place, said),
         place=place,
         missing=tuple(missing),
         residual=np.concatenate(made.innovation),
@@ -136,9 +150,30 @@ def _probe(
     )  # fmt: skip
 
 
-def _element(best: ProbeGain | None, place: PlaceMap | None) -> Element | None:
+def _said(found: Parity | None) -> dict[str, tuple[float, Element | None]]:
+    """What parity says for each channel: log likelihood ratio of its strongest significant finding [nats], halved for
+    what look-alikes share of it, and the element."""
+    from r2s2r_cli.effects import CATALOGUE
+
+    channel = {effect.name: str(effect.channel) for effect in CATALOGUE}
+    made: dict[str, tuple[float, Element | None]] = {}
+    for one in () if found is None else found.significant:
+        for suspicion in one.suspicions:
+            own = channel.get(suspicion.effect, "")
+            nats = suspicion.share * min(0.5 * one.z**2, MOST_PARITY)
+            if nats > made.get(own, (0.0, None))[0]:
+                made[own] = (nats, one.element)
+    return made
+
+
+def _element(
+    best: ProbeGain | None, place: PlaceMap | None, said: dict[str, tuple[float, Element | None]]
+) -> Element | None:
     if best is None:
         return None
+    nats, named = said.get(best.channel, (0.0, None))
+    if named is not None and named.index is not None and nats > ENOUGH_NATS:
+        return named
     if best.channel == "contact" and place is not None and place.xy_m is not None:
         follows = max(place.r2, key=lambda name: place.r2[name])
         if follows == "place" and place.r2["place"] > 0:

@@ -8,7 +8,7 @@ from tests.support import blind_bank
 
 
 def test_tables_and_page_hold_every_figure() -> None:
-    """A row a metric with interval and verdict, `not shown` where the interval holds the target; both pictures in it."""
+    """A row a metric with interval and verdict, `not shown` where the interval holds the target; both pictures."""
     labels = blind_bank.bank(60)
     result = score_of(blind_bank.answered(labels, blind_bank.by_chance), tier="B", bank="test", sets=60, index="f00")
     figures, recall, misses = blind_tables(result)

@@ -7,31 +7,35 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.where.found import Onset, SegmentGap
 
 DRAWS = 999
-LEAST_NATS = 6.0
-"""A beginning must be worth so much more than a gap that is always there."""
-LEVEL = 0.05
+LEVEL = 0.02
+QUIET = 0.3
+"""Before the beginning the gap is at most this share of what it is afterwards."""
 
 
 def onset(segments: tuple[SegmentGap, ...], gain: np.ndarray, seed: int) -> Onset | None:
     """None where the gap is there from the first interval on, or nowhere, or no order of intervals is unusual.
 
-    gain: log density of every interval with the best probe over that without, (stretch,) [nats]. The chance is that of
-    as large a gain in intervals whose order was drawn anew.
+    gain: log density of every interval with the best probe over that without, (stretch,) [nats]. The interval is that
+    of the largest cumulative sum (Page 1954); the chance is that of one as large in intervals in another order.
     """
-    if len(gain) < 4:
+    if len(gain) < 4 or np.ptp(gain) == 0:
         return None
     found, place = _best(gain)
     rng = np.random.default_rng(seed)
     drawn = np.array([_best(rng.permutation(gain))[0] for _ in range(DRAWS)])
     p = float((1 + np.sum(drawn >= found)) / (DRAWS + 1))
-    if place == 0 or found < LEAST_NATS or p > LEVEL:
+    before, after = float(gain[:place].mean()), float(gain[place:].mean())
+    if p > LEVEL or before > QUIET * after:
         return None
     one = segments[place]
-    return Onset(one.order, one.run, one.interval, float(found), p)
+    return Onset(one.order, one.run, one.interval, (after - max(before, 0.0)) * (len(gain) - place), p)
 
 
 def _best(gain: np.ndarray) -> tuple[float, int]:
-    """Gain of the best beginning over the better of none and always, and where it is."""
-    after = np.cumsum(gain[::-1])[::-1]
-    place = int(np.argmax(after))
-    return float(after[place] - max(after[0], 0.0)), place
+    """Largest standardised step up of the mean, and the first interval after it."""
+    n = len(gain)
+    k = np.arange(1, n)
+    after = np.cumsum(gain[::-1])[::-1][1:]
+    step = (after / (n - k) - (gain.sum() - after) / k) * np.sqrt(k * (n - k) / n)
+    place = int(np.argmax(step))
+    return float(step[place]), place + 1

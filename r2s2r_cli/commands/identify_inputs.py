@@ -165,6 +165,7 @@ class Asked:
     def request(self, runs: Sequence[RunData], train_share: float) -> Request:
         """The request, its intervals resolved. Raises UsageError for runs and intervals that do not exist."""
         from r2s2r_cli.stages.identify.effects_asked import effects_asked, effects_kept
+        from r2s2r_cli.stages.identify.free.extend import name_of
         from r2s2r_cli.stages.identify.request import Request
         from r2s2r_cli.stages.identify.selection import split
         from r2s2r_cli.store.read import read_artifact
@@ -176,8 +177,10 @@ class Asked:
         )
         robot = self.project.robot()
         wanted = effects_asked(self.effects, robot) if kept is None else effects_kept(kept, robot)
+        named = {name_of(text.removeprefix("+")) for text in self.free}
+        fixed = {name: value for name, value in wanted.fixed.items() if name not in named} | parse_fixed(self.fix)
         return Request(
-            train=train, test=test, free=self.free, fixed=parse_fixed(self.fix), effects=wanted.ids,
+            train=train, test=test, free=self.free, fixed=fixed, effects=wanted.ids,
             of_effects=wanted.specs,
             method=self.method, drive=self.drive, seed=self.seed, online=self.online, before=before,
         )  # fmt: skip

@@ -6,8 +6,8 @@ rod). An iteration that names none keeps those of the identification before it, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.artifact import ArtifactData
@@ -25,10 +25,12 @@ NONE = "none"
 
 @dataclass(frozen=True)
 class EffectsAsked:
-    """ids: of the effects in the simulator. specs: of their free numbers, as after --free."""
+    """ids: of the effects in the simulator. specs: of their free numbers, as after --free. fixed: numbers of theirs
+    that were given before."""
 
     ids: tuple[str, ...] = ()
     specs: tuple[str, ...] = ()
+    fixed: Mapping[str, float] = field(default_factory=dict)
 
 
 def effects_asked(words: Sequence[str], robot: Robot) -> EffectsAsked:
@@ -59,13 +61,17 @@ def effects_asked(words: Sequence[str], robot: Robot) -> EffectsAsked:
 
 
 def effects_kept(before: ArtifactData, robot: Robot) -> EffectsAsked:
-    """Of an earlier identification: its effects, each free number of theirs starting from what was found."""
+    """Of an earlier identification: its effects, each free number of theirs starting from what was found, and what was
+    fixed by hand as it was."""
     known, table = entries(robot), before.groups["parameters"]
     ids = tuple(str(before.groups["fit"].attributes["effects"]).split())
-    specs = []
+    specs, fixed = list[str](), dict[str, float]()
     for k, name in enumerate(one.decode() for one in table["name"].tolist()):
-        if name in known and known[name].effect in ids and int(table["trust"][k]) != FIXED_BY_HAND:
-            free = known[name].free
-            start = inside(float(table["value"][k]), free.lower, free.upper, free.prior_sd)
-            specs.append(f"{name}={start!r}")
-    return EffectsAsked(ids, tuple(specs))
+        if name not in known or known[name].effect not in ids:
+            continue
+        free, value = known[name].free, float(table["value"][k])
+        if int(table["trust"][k]) == FIXED_BY_HAND:
+            fixed[name] = value
+        else:
+            specs.append(f"{name}={inside(value, free.lower, free.upper, free.prior_sd)!r}")
+    return EffectsAsked(ids, tuple(specs), fixed)

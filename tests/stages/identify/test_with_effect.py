@@ -86,6 +86,7 @@ def test_the_next_iteration_keeps_the_effect_and_starts_from_it() -> None:
         ParameterFound(tau, 0.0, 0.01, 0.0, 0.03, (math.nan, math.nan), Trust.IDENTIFIED, ""),
         ParameterFound(slope, 0.03, 0.001, 0.028, 0.032, (math.nan, math.nan), Trust.IDENTIFIED, ""),
         ParameterFound(SPEED, 0.9, 0.01, 0.88, 0.92, (math.nan, math.nan), Trust.IDENTIFIED, ""),
+        ParameterFound(own["ground_slope.angle_y_rad"], 0.01, math.nan, math.nan, math.nan, (math.nan, math.nan), None),
     )
     request = replace(found().request, effects=("motor_lag", "ground_slope"))
     before = identification(
@@ -102,6 +103,7 @@ def test_the_next_iteration_keeps_the_effect_and_starts_from_it() -> None:
     )
     kept = effects_kept(before, threebar())
     assert kept.ids == ("motor_lag", "ground_slope")
+    assert kept.fixed == {"ground_slope.angle_y_rad": 0.01}
     assert kept.specs == ("motor_lag.tau_s=0.005", "ground_slope.angle_x_rad=0.03")
     starts = [free.start for free in select(kept.specs, threebar(), kept.ids)]
     assert starts == [0.005, 0.03]

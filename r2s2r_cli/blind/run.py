@@ -10,6 +10,7 @@ import importlib
 import json
 import os
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -86,8 +87,11 @@ def one(job: Job) -> dict[str, Any]:
         found = diagnoser(read_set(folder, shuffled=job.shuffled), job.settings)
     except Peeked:
         raise
+    # A set that cannot be diagnosed is a miss, not the end of the trial; so is one that a bug of the diagnoser's ends.
     except R2S2RError as error:
-        failed = str(error)  # a set that cannot be diagnosed is a miss, not the end of the trial
+        failed = str(error)
+    except Exception as error:
+        failed = "bug: " + "".join(traceback.format_exception(error)[-2:]).strip()
     finally:
         guard.end()
     verdict = {

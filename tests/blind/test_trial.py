@@ -93,6 +93,13 @@ def test_a_diagnoser_that_peeks_has_no_verdict(bank: Path, tmp_path: Path) -> No
         assert not list(tmp_path.rglob("*.json"))
 
 
+def test_a_bug_is_a_miss_and_not_the_end(bank: Path, tmp_path: Path) -> None:
+    """Both sets have a verdict that says what broke; both count as failed."""
+    verdicts = list(run(all_jobs(bank, tmp_path / "v", "breaks")))
+    assert len(verdicts) == 2 and all("nothing to divide by" in one["failed"] for one in verdicts)
+    assert score(bank, tmp_path / "v", labels.read_key(bank.parent / "a.key")).failed == 2
+
+
 def test_logs_that_were_changed_are_refused(bank: Path, tmp_path: Path) -> None:
     """One digit in one log: neither run nor score goes on."""
     log = next((bank / "sets").rglob("g1.csv"))

@@ -1,4 +1,4 @@
-"""Diagnosers for the machinery of the blind trials: one that only counts, two that try to cheat. Run in processes."""
+"""Diagnosers for the machinery of the blind trials: one that only counts, one with a bug, two that cheat."""
 
 from __future__ import annotations
 
@@ -15,6 +15,11 @@ def sees(evidence: Evidence, settings: dict[str, Any]) -> dict[str, Any]:
     """No gap, as sure as it has frames."""
     frames = sum(len(run.caps.t) for run in evidence.runs)
     return document("no_gap", [], {"none": 1.0 - 1.0 / frames, "payload": 1.0 / frames})
+
+
+def breaks(evidence: Evidence, settings: dict[str, Any]) -> dict[str, Any]:
+    """Has a bug."""
+    raise ZeroDivisionError("nothing to divide by")
 
 
 def peeks(evidence: Evidence, settings: dict[str, Any]) -> dict[str, Any]:

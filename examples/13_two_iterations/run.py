@@ -45,6 +45,7 @@ class Profile:
 
 DEMO = Profile(
     targets=8,
+    policies=("straight",),
     settings={
         "identify": {"starts": 1, "profiles": 0, "max_iterations": 8},
         "plan": {"draws": 4, "candidates": 24, "kept": 4, "beam": 100, "cycles": 3},

@@ -124,3 +124,23 @@ class IdentifyBenchResult(Frozen):
     """`ours`, `mujoco.sysid` with its defaults, `mujoco.sysid jac` with x_scale='jac', `mujoco.sysid growing`."""
     compile_s: float
     """Processor time of our first simulations with and without derivatives, compilation included, before any fit [s]."""
+
+
+class DiagnoseBenchResult(Frozen):
+    """What `bench diagnose` prints: one diagnosis with the whole catalogue."""
+
+    schema_: Literal["r2s2r.bench.diagnose/1"] = Field(default="r2s2r.bench.diagnose/1", alias="schema")
+    machine: str
+    gaits: int
+    robot_s: float
+    """How long the robot walked in all of them."""
+    threads: int
+    first_s: float
+    """With compiling the machine code, which is kept."""
+    wall_s: float
+    cpu_s: float
+    seconds: dict[str, float]
+    """Wall time of each part."""
+    rollouts: int
+    verdict: str
+    effects: tuple[str, ...]

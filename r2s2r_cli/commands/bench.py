@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from r2s2r_cli.commands.bench_diagnose import diagnose
 from r2s2r_cli.commands.bench_engine import engine
 from r2s2r_cli.commands.bench_estimate import estimate
 from r2s2r_cli.commands.bench_identify import identify
@@ -43,6 +44,7 @@ def bench() -> None:
 bench_app.command("engine")(engine)
 bench_app.command("estimate")(estimate)
 bench_app.command("identify")(identify)
+bench_app.command("diagnose")(diagnose)
 
 
 @bench_app.command("startup")

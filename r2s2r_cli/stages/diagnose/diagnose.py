@@ -109,6 +109,7 @@ def diagnose(
             evidence,
             compared.arena,
             compared.base.z,
+            found=said,
             seed=settings.seed,
             cache_dir=cache_dir,
             threads=threads,

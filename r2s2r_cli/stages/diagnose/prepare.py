@@ -34,6 +34,8 @@ FROZEN = 1e8
 """Times its prior's precision that a nuisance has which is not fitted."""
 JACOBIANS = 2
 """Times that derivatives are taken anew for one set of start states."""
+AGED_ENGINE = 0.05
+"""The same of what stands for another engine's numerics, or how the robot was built: that does not age."""
 AGED = 0.5
 """Of a nuisance's own prior: how far it may have moved since the healthy runs."""
 
@@ -236,5 +238,8 @@ def _posterior(arena: Arena, base: Fit) -> tuple[np.ndarray, np.ndarray]:
     )  # fmt: skip
     H, _ = fits.normal(again)
     n = arena.shared
-    aged = AGED**2 * np.diag(1.0 / np.diag(arena.precision)[:n])
+    own = [arena.model.numbers[k].kind == "own" for k in arena.engine]
+    share = np.full(n, AGED)
+    share[: len(own)] = np.where(own, AGED_ENGINE, AGED)
+    aged = np.diag(share**2 / np.diag(arena.precision)[:n])
     return base.z[:n], np.linalg.inv(np.linalg.inv(H)[:n, :n] + aged)

@@ -112,8 +112,14 @@ class Fits:
         """A fit at a point of which the residual (M,) is known; derivatives by the effect are those towards off."""
         k = len(x)
         jacobian = np.concatenate([self.arena.by_nuisance, np.zeros((len(residual), k))], axis=1)
+        jacobian[:, self.overruled(hypothesis)] = 0.0
         cost = float(self.cost(hypothesis, z[None], x[None], residual[None])[0])
         return Fit(hypothesis, z.copy(), x.copy(), residual, jacobian, cost, x.copy())
+
+    def overruled(self, hypothesis: Hypothesis) -> list[int]:
+        """Places in z of nuisances that are the hypothesis's own numbers: it sets them, whatever z says."""
+        own = {place for places in hypothesis.spread for place in places}
+        return [k for k, place in enumerate(self.arena.engine) if place in own]
 
     def run(
         self, fits: Sequence[Fit], *, iterations: int = ITERATIONS, told: Callable[[int, int], None] | None = None

@@ -41,6 +41,16 @@ class Response:
         return self.seen >= LEAST_RESPONSE
 
 
+class _Projection:
+    """The nuisances as a linear problem, without those (held) that a candidate sets itself."""
+
+    def __init__(self, J: np.ndarray, weights: np.ndarray, precision: np.ndarray, held: Sequence[int] = ()) -> None:
+        self.J = J.copy()
+        self.J[:, list(held)] = 0.0
+        self.normal = (self.J * weights[:, None]).T @ self.J + precision
+        self.Q, _ = np.linalg.qr(np.delete(J, list(held), axis=1))
+
+
 def screen(arena: Arena, base: Fit, candidates: Sequence[Candidate]) -> tuple[Response, ...]:
     """Responses of all candidates at the sizes they are tried at, best gain first. base: the refit nominal model."""
     fits = Fits(arena)
@@ -48,9 +58,8 @@ def screen(arena: Arena, base: Fit, candidates: Sequence[Candidate]) -> tuple[Re
     weights = weight(arena.squares(base.residual[None])[0], arena.sizes)
     by_row = np.concatenate([np.full(w.rows.stop - w.rows.start, k) for w, k in zip(arena.white, weights, strict=True)])
     Jn = base.jacobian[:, : len(base.z)]
-    normal = (Jn * by_row[:, None]).T @ Jn + arena.precision
+    plain = _Projection(Jn, by_row, arena.precision)
     pull = arena.precision @ (base.z - arena.mean)
-    Q, _ = np.linalg.qr(Jn)
     best: dict[int, tuple[float, np.ndarray, np.ndarray]] = {}
     shown: dict[int, tuple[float, float, np.ndarray]] = {}
     for first in range(0, len(rows), CHUNK):
@@ -62,16 +71,18 @@ def screen(arena: Arena, base: Fit, candidates: Sequence[Candidate]) -> tuple[Re
         for (i, size), residual in zip(some, residuals, strict=True):
             if not np.isfinite(residual).all():
                 continue
+            held = fits.overruled(Hypothesis((candidates[i],)))
+            own = plain if not held else _Projection(Jn, by_row, arena.precision, held)
             response = residual - base.residual
             length = float(np.linalg.norm(response))
-            left = response - Q @ (Q.T @ response)
+            left = response - own.Q @ (own.Q.T @ response)
             kept = float(np.linalg.norm(left))
             if length > shown.get(i, (0.0, 0.0, residual))[0]:
                 share = 1.0 - (kept / length) ** 2 if length > 0 else 0.0
                 shown[i] = (length, share, left / max(kept, 1e-12))
-            by = -np.linalg.solve(normal, Jn.T @ (by_row * residual) + pull)
+            by = -np.linalg.solve(own.normal, own.J.T @ (by_row * residual) + pull)
             z = np.clip(base.z + by, arena.lower, arena.upper)
-            after = residual + Jn @ (z - base.z)
+            after = residual + own.J @ (z - base.z)
             data = float(minus_log(arena.squares(after[None]), arena.sizes).sum())
             away = z - arena.mean
             gain = base.cost - data - 0.5 * float(away @ arena.precision @ away)

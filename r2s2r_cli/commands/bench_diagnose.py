@@ -67,21 +67,11 @@ def diagnose(
         wall, cpu = time.perf_counter() - begun, time.process_time() - cpu
     robot_s = sum(float(run.caps.t[-1] - run.caps.t[0]) for run in evidence.runs)
     machine = f"{platform.machine()}, {os.cpu_count()} cores, python {platform.python_version()}"
-    console.document(
-        DiagnoseBenchResult(
-            machine=machine,
-            gaits=gaits,
-            robot_s=robot_s,
-            threads=threads,
-            first_s=compiled,
-            wall_s=wall,
-            cpu_s=cpu,
-            seconds=seconds,
-            rollouts=found.rollouts,
-            verdict=found.which.verdict,
-            effects=found.which.effects,
-        )  # fmt: skip
-    )
+    result = DiagnoseBenchResult(
+        machine=machine, gaits=gaits, robot_s=robot_s, threads=threads, first_s=compiled, wall_s=wall, cpu_s=cpu,
+        seconds=seconds, rollouts=found.rollouts, verdict=found.which.verdict, effects=found.which.effects,
+    )  # fmt: skip
+    console.document(result)
     console.table(
         f"one diagnosis of {gaits} gaits, {robot_s:.0f} s of the robot, the whole catalogue ({machine})",
         ["part", "time"],

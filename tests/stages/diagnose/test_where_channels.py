@@ -96,8 +96,8 @@ def _segments() -> tuple[SegmentGap, ...]:
 
 
 def test_a_beginning_is_found_and_none_is_invented() -> None:
-    """Gains from the 12th interval on: exactly that one. Gains everywhere, nowhere, and in 60 random orders: at most
-    8 per cent are said to begin."""
+    """Gains from the 12th interval on: exactly that one. Gains everywhere, nowhere, and in 100 random orders: at most
+    6 per cent are said to begin."""
     rng = np.random.default_rng(0)
     gain = rng.normal(-0.5, 0.5, STRETCHES)
     gain[11:] += 6.0
@@ -107,5 +107,6 @@ def test_a_beginning_is_found_and_none_is_invented() -> None:
     assert found.interval == 12
     assert onset(_segments(), np.full(STRETCHES, 6.0), 0) is None
     assert onset(_segments(), np.full(STRETCHES, -0.5), 0) is None
-    drawn = [onset(_segments(), rng.permutation(gain), k) is not None for k in range(60)]
-    assert np.mean(drawn) <= 0.08
+    orders = np.random.default_rng(5)
+    drawn = [onset(_segments(), orders.permutation(gain), k) is not None for k in range(100)]
+    assert np.mean(drawn) <= 0.06

@@ -115,7 +115,9 @@ def tracked_run(
         if readings is not None:
             heard = readings.t <= source.t[n - 1]
             readings = Readings(readings.t[heard], readings.length[heard], readings.cable)
-    doubt = check_names(swept.sighted, readings, robot, where=f"runs/{run}/camera")
+    names, doubt = check_names(swept.sighted, readings, robot, where=f"runs/{run}/camera")
+    if names is not None:
+        swept = swept.renamed(names)
     t = source.t[:n]
     show(f"{run}: smoothing", 0, 1, "")
     tracked = smooth_run(swept.sighted, readings, robot, motion, switches=switches(streams, t))

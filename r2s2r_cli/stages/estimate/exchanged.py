@@ -38,22 +38,35 @@ MOST_RODS = 4
 """Robots of more rods are checked for two rods exchanged alone."""
 
 
-def check_names(sighted: Sighted, readings: Readings | None, robot: Robot, *, where: str) -> str | None:
-    """A warning where the run cannot tell, in words; None where the names of the caps are right.
+def check_names(
+    sighted: Sighted, readings: Readings | None, robot: Robot, *, where: str
+) -> tuple[np.ndarray | None, str | None]:
+    """The names that the caps have, (cap,), None where they have them already; and a warning in words, or None.
 
-    Raises InputError where other names fit the sensors clearly better.
+    A robot at rest may look the same after half a turn, and sensors with offsets do not tell: then the two caps of
+    rods are taken for each other at first, which is put right here. Raises InputError where only names that give rods
+    each other's colours fit the sensors, and clearly better.
     """
     if readings is None:
-        return None  # the report says what a run without sensors cannot tell
+        return None, None  # the report says what a run without sensors cannot tell
     p, shown = sighted.p_WE, lengths_at(sighted.t, readings)
     ends = np.array([cable.caps for cable in robot.cables])[readings.cable]
     names = list(namings(len(robot.rods)))
     found = np.array([deviation(p, shown, ends, name) for name in names])
     if not np.isfinite(found[0]):
-        return None
-    others = np.where(np.isfinite(found[1:]), found[1:], np.inf)
-    best = 1 + int(np.argmin(others))
+        return None, None
+    found[~np.isfinite(found)] = np.inf
+    best = 1 + int(np.argmin(found[1:]))
+    same_rods = [i for i, name in enumerate(names) if i and np.array_equal(name[::2] // 2, np.arange(len(robot.rods)))]
+    if same_rods and found[own := min(same_rods, key=lambda i: float(found[i]))] < TELLS * found[best]:
+        best = own
     if found[best] < BETTER * found[0]:
+        if best in same_rods:
+            turned = ", ".join(robot.rods[r].name for r in np.flatnonzero(names[best][::2] % 2))
+            return names[best], (
+                f"at the start the two end caps of rods {turned} were taken for each other: the lengths of the sensors "
+                f"over the run put that right ({1e3 * found[0]:.1f} mm apart before, {1e3 * found[best]:.1f} mm after)"
+            )
         raise InputError(
             _what(names[best], robot), where=f"robot.toml [[colors]]; {where}",
             expected="lengths of the cable sensors as the camera sees them, but for an offset each",
@@ -61,18 +74,15 @@ def check_names(sighted: Sighted, readings: Readings | None, robot: Robot, *, wh
             hint="r2s2r doctor camera --camera replay:10-record.h5 --preview see.png",
         )  # fmt: skip
     if found[best] < TELLS * found[0]:
-        return (
+        return None, (
             "so little moves, or the sensors err so much, that nobody can tell whether the colours belong to the rods "
             "that robot.toml says"
         )
-    return None
+    return None, None
 
 
 def _what(naming: np.ndarray, robot: Robot) -> str:
     rods = naming[::2] // 2
-    if np.array_equal(rods, np.arange(len(rods))):
-        flipped = ", ".join(str(r) for r in np.flatnonzero(naming[::2] % 2))
-        return f"the two end caps of rod {flipped} are exchanged, or sensors are on other cables than robot.toml says"
     name = [rod.name for rod in robot.rods]
     hue = {color.rod: f" (hue {color.hue[0]:g} to {color.hue[1]:g})" for color in robot.colors}
     parts = [f"rod {name[r]} has that of rod {name[of]}{hue.get(name[of], '')}" for r, of in enumerate(rods) if r != of]

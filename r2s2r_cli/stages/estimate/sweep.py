@@ -7,7 +7,7 @@ to the first. Pictures are decoded once, those before the beginning twice.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,6 +51,12 @@ class Swept:
         """Frames up to the last one in which most caps were seen: after it the robot did not come back as a whole."""
         seen = np.isfinite(self.sighted.p_WE[..., 0]).mean(axis=1) > MOST
         return int(np.flatnonzero(seen)[-1]) + 1 if seen.any() else 0
+
+    def renamed(self, names: np.ndarray) -> Swept:
+        """The same with cap c where cap names[c] was taken to be."""
+        sighted = Sighted(self.sighted.t, self.sighted.p_WE[:, names], self.sighted.cov[:, names])
+        caps = {name: getattr(self, name)[:, names] for name in ("visible", "code", "known", "known_sd")}
+        return replace(self, sighted=sighted, **caps)
 
     def until(self, frames: int) -> Swept:
         """The first frames alone."""

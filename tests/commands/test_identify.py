@@ -13,10 +13,12 @@ from pathlib import Path
 
 import pytest
 
+from r2s2r_cli.stages.identified import Identified, identified as made_of
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.read import read_artifact
 from tests.commands.conftest import document, invoke
 from tests.support.builders import same
+from tests.support.engine import threebar
 from tests.support.simulated_log import simulated_project
 
 pytestmark = pytest.mark.slow
@@ -151,3 +153,27 @@ def test_the_self_test_writes_nothing(identified: Path) -> None:
     assert set(report["parameters"]) == {"motor_speed", "friction"}
     assert len(report["cases"]) == 2
     assert {path: path.stat().st_mtime_ns for path in (identified / "iterations").rglob("*")} == before
+
+
+def test_an_effect_stays_and_the_next_iteration_starts_from_it(identified: Path) -> None:
+    """A payload that is not there: its mass is fitted to next to nothing, with its place given; whoever simulates has
+    the effect, and so has the next iteration, which names none, until it names `none`."""
+    ask = ("--train", "gait:1-3", "--free", "motor_speed", "--starts", "1", "--set", "identify.profiles=1")
+    asked = ("--with-effect", "payload:0", "--fix", "payload.place_m.0=0.1")
+    found = document("identify", *ask, *asked, "--force")["parameters"]
+    mass = found["payload.mass_kg.0"]
+    assert mass["value"] < max(3 * mass["sd"], 0.01)
+    assert "payload.place_m.0" in found
+    own = identified_simulator(identified / IDENTIFY)
+    assert [effect.name for effect in own.structure.effects] == ["payload"]
+    assert float(own.theta.extra["payload.place_m"][0, 0]) == 0.1
+    again = document("identify", *ask, "--iteration", "2")["parameters"]
+    assert again["payload.mass_kg.0"]["value"] == pytest.approx(mass["value"], abs=0.01)
+    assert again["payload.place_m.0"]["value"] == 0.1
+    bare = document("identify", *ask, "--iteration", "3", "--with-effect", "none")["parameters"]
+    assert set(bare) == {"motor_speed"}
+
+
+def identified_simulator(path: Path) -> Identified:
+    """As plan, simulate and compare take it."""
+    return made_of(read_artifact(path, "identification")[1], threebar())

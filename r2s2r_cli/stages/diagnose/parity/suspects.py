@@ -37,8 +37,11 @@ _OF: dict[str, Sizes] = {
     "slope_y": lambda d, k: (Suspicion("ground_slope", {"angle_y_rad": d}), Suspicion("camera_pose", {}, 0.7)),
     "slope_change": lambda d, k: (Suspicion("camera_pose", {}), Suspicion("ground_slope", {}, 0.3)),
     "cap_height": lambda d, k: (Suspicion("cap_radius", _indexed("by_m", k, 1.5 * d)),),
-    "winch_speed": lambda d, k: (Suspicion("battery_sag", {}, 0.4), Suspicion("load_droop", {}, 0.4),
-                                 Suspicion("spool_buildup", {}, 0.4), Suspicion("motor_speed_mismatch", {}, 0.2)),
+    "winch_speed": lambda d, k: (
+        # Wound cable makes winches faster than they were; batteries and loads make them slower.
+        (Suspicion("spool_buildup", {}, 0.6),) if d > 0 else
+        (Suspicion("battery_sag", {}, 0.5), Suspicion("load_droop", {}, 0.4))
+    ),
     "winch_rate": lambda d, k: (Suspicion("motor_speed_mismatch", _indexed("factor", k, math.exp(d))),),
     "in_over_out": lambda d, k: (Suspicion("load_droop", {"per_newton": max(-d, 0.0) / USUAL_N}),),
     "latency": lambda d, k: (Suspicion("command_latency", {"tau_s": max(d, 0.0)}),),

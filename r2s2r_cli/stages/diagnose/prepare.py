@@ -10,7 +10,7 @@ import numpy as np
 
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run
-from r2s2r_cli.stages.diagnose.starts import Starts
+from r2s2r_cli.stages.diagnose.starts import Starts, as_smoothed
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
@@ -163,6 +163,7 @@ def _fitted(
         if z is not None:
             values[list(model.nuisances)] = z[: len(model.nuisances)]
         states = starts.at([named[name] for name in last], replayer, values, last)
+        states = as_smoothed(states, runs, replayer, values)
         many = stretches(runs, part, states)
         if not many:
             raise InputError(

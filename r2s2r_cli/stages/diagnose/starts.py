@@ -60,6 +60,30 @@ class Starts:
         return found
 
 
+def as_smoothed(
+    states: dict[tuple[str, int], State], runs: Sequence[Run], predictor: Predictor, values: np.ndarray
+) -> dict[tuple[str, int], State]:
+    """The states with the poses and velocities that the estimate smoothed: these know later frames, so they are for
+    intervals that are fitted, never for judged ones. Roll is the filter's; rest lengths balance the pose."""
+    import torch
+
+    from r2s2r_cli.engine.settle import window_state
+
+    theta = predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64))
+    up = np.array([0.0, 0.0, predictor.mapping.observation(values).ground_height])
+    named = {run.name: run.caps for run in runs}
+    found = {}
+    with torch.no_grad():
+        for (name, number), state in states.items():
+            run = named[name]
+            frame = int(run.intervals.first[number - 1])
+            found[name, number] = window_state(
+                predictor.simulator, theta, torch.as_tensor(run.p_WE[frame] - up)[None], state,
+                v_WE=torch.as_tensor(run.v_WE[frame])[None],
+            )  # fmt: skip
+    return found
+
+
 def thinned(run: RunData) -> RunData:
     """The run with the first frame of every interval and, between these, frames at least APART_S apart."""
     first = {int(frame) for frame in run.intervals.first}

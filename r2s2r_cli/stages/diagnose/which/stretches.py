@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 APART_S = 0.08
 """Frames nearer than this are averaged: errors of a simulator last longer, and half the frames say as much."""
 LEAST_NOISE_M = 5e-4
-LENGTH_NOISE_M = 1e-3
-"""Least noise of a length sensor: its calibration is no better."""
+LENGTH_NOISE_M = 2e-3
+"""Least noise of a length sensor: its calibration and its own delay are no better."""
 
 
 @dataclass(frozen=True)

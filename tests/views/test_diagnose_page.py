@@ -1,0 +1,54 @@
+"""The page of a diagnosis: the sentence, the share with its prediction, what is not calibrated, no network."""
+
+from __future__ import annotations
+
+from r2s2r_cli.views.diagnose_page import diagnose_page, diagnose_tables
+from schemas.results_diagnose import (
+    DiagnoseReport,
+    ElementFound,
+    RankedName,
+    ShrinkageFound,
+    WhereFound,
+)
+
+
+def report() -> DiagnoseReport:
+    """A payload on rod 1, found on three intervals."""
+    element = ElementFound(kind="rod", index=1)
+    return DiagnoseReport(
+        verdict="effect", sentence="The gap is caused by payload at rod 1 (p = 0.90).", effects=("payload",),
+        probability=0.9, set90=("payload", "com_offset"),
+        ranking=(
+            RankedName(effect="payload", elpd_gain=31.0, probability=0.9, size={"payload.mass_kg.1": 0.04},
+                       ci90={"payload.mass_kg.1": (0.03, 0.05)}, units={"payload.mass_kg.1": "kg"}, channel="mass",
+                       element=element, rmse_m=0.006, on_bound=("payload.place_m.1",)),
+            RankedName(effect="none", elpd_gain=0.0, probability=0.1),
+        ),
+        where=WhereFound(segments=("a:2",), onset_segment=None, channel="mass", element=element),
+        shrinkage=ShrinkageFound(
+            effects=("payload",), nominal=0.02, refit=0.012, refit_plus_effect=0.006, ceiling=0.01, floor=0.005,
+            own_share=0.7, ci90=(0.4, 0.9), predicted=0.65, judged_on=("b:1", "b:2"), within_run=False,
+        ),
+        not_testable=("motor_dead_zone",), confusable=(("payload", "com_offset", 2.1),), next_gait=None,
+        robot="threebar", floor_m=0.005, floor_from="repeats", floor_given=True, refit_rmse_m=0.012,
+        refit_upper_m=0.014, chance_nats=4.0, calibrated="uncalibrated: a temperature by hand", left_out="3 gaits",
+        segments=(), hidden=(), parity=("rod lengths are as built",), missing=("no sensors",),
+        refit={"friction": (0.1, 0.02)}, rollouts=100, within_run=False, warnings=("look here",),
+    )  # fmt: skip
+
+
+def test_the_page_says_what_was_found_and_what_it_is_worth() -> None:
+    """The sentence, the warning, that probabilities are by hand; nothing is loaded from elsewhere."""
+    page = diagnose_page(report(), []).decode()
+    assert "payload at rod 1" in page and "look here" in page
+    assert "uncalibrated" in page
+    assert "http://" not in page and "https://" not in page
+
+
+def test_tables_hold_the_share_beside_its_prediction_and_its_doubts() -> None:
+    """Both shares, the size with its unit and interval, the bound it ended on, and who cannot be told apart."""
+    text = "\n".join(" | ".join(row) for table in diagnose_tables(report()) for row in table.rows)
+    assert "70 % (40 .. 90)" in text and "65 %" in text
+    assert "mass_kg 0.04 kg | 0.03 .. 0.05" in text
+    assert "place_m.1 on a bound" in text
+    assert "payload | com_offset | 2.1 | cannot be told apart" in text

@@ -10,6 +10,7 @@ import pytest
 from r2s2r_cli.stages.diagnose.parity import parity
 from r2s2r_cli.stages.diagnose.parity.finding import discoveries
 from r2s2r_cli.stages.diagnose.parity.series import Measured, combined, regression
+from r2s2r_cli.stages.identify.data import Selection
 from tests.support.parity_log import evidence_of, swaying, with_caps
 
 
@@ -88,3 +89,22 @@ def test_caps_that_were_lost_half_of_the_time_are_counted() -> None:
     found = parity(evidence_of((with_caps(run, quality=quality),)))
     assert abs(found.of("dropout")[0].value - 1 / 6) < 0.01
     assert next(iter(found.suspected())) == "dropout"
+
+
+def test_nothing_of_judged_intervals_is_looked_at() -> None:
+    """A split through a run: numbers of the judged part, even absurd ones, change no finding."""
+    run = swaying("g", 3)
+    split = replace(
+        evidence_of((run,)), fit=(Selection("g", (1, 2, 3)),), judge=(Selection("g", (4, 5, 6)),)
+    )  # fmt: skip
+    frame, tick = int(run.caps.intervals.first[3]), int(np.searchsorted(run.caps.t_command, 6.0))
+    observed, control = run.caps.observed.copy(), run.caps.control.copy()
+    observed[frame:] *= 7.0
+    control[tick:] = -control[tick:]
+    assert run.lengths is not None
+    length = run.lengths.length.copy()
+    length[tick:] = 9.9
+    spoiled = replace(with_caps(run, observed=observed, control=control), lengths=replace(run.lengths, length=length))
+    first, second = parity(split), parity(replace(split, runs=(spoiled,)))
+    assert first.findings
+    assert first == second

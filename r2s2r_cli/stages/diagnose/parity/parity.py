@@ -8,6 +8,7 @@ from dataclasses import replace
 from r2s2r_cli.stages.diagnose.evidence import Evidence
 from r2s2r_cli.stages.diagnose.parity.expected import EXPECTED
 from r2s2r_cli.stages.diagnose.parity.finding import Element, Finding, Parity
+from r2s2r_cli.stages.diagnose.parity.fitted import fitted_runs
 from r2s2r_cli.stages.diagnose.parity.mismatch import mismatches
 from r2s2r_cli.stages.diagnose.parity.quantities import Key, Quantities, quantities
 from r2s2r_cli.stages.diagnose.parity.series import Measured
@@ -28,7 +29,7 @@ def parity(evidence: Evidence, *, level: float = 0.05) -> Parity:
     the data come first: with one, no quantity is measured. Raises nothing for data that are too few: `missing` says so.
     """
     robot = evidence.robot
-    runs = evidence.only(evidence.fit) or evidence.runs
+    runs = fitted_runs(evidence)
     speed = float(evidence.model.theta.speed_in.mean())
     wrong, missing = mismatches(runs, robot, speed)
     if wrong:

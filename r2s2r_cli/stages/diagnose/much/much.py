@@ -73,7 +73,7 @@ def _chosen(compared: Compared) -> tuple[Fit | None, Score | None]:
     """The fit of what was committed to, else the best one."""
     wanted = set(compared.which.effects)
     for fit, score in zip(compared.fits, compared.scores, strict=True):
-        if not wanted or set(fit.hypothesis.effects) == wanted:
+        if set(fit.hypothesis.effects) == wanted or (not wanted and len(fit.hypothesis.parts) == 1):
             return fit, score
     return (compared.fits[0], compared.scores[0]) if compared.fits else (None, None)
 

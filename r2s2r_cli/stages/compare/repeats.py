@@ -44,11 +44,11 @@ class Floors:
 
 SAME_START_M = 0.03
 """Runs whose first frames, laid on each other, differ by more than this (RMS of the caps) started on another side of
-the robot or in another shape: they repeat nothing. Rest shapes differ by 5 to 20 mm within the controller's tolerance."""
+the robot or in another shape: they repeat nothing. Rest shapes differ by 5 to 20 mm within the tolerance of the PID."""
 
 
 def grouped(walks: Mapping[str, Walk], policies: Mapping[str, str]) -> list[list[str]]:
-    """Names of runs that repeat each other: same policy, same targets, same shape at the start; groups of two or more."""
+    """Names of runs that repeat each other: same policy, targets and shape at the start; groups of two or more."""
     found: list[list[str]] = []
     for name, walk in walks.items():
         for group in found:

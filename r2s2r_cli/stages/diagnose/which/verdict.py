@@ -15,8 +15,10 @@ from r2s2r_cli.stages.diagnose.which.rivals import NoGap
 from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.screen import Response
 
-PAIR = 3.0
-"""[nats] beyond chance that a second effect must add."""
+PAIR = 15.0
+"""[nats] beyond chance that a second effect must add: one law is never quite right, and a second mends its faults."""
+PAIR_SHARE = 0.3
+"""Of the first effect's gain, which it must add at least as well."""
 NINETY = 1.645
 INDISTINCT = 3.0
 """[nats] Two hypotheses nearer than this cannot be told apart."""
@@ -97,7 +99,7 @@ def _pair(m: Material, order: list[int], gains: dict[int, float], best: dict[str
         effects = m.fits[i].hypothesis.effects
         if len(effects) == 2:
             alone = max((gains[k] for k in best.values()), default=0.0)
-            return effects if gains[i] - alone > m.chance + PAIR else None
+            return effects if gains[i] - alone > m.chance + max(PAIR, PAIR_SHARE * alone) else None
     return None
 
 

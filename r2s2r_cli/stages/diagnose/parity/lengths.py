@@ -67,8 +67,8 @@ def sensor_parity(runs: Sequence[Series]) -> SensorParity | None:
 def _moved(one: Series, shift: float) -> np.ndarray:
     """Sensor lengths as they were `shift` seconds before the frames, (frame, cable)."""
     t, length = one.heard
-    found = np.full(one.sensed.shape, np.nan)
-    for k in range(found.shape[1]):
+    found = np.full_like(one.sensed, np.nan)
+    for k in range(length.shape[1]):
         good = np.isfinite(length[:, k])
         if good.sum() > 2:
             found[:, k] = np.interp(one.t - shift, t[good], length[good, k], left=np.nan, right=np.nan)

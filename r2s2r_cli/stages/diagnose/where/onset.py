@@ -20,10 +20,11 @@ def onset(segments: tuple[SegmentGap, ...], gain: np.ndarray, seed: int) -> Onse
     """
     if len(gain) < 4 or np.ptp(gain) == 0:
         return None
-    found, place = _best(gain)
+    steps = _steps(gain[None])[0]
+    place = int(np.argmax(steps)) + 1
     rng = np.random.default_rng(seed)
-    drawn = np.array([_best(rng.permutation(gain))[0] for _ in range(DRAWS)])
-    p = float((1 + np.sum(drawn >= found)) / (DRAWS + 1))
+    drawn = _steps(rng.permuted(np.tile(gain, (DRAWS, 1)), axis=1)).max(axis=1)
+    p = float((1 + np.sum(drawn >= steps.max())) / (DRAWS + 1))
     before, after = float(gain[:place].mean()), float(gain[place:].mean())
     if p > LEVEL or before > QUIET * after:
         return None
@@ -31,11 +32,10 @@ def onset(segments: tuple[SegmentGap, ...], gain: np.ndarray, seed: int) -> Onse
     return Onset(one.order, one.run, one.interval, (after - max(before, 0.0)) * (len(gain) - place), p)
 
 
-def _best(gain: np.ndarray) -> tuple[float, int]:
-    """Largest standardised step up of the mean, and the first interval after it."""
-    n = len(gain)
+def _steps(gain: np.ndarray) -> np.ndarray:
+    """Standardised steps up of the mean of gains (draw, n) before each interval but the first, (draw, n - 1)."""
+    n = gain.shape[1]
     k = np.arange(1, n)
-    after = np.cumsum(gain[::-1])[::-1][1:]
-    step = (after / (n - k) - (gain.sum() - after) / k) * np.sqrt(k * (n - k) / n)
-    place = int(np.argmax(step))
-    return float(step[place]), place + 1
+    after = np.cumsum(gain[:, ::-1], axis=1)[:, ::-1][:, 1:]
+    before = gain.sum(axis=1, keepdims=True) - after
+    return np.asarray((after / (n - k) - before / k) * np.sqrt(k * (n - k) / n))

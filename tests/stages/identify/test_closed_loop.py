@@ -141,8 +141,8 @@ def test_what_the_sensors_read_is_measured() -> None:
 
 
 def test_what_the_camera_says_of_the_sensors_comes_first() -> None:
-    """Errors are the mean over the runs that are trained on, NaN where a sensor is dead in all; the loop is late by what
-    a command takes and by what the sensors are behind."""
+    """Errors are the mean over the runs that are trained on, NaN where a sensor is dead in all; the loop is late by
+    what a command takes and by what the sensors are behind."""
     run = crawl(2, values=LATE)
     shown = np.array([1.0, 2, 3, 4, np.nan, 6, 7, 8, 9]) * 1e-3
     runs = [

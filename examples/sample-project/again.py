@@ -119,7 +119,7 @@ def _again(project: Project, path: Path, say: Callable[[str], None]) -> Iterator
         say(f"{name}: {'the same, bit by bit' if same else 'within tolerance' if not found else 'NOT as it was'}")
         yield from (f"{name}: {text}" for text in found)
     if made.stage == "plan" and (path.parent / "50-execute.h5").exists():
-        yield _must(["execute", "--iteration", number, "--dry-run", "--yes"], project.root, say)
+        yield _must(["execute", "--iteration", number, "--dry-run", "--force"], project.root, say)
     path.write_bytes(kept)
 
 

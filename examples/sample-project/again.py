@@ -1,4 +1,4 @@
-"""Run every stage of a project again and compare with what is stored: `python again.py PROJECT` (a minute or two).
+"""Run every stage of a project again and compare with what is stored: `python again.py PROJECT` (minutes).
 
 For a lab's own CI as well: it needs nothing but r2s2r and the project's directory, of which it works on a copy. The
 robot is not moved: `execute` is run with --dry-run. Every stage gets the *stored* artifacts before it as its input, so

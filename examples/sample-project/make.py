@@ -29,7 +29,7 @@ SETTINGS = {
     "plan.step_s": 0.002, "plan.depth": 3, "plan.beam": 40, "plan.draws": 3, "plan.starts": 2, "plan.candidates": 9,
     "plan.kept": 2, "plan.cycles": 2, "record.rest_s": 1.0, "record.jpeg_quality": 80, "record.camera_hold_s": 0.5,
 }  # fmt: skip
-"""What differs from the defaults: a small problem, so that all stages together take a minute or two to repeat."""
+"""What differs from the defaults: a small problem, so that all stages together take minutes to repeat."""
 WORLD = """\
 # The virtual robot of this project. Read by `r2s2r rig` alone.
 seed = 12

@@ -22,8 +22,18 @@ from schemas.simulation import SIMULATION
 
 KINDS: dict[str, ArtifactSpec] = {
     spec.kind: spec
-    for spec in (CALIBRATION, RECORDING, ESTIMATE, IDENTIFICATION, PLAN, POLICY, SIMULATION, COMPARISON, FLOOR,
-                 DIAGNOSIS)
+    for spec in (
+        CALIBRATION,
+        RECORDING,
+        ESTIMATE,
+        IDENTIFICATION,
+        PLAN,
+        POLICY,
+        SIMULATION,
+        COMPARISON,
+        FLOOR,
+        DIAGNOSIS,
+    )
 }
 """The artifact kinds by name, in the order of the data."""
 

@@ -148,7 +148,7 @@ def test_numbers_of_another_robot_are_refused(project: Path) -> None:
     text = (project / "robot.toml").read_text()
     (project / "robot.toml").write_text(text.replace('name = "threebar"', 'name = "mine"', 1))
     refused = invoke("plan", "--dry-run")
-    assert refused.exit_code == 4 and "another robot" in refused.stderr
+    assert refused.exit_code == 4 and "another name" in refused.stderr
 
 
 @pytest.mark.slow

@@ -209,9 +209,53 @@ def comparison() -> ArtifactData:
     })  # fmt: skip
 
 
+def diagnosis() -> ArtifactData:
+    """An effect that wins over none and unknown; two fitted intervals, one of which stands out, and a judged one."""
+
+    def words(*values: str) -> np.ndarray:
+        return np.array([value.encode() for value in values])
+
+    caps = np.array(robot().rest_caps_m)
+    verdict = {
+        "robot": "threebar", "verdict": "effect", "effects": "friction_field", "probability": 0.8,
+        "set90": "friction_field cap_friction", "calibrated": "not calibrated", "floor": 0.006,
+        "floor_from": "repeats of a policy", "chance": 3.5, "within_run": False,
+    }  # fmt: skip
+    names = ("friction_field", "cap_friction", "none", "unknown")
+    ranking = {
+        "name": words(*names), "elpd_gain": np.array([20.0, 8.0, 0.0, 2.0]),
+        "probability": np.array([0.8, 0.1, 0.05, 0.05]),
+        "rmse": np.array([0.007, 0.009, 0.012, np.nan]), "element": words("", "cap 2", "", ""),
+        "channel": words("contact", "contact", "", ""),
+    }  # fmt: skip
+    sizes = {"name": words("cap_friction.factor.2"), "value": np.array([0.6]), "lower": np.array([0.5]),
+             "upper": np.array([0.7]), "unit": words("1")}  # fmt: skip
+    screening = {"name": words("friction_field", "motor_dead_zone"), "gain": np.array([18.0, np.nan]),
+                 "absorbed": np.array([0.4, 0.0]), "seen": np.array([12.0, 0.0])}  # fmt: skip
+    segments = {
+        "run": words("walk", "walk"), "interval": np.array([1, 2]), "t": np.array([[0.0, 1.0], [1.0, 2.5]]),
+        "refit": np.array([0.006, 0.02]), "effect": np.array([0.006, 0.008]), "misfit": np.array([1.0, 4.0]),
+        "gap": np.array([False, True]), "xy": np.stack([caps[:, :2], caps[:, :2] + 0.1]),
+        "error": np.stack([0 * caps, 0 * caps + 1e-2]),
+    }  # fmt: skip
+    judged = {"name": words("walk:3"), "nominal": np.array([0.03]), "refit": np.array([0.02]),
+              "effect": np.array([0.008]), "ceiling": np.array([0.007])}  # fmt: skip
+    drawn = {"p_WE": caps, "cable": np.array([cable.caps for cable in robot().cables]),
+             "actuated": np.array([i in robot().actuated for i in range(len(robot().cables))])}  # fmt: skip
+    place = {"x": np.array([0.0, 0.1]), "y": np.array([0.0, 0.1, 0.2]),
+             "value": np.array([[0.0, 0.1], [0.2, 0.3], [np.nan, 0.1]]),
+             "weight": np.array([[1.0, 1.0], [2.0, 3.0], [0.0, 1.0]])}  # fmt: skip
+    return ArtifactData("diagnosis", {
+        "verdict": Group(attributes=verdict), "ranking": Group(ranking), "sizes": Group(sizes),
+        "screening": Group(screening), "segments": Group(segments), "judged": Group(judged), "robot": Group(drawn),
+        "place": Group(place),
+    })  # fmt: skip
+
+
 BUILDERS: dict[str, Callable[[], ArtifactData]] = {
     "calibration": calibration, "recording": recording, "estimate": estimate, "identification": identification,
     "plan": plan, "policy": policy, "simulation": simulation, "comparison": comparison, "floor": floor,
+    "diagnosis": diagnosis,
 }  # fmt: skip
 """One builder a kind."""
 

@@ -45,14 +45,15 @@ class TickClock:
         """A host has come: it counts its ticks from 1."""
         self._k = 0
 
-    def asked(self, k: int, *, stream: bool) -> bool | None:
+    def asked(self, k: int) -> bool | None:
         """What to do for tick k. True: advance; False: it is done, answer again; None: pass over.
 
-        Over datagrams nothing tells of a new host but that it asks for tick 1.
+        Over datagrams nothing tells of a new host but that it asks for tick 1, nor where a port was closed and opened
+        again between two looks at it.
         """
         if k == self._k:
             return False
-        if k == self._k + 1 or (k == 1 and not stream):
+        if k in (1, self._k + 1):
             self._k = k
             return True
         return None

@@ -98,7 +98,7 @@ class Server:
         return [*others, *ticks]
 
     def _tick(self, clock: TickClock, k: int, board: int) -> None:
-        advance = clock.asked(k, stream=self._port.transport.stream)
+        advance = clock.asked(k)
         if advance is None:
             return
         if advance:

@@ -51,12 +51,12 @@ def rows_of(report: Mapping[str, Any], seed: str) -> Iterator[Row]:
 def summary(rows: Sequence[Row]) -> Iterator[str]:
     """The table, median and range over seeds."""
     models = list(dict.fromkeys(name for row in rows for name in row.error))
-    yield f"{'':14} {'':26} {'floor':>8}" + "".join(f"{name:>24}" for name in models) + "   by what factor the gap fell"
+    yield f"{'':14} {'':26} {'floor':>8}" + "".join(f"{name:>28}" for name in models) + "   by what factor the gap fell"
     for runs in dict.fromkeys(row.runs for row in rows):
         for measure, (words, scale, unit) in MEASURES.items():
             mine = [row for row in rows if row.runs == runs and row.measure == measure]
             floors = [scale * row.floor for row in mine if row.floor is not None]
-            cells = "".join(f"{_spread([scale * row.error[name] for row in mine if name in row.error]):>24}"
+            cells = "".join(f"{_spread([scale * row.error[name] for row in mine if name in row.error]):>28}"
                             for name in models)  # fmt: skip
             fall = "   ".join(
                 f"{name} {_factor([row.falls(name) for row in mine])}" for name in models if name != "initial"
@@ -68,6 +68,8 @@ def summary(rows: Sequence[Row]) -> Iterator[str]:
 def _spread(values: Sequence[float]) -> str:
     if not values:
         return "-"
+    if len(values) == 1:
+        return f"{values[0]:.2f}"
     return f"{median(values):.2f} ({min(values):.2f} .. {max(values):.2f})"
 
 
@@ -79,5 +81,7 @@ def _factor(values: Sequence[float | None]) -> str:
     def text(value: float) -> str:
         return "to the floor" if value == inf else f"{value:.1f}"
 
+    if len(known) == 1:
+        return text(known[0])
     middle = known[len(known) // 2] if len(known) % 2 else min(known[len(known) // 2 - 1], known[len(known) // 2])
     return f"{text(middle)} ({text(known[0])} .. {text(known[-1])})"

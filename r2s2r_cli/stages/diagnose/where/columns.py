@@ -17,8 +17,8 @@ from r2s2r_cli.stages.identify.predict import Predictor
 if TYPE_CHECKING:
     from r2s2r_cli.stages.identified import Identified
 
-TIMING = {"sensor_lag": 0.04, "command_delay": 0.015}
-"""Further nuisances and prior sd [s]: sensors have a lag of their own, and half a control tick is in no log."""
+TIMING = {"command_delay": 0.015}
+"""Further nuisances and prior sd [s]: half a control tick is in no log."""
 TILTED_RAD = 0.1
 FARTHEST = 10.0
 """A probe of its prior's size moves what is seen by at most so many standard deviations, root mean square."""
@@ -92,7 +92,7 @@ def design(
         whole = np.concatenate([_channels(arena, own, by), _sensing(arena, len(own))], axis=0)
         white = arena.white[k]
         probes = _bounded(_whitened(white, whole) * scale[:, None], white.size)
-        timing = _whitened(white, _timing(arena, own, one.t, later[rows]))
+        timing = _whitened(white, _timing(arena, own, later[rows]))
         nuisances = _bounded(arena.by_nuisance[white.rows].T * spread[:, None], white.size) / spread[:, None]
         joined = np.concatenate([nuisances, timing, probes, -residual[None, white.rows]], axis=0)
         grams.append(joined @ joined.T)
@@ -108,15 +108,9 @@ def design(
     return Design(gram, tuple(columns), arena.sizes, arena.gait, known, tuple(caps), tuple(innovations))
 
 
-def _timing(arena: Arena, caps: np.ndarray, t: np.ndarray, later: np.ndarray) -> np.ndarray:
-    """Responses to TIMING: sensors that show what was, and commands that act later, (2, channel, F)."""
-    late = _channels(arena, caps, np.concatenate([later[..., None], np.zeros((*caps.shape, CAMERA_ONLY))], axis=-1))[:1]
-    lag = np.zeros_like(late)
-    for place, cable in enumerate(arena.sensors):
-        a, b = arena.replayer.cable_caps[cable]
-        length = np.linalg.norm(caps[:, a] - caps[:, b], axis=-1)
-        lag[0, 3 * caps.shape[1] + place] = -np.gradient(length, t) if len(t) > 1 else 0.0
-    return np.concatenate([lag, late], axis=0)
+def _timing(arena: Arena, caps: np.ndarray, later: np.ndarray) -> np.ndarray:
+    """Responses to TIMING: commands that act later, (1, channel, F)."""
+    return _channels(arena, caps, np.concatenate([later[..., None], np.zeros((*caps.shape, CAMERA_ONLY))], axis=-1))[:1]
 
 
 def _levelled(arena: Arena) -> np.ndarray:

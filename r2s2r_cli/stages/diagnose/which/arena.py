@@ -21,6 +21,9 @@ CAMERA = (("camera_height", "m", 2e-3), ("camera_tilt_x", "rad", 5e-3), ("camera
 where a stretch starts."""
 SENSOR_SD = 3e-3
 """[m] What a length sensor is off by, the same all the time, before anything is called an effect."""
+SENSOR_LAG_SD = 0.04
+"""[s] By how much all length readings are late, before anything is called an effect: filters, converters and half a
+control tick are in no log, and a lag of 40 ms is 2 to 3 mm on every ramp."""
 SECANT = 0.3
 """Of a nuisance's prior sd, to both sides: over what its derivative is taken."""
 TRIMMED = 0.85
@@ -65,14 +68,14 @@ class Arena:
         winched = self.model.robot.actuated
         shared = (
             *(self.model.names[k] for k in self.engine), *(name for name, _, _ in CAMERA),
-            *(f"sensor_bias_{k}" for k in self.sensors),
+            *(f"sensor_bias_{k}" for k in self.sensors), *(("sensor_lag",) if self.sensors else ()),
         )  # fmt: skip
         self.shared = len(shared)
         """How many nuisances are the same in every run; the others are the rest lengths that runs began with."""
         self.names = (*shared, *(f"rest_{run}_{cable}" for run in self.runs for cable in winched))
         own = [self.model.numbers[k] for k in self.engine]
         sd = np.array([n.sd for n in own] + [sd for _, _, sd in CAMERA] + [SENSOR_SD] * len(self.sensors)
-                      + [REST_SD] * (len(self.runs) * len(winched)))  # fmt: skip
+                      + [SENSOR_LAG_SD] * bool(self.sensors) + [REST_SD] * (len(self.runs) * len(winched)))  # fmt: skip
         low, high = np.array([n.within for n in own]).T
         self.lower = np.concatenate([low, np.full(len(sd) - len(own), -np.inf)])
         self.upper = np.concatenate([high, np.full(len(sd) - len(own), np.inf)])
@@ -213,7 +216,8 @@ class Arena:
 
     def _with_rest(self, by_offset: Sequence[np.ndarray] | None) -> list[np.ndarray]:
         """What is added to the residuals per unit of all nuisances that are simple shifts, (q, channel, F) of every
-        stretch. What a run's rest lengths at its begin are off by is still so in its later stretches."""
+        stretch. What a run's rest lengths at its begin are off by is still so in its later stretches; a reading that is
+        late shows a length that was, as fast as the simulated one changes."""
         found = []
         winches = len(self.model.robot.actuated)
         for k, one in enumerate(self.many):
@@ -222,8 +226,16 @@ class Arena:
             if by_offset is not None:
                 begin = self.runs.index(one.run) * winches
                 rest[begin : begin + winches] = self._channels(k, by_offset[k][..., -winches:])
-            found.append(np.concatenate([constant, rest]))
+            late = np.zeros((1 if self.sensors else 0, *constant.shape[1:]))
+            if by_offset is not None and self.sensors and len(one.t) > 1:
+                late[0, -len(self.sensors) :] = -np.gradient(self._lengths(k), one.t, axis=0).T
+            found.append(np.concatenate([constant, late, rest]))
         return found
+
+    def _lengths(self, k: int) -> np.ndarray:
+        """Simulated lengths of the sensed cables of a stretch where derivatives were taken, (F, sensor) [m]."""
+        ends = np.array([self.replayer.cable_caps[cable] for cable in self.sensors])
+        return np.asarray(np.linalg.norm(self._ends[k][:, ends[:, 0]] - self._ends[k][:, ends[:, 1]], axis=-1))
 
     def _shift_columns(self, one: Stretch) -> np.ndarray:
         """What camera and sensor biases add, per unit, (q, channel, F)."""

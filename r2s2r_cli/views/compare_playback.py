@@ -21,7 +21,7 @@ from r2s2r_cli.views.simulation_playback import packed, template
 from schemas.robot import Robot
 
 _INT16 = 32767
-_SCRIPTS = ("playback_scene.js", "compare.js")
+_SCRIPTS = ("playback_scene.js", "playback_page.js", "compare.js")
 
 
 def playback_page(page: Page, data: ArtifactData, robot: Robot, shown: Mapping[str, tuple[Picture, ...]]) -> bytes:

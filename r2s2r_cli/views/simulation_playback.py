@@ -22,7 +22,7 @@ FRAME_RATE_HZ = 30.0
 BYTES_MAX = 600_000
 """Of all packed frames together, before base64 makes four bytes of three; longer runs get fewer frames a second."""
 _INT16, _BYTE, _SIGNED = 32767, 255, 127
-_SCRIPTS = ("playback_scene.js", "playback.js")
+_SCRIPTS = ("playback_scene.js", "playback_page.js", "playback.js")
 
 
 def playback_page(page: Page, data: ArtifactData, robot: Robot) -> bytes:

@@ -43,7 +43,7 @@ def played(data: ArtifactData, folder: Path) -> dict[str, Any]:
     """What the player shows of a simulation when somebody plays, turns, zooms, scrubs and rewinds it."""
     assert NODE is not None
     (folder / "data.json").write_text(json.dumps(playback_data(data, builders.robot())))
-    files = [folder / "data.json", SCRIPTS / "playback_scene.js", SCRIPTS / "playback.js"]
+    files = [folder / "data.json", SCRIPTS / "playback_scene.js", SCRIPTS / "playback_page.js", SCRIPTS / "playback.js"]
     done = subprocess.run([NODE, HARNESS, *files], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     result: dict[str, Any] = json.loads(done.stdout)

@@ -101,27 +101,16 @@ function startComparison(document, window, data) {
   const runs = data.runs.map((run) => ({...run, actors: run.actors.map((one) => ({...unpackActor(one), caps}))}));
   const home = {azimuth: -1.12, elevation: 0.5, distance: 4.6 * robot.size, target: [0, 0, 0.2 * robot.size]};
   const names = [...new Set(runs.flatMap((run) => run.actors.map((one) => one.name)))], hidden = new Set();
-  const state = {run: runs[0], time: 0, speed: 1, playing: false, view: {...home, target: [...home.target]}, before: 0};
+  const state = {run: runs[0], time: 0, speed: 1, playing: false, view: viewFrom(home), before: 0};
   const inStep = () => find("step").checked;
   const end = () => Math.max(...state.run.actors.map((one) => (inStep() ? state.run.actors[0] : one).begin.at(-1)));
-
-  function fit(canvas) {
-    const ratio = window.devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
-    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-      canvas.width = Math.round(width * ratio);
-      canvas.height = Math.round(height * ratio);
-    }
-    const context = canvas.getContext("2d");
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    return [context, width, height];
-  }
 
   function draw() {
     const real = state.run.actors[0], now = actorAt(real, real, state.time, true);
     if (find("follow").checked) state.view.target = [now.com[0], now.com[1], state.view.target[2]];
-    const [context, width, height] = fit(scene), shown = state.run.actors.map((one) => !hidden.has(one.name));
+    const [context, width, height] = fitCanvas(window, scene), shown = state.run.actors.map((one) => !hidden.has(one.name));
     const poses = drawAll(context, robot, state.run, shown, state.time, inStep(), find("trail").checked, state.view, width, height);
-    drawErrors(...fit(bar), state.run, shown, state.time, end());
+    drawErrors(...fitCanvas(window, bar), state.run, shown, state.time, end());
     const off = state.run.actors.slice(1).map((one, k) => {
       const d = Math.hypot(poses[k + 1].com[0] - poses[0].com[0], poses[k + 1].com[1] - poses[0].com[1]);
       return `${one.name} ${(1000 * d).toFixed(0)} mm`;
@@ -129,28 +118,6 @@ function startComparison(document, window, data) {
     clock.textContent = `${state.time.toFixed(2)} s, interval ${placeAt(real, state.time)[0] + 1} of ${real.duration.length}    `
       + `centre of mass off by: ${off.join(", ")}`;
     play.textContent = state.playing ? "Pause" : "Play";
-  }
-
-  function tick(now) {
-    if (!state.playing) return;
-    state.time = Math.min(end(), state.time + state.speed * (now - state.before) / 1000);
-    state.before = now;
-    if (state.time >= end()) state.playing = false;
-    draw();
-    window.requestAnimationFrame(tick);
-  }
-
-  function setPlaying(on) {
-    state.playing = on;
-    if (on && state.time >= end()) state.time = 0;
-    state.before = window.performance.now();
-    if (on) window.requestAnimationFrame(tick);
-    draw();
-  }
-
-  function seek(time) {
-    state.time = Math.min(end(), Math.max(0, time));
-    draw();
   }
 
   const choose = find("run");
@@ -173,74 +140,10 @@ function startComparison(document, window, data) {
     label.append(box, word);
     find("actors").append(label);
   });
-  const pace = find("speed");
-  SPEEDS.forEach((speed) => pace.add(new window.Option(`${speed} x`, String(speed), speed === 1, speed === 1)));
-  pace.addEventListener("change", () => (state.speed = Number(pace.value)));
-  play.addEventListener("click", () => setPlaying(!state.playing));
   for (const id of ["trail", "step", "follow"]) find(id).addEventListener("change", () => seek(state.time));
-  find("reset").addEventListener("click", () => {
-    state.view = {...home, target: [...home.target]};
-    draw();
+  const seek = startPlayer(document, window, state, {
+    draw, begin: () => 0, end, home, size: robot.size, speeds: SPEEDS, jump: 0.05,
   });
-
-  // One pointer turns, with shift or the other button it moves the ground; two pointers and the wheel zoom.
-  const pointers = new Map();
-  const apart = () => {
-    const [a, b] = [...pointers.values()];
-    return Math.hypot(a.x - b.x, a.y - b.y);
-  };
-  const zoom = (factor) => (state.view.distance = Math.min(20 * robot.size, Math.max(0.8 * robot.size, state.view.distance * factor)));
-  scene.addEventListener("pointerdown", (event) => {
-    scene.setPointerCapture(event.pointerId);
-    pointers.set(event.pointerId, {x: event.clientX, y: event.clientY});
-  });
-  for (const gone of ["pointerup", "pointercancel"]) scene.addEventListener(gone, (event) => pointers.delete(event.pointerId));
-  scene.addEventListener("pointermove", (event) => {
-    const old = pointers.get(event.pointerId);
-    if (!old) return;
-    const before = pointers.size === 2 ? apart() : 0, dx = event.clientX - old.x, dy = event.clientY - old.y;
-    pointers.set(event.pointerId, {x: event.clientX, y: event.clientY});
-    if (pointers.size === 2) zoom(before / Math.max(1, apart()));
-    else if (event.shiftKey || event.buttons === 2) moveTarget(dx, dy);
-    else {
-      state.view.azimuth -= 0.008 * dx;
-      state.view.elevation = Math.min(1.55, Math.max(0.02, state.view.elevation + 0.008 * dy));
-    }
-    draw();
-  });
-  function moveTarget(dx, dy) {
-    find("follow").checked = false;
-    const metres = state.view.distance / (1.9 * Math.min(scene.clientWidth, 1.3 * scene.clientHeight));
-    const {azimuth, target} = state.view, c = Math.cos(azimuth), s = Math.sin(azimuth);
-    target[0] += metres * (s * dx - c * dy);
-    target[1] += metres * (-c * dx - s * dy);
-  }
-  scene.addEventListener("contextmenu", (event) => event.preventDefault());
-  scene.addEventListener("wheel", (event) => {
-    event.preventDefault();
-    zoom(Math.exp(0.001 * event.deltaY));
-    draw();
-  }, {passive: false});
-
-  const scrub = (event) => seek(end() * event.offsetX / bar.clientWidth);
-  bar.addEventListener("pointerdown", (event) => {
-    bar.setPointerCapture(event.pointerId);
-    scrub(event);
-  });
-  bar.addEventListener("pointermove", (event) => event.buttons && scrub(event));
-  document.addEventListener("keydown", (event) => {
-    const on = event.target.tagName;
-    if (on === "SELECT" || (event.key === " " && (on === "BUTTON" || on === "INPUT"))) return; // these take the key themselves
-    const jump = {ArrowLeft: -0.05, ArrowRight: 0.05, PageUp: -1, PageDown: 1}[event.key];
-    if (event.key === " ") setPlaying(!state.playing);
-    else if (event.key === "Home") seek(0);
-    else if (event.key === "End") seek(end());
-    else if (jump) seek(state.time + jump);
-    else return;
-    event.preventDefault();
-  });
-  window.addEventListener("resize", draw);
-  draw();
 }
 
 // The real robot's intervals as bands, above them by simulator how far the caps are off at their ends, now as a line.

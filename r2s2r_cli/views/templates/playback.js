@@ -8,20 +8,9 @@ function startPlayback(document, window, data) {
   const scene = find("scene"), panel = find("panel"), bar = find("timeline"), play = find("play"), clock = find("clock");
   const runs = data.runs.map(unpackRun);
   const home = {azimuth: -1.12, elevation: 0.42, distance: 4.2 * robot.size, target: [0, 0, 0.25 * robot.size]};
-  const state = {run: runs[0], time: 0, speed: 1, playing: false, view: {...home, target: [...home.target]}, before: 0};
+  const state = {run: runs[0], time: 0, speed: 1, playing: false, view: viewFrom(home), before: 0};
   const options = () => ({trail: find("trail").checked, contacts: find("contacts").checked, numbers: find("numbers").checked});
   const end = () => state.run.t[state.run.t.length - 1];
-
-  function fit(canvas) {
-    const ratio = window.devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
-    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-      canvas.width = Math.round(width * ratio);
-      canvas.height = Math.round(height * ratio);
-    }
-    const context = canvas.getContext("2d");
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    return [context, width, height];
-  }
 
   function draw() {
     if (find("follow").checked) {
@@ -29,36 +18,14 @@ function startPlayback(document, window, data) {
       state.view.target[0] = com[0];
       state.view.target[1] = com[1];
     }
-    const [context, width, height] = fit(scene);
+    const [context, width, height] = fitCanvas(window, scene);
     const pose = drawScene(context, robot, state.run, state.time, state.view, width, height, options());
-    drawPanel(...fit(panel), robot, state.run, pose, state.time);
-    drawTimeline(...fit(bar), state.run, state.time);
+    drawPanel(...fitCanvas(window, panel), robot, state.run, pose, state.time);
+    drawTimeline(...fitCanvas(window, bar), state.run, state.time);
     const first = poseAt(robot, state.run, state.run.t[0]).com;
     const gone = 1000 * Math.hypot(pose.com[0] - first[0], pose.com[1] - first[1]);
     clock.textContent = `${state.time.toFixed(2)} s of ${end().toFixed(2)} s    centre of mass ${gone.toFixed(0)} mm from the start`;
     play.textContent = state.playing ? "Pause" : "Play";
-  }
-
-  function tick(now) {
-    if (!state.playing) return;
-    state.time = Math.min(end(), state.time + state.speed * (now - state.before) / 1000);
-    state.before = now;
-    if (state.time >= end()) state.playing = false;
-    draw();
-    window.requestAnimationFrame(tick);
-  }
-
-  function setPlaying(on) {
-    state.playing = on;
-    if (on && state.time >= end()) state.time = state.run.t[0];
-    state.before = window.performance.now();
-    if (on) window.requestAnimationFrame(tick);
-    draw();
-  }
-
-  function seek(time) {
-    state.time = Math.min(end(), Math.max(state.run.t[0], time));
-    draw();
   }
 
   const choose = find("run");
@@ -69,74 +36,10 @@ function startPlayback(document, window, data) {
     state.view.target = [...home.target];
     seek(state.run.t[0]);
   });
-  const pace = find("speed");
-  SPEEDS.forEach((speed) => pace.add(new window.Option(`${speed} x`, String(speed), speed === 1, speed === 1)));
-  pace.addEventListener("change", () => (state.speed = Number(pace.value)));
-  play.addEventListener("click", () => setPlaying(!state.playing));
   for (const id of ["trail", "contacts", "numbers", "follow"]) find(id).addEventListener("change", draw);
-  find("reset").addEventListener("click", () => {
-    state.view = {...home, target: [...home.target]};
-    draw();
+  const seek = startPlayer(document, window, state, {
+    draw, begin: () => state.run.t[0], end, home, size: robot.size, speeds: SPEEDS, jump: 0.04,
   });
-
-  // One pointer turns, with shift or the other button it moves the ground; two pointers and the wheel zoom.
-  const pointers = new Map();
-  const apart = () => {
-    const [a, b] = [...pointers.values()];
-    return Math.hypot(a.x - b.x, a.y - b.y);
-  };
-  const zoom = (factor) => (state.view.distance = Math.min(20 * robot.size, Math.max(0.8 * robot.size, state.view.distance * factor)));
-  scene.addEventListener("pointerdown", (event) => {
-    scene.setPointerCapture(event.pointerId);
-    pointers.set(event.pointerId, {x: event.clientX, y: event.clientY});
-  });
-  for (const gone of ["pointerup", "pointercancel"]) scene.addEventListener(gone, (event) => pointers.delete(event.pointerId));
-  scene.addEventListener("pointermove", (event) => {
-    const old = pointers.get(event.pointerId);
-    if (!old) return;
-    const before = pointers.size === 2 ? apart() : 0, dx = event.clientX - old.x, dy = event.clientY - old.y;
-    pointers.set(event.pointerId, {x: event.clientX, y: event.clientY});
-    if (pointers.size === 2) zoom(before / Math.max(1, apart()));
-    else if (event.shiftKey || event.buttons === 2) moveTarget(dx, dy);
-    else {
-      state.view.azimuth -= 0.008 * dx;
-      state.view.elevation = Math.min(1.55, Math.max(0.02, state.view.elevation + 0.008 * dy));
-    }
-    draw();
-  });
-  function moveTarget(dx, dy) {
-    find("follow").checked = false;
-    const metres = state.view.distance / (1.9 * Math.min(scene.clientWidth, 1.3 * scene.clientHeight));
-    const {azimuth, target} = state.view, c = Math.cos(azimuth), s = Math.sin(azimuth);
-    target[0] += metres * (s * dx - c * dy);
-    target[1] += metres * (-c * dx - s * dy);
-  }
-  scene.addEventListener("contextmenu", (event) => event.preventDefault());
-  scene.addEventListener("wheel", (event) => {
-    event.preventDefault();
-    zoom(Math.exp(0.001 * event.deltaY));
-    draw();
-  }, {passive: false});
-
-  const scrub = (event) => seek(state.run.t[0] + (end() - state.run.t[0]) * event.offsetX / bar.clientWidth);
-  bar.addEventListener("pointerdown", (event) => {
-    bar.setPointerCapture(event.pointerId);
-    scrub(event);
-  });
-  bar.addEventListener("pointermove", (event) => event.buttons && scrub(event));
-  document.addEventListener("keydown", (event) => {
-    const on = event.target.tagName;
-    if (on === "SELECT" || (event.key === " " && (on === "BUTTON" || on === "INPUT"))) return; // these take the key themselves
-    const jump = {ArrowLeft: -0.04, ArrowRight: 0.04, PageUp: -1, PageDown: 1}[event.key];
-    if (event.key === " ") setPlaying(!state.playing);
-    else if (event.key === "Home") seek(0);
-    else if (event.key === "End") seek(end());
-    else if (jump) seek(state.time + jump);
-    else return;
-    event.preventDefault();
-  });
-  window.addEventListener("resize", draw);
-  draw();
 }
 
 // One row a cable: tension above; for winched ones below it position, target with tolerance, and what the motor does.

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from r2s2r_cli.commands.identify_inputs import Asked as IdentifyAsked, Source
+from r2s2r_cli.commands.identify_inputs import Asked as IdentifyAsked, Source, named_runs
 from r2s2r_cli.commands.stage import require_input
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.store.project import Iteration, Project
@@ -112,22 +112,15 @@ class Asked:
         from r2s2r_cli.stages.diagnose.evidence import Run
         from r2s2r_cli.stages.floor.runs import sensed_run
         from r2s2r_cli.stages.identify.load import run_data
-        from r2s2r_cli.store.read import read_artifact
 
         robot = self.project.robot()
-        found: dict[str, Run] = {}
-        for source in self.sources:
-            recording = read_artifact(source.recording, "recording")[1]
-            estimate = read_artifact(source.estimate, "estimate")[1]
-            prefix = "" if source.place == self.sources[0].place else f"{source.place.number:03d}-"
-            for run in estimate.runs():
-                name = prefix + run
-                name = f"executed-{name}" if name in found else name
-                caps = run_data(recording, estimate, run, name=name)
-                commands = recording.group(run, "commands")
-                policy = "" if commands is None else str(commands.attributes.get("policy", ""))
-                found[name] = Run(caps, sensed_run(name, recording, run, robot), gait=policy or run)
-        return tuple(found.values())
+        found: list[Run] = []
+        for one in named_runs(self.sources):
+            caps = run_data(one.recording, one.estimate, one.run, name=one.name)
+            commands = one.recording.group(one.run, "commands")
+            policy = "" if commands is None else str(commands.attributes.get("policy", ""))
+            found.append(Run(caps, sensed_run(one.name, one.recording, one.run, robot), gait=policy or one.run))
+        return tuple(found)
 
     def _split(self, runs: Sequence[Run], found: ArtifactData) -> tuple[tuple[Selection, ...], tuple[Selection, ...]]:
         """As typed, else that of the identification; runs that it does not know are fitted, the last of them judged."""

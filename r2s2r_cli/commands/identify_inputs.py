@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,6 +15,7 @@ from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
 
 if TYPE_CHECKING:
+    from r2s2r_cli.artifact import ArtifactData
     from r2s2r_cli.stages.identify.data import RunData
     from r2s2r_cli.stages.identify.request import Drive, Method, Request
     from schemas.config import IdentifySettings
@@ -41,6 +42,33 @@ class Source:
 def _estimated(place: Iteration) -> list[Source]:
     """The runs of an iteration that have states, recorded ones first."""
     return [one for one in (Source(place), Source(place, executed=True)) if one.estimate.exists()]
+
+
+@dataclass(frozen=True)
+class NamedRun:
+    """A run of both artifacts, where it is called `run`, and its name among those of all sources."""
+
+    name: str
+    recording: ArtifactData
+    estimate: ArtifactData
+    run: str
+
+
+def named_runs(sources: Sequence[Source]) -> Iterator[NamedRun]:
+    """The runs of all sources: those of another iteration than the first are called NNN-RUN, an executed one with the
+    name of a recorded one executed-RUN. Raises ArtifactError."""
+    from r2s2r_cli.store.read import read_artifact
+
+    taken: set[str] = set()
+    for source in sources:
+        recording = read_artifact(source.recording, "recording")[1]
+        estimate = read_artifact(source.estimate, "estimate")[1]
+        prefix = "" if source.place == sources[0].place else f"{source.place.number:03d}-"
+        for run in estimate.runs():
+            name = prefix + run
+            name = f"executed-{name}" if name in taken else name
+            taken.add(name)
+            yield NamedRun(name, recording, estimate, run)
 
 
 @dataclass(frozen=True)
@@ -125,21 +153,10 @@ class Asked:
         return [artifact_ref(self.project, path, whole_header(path)) for path in paths]
 
     def runs(self) -> list[RunData]:
-        """The runs of all sources; those of --also are called NNN-RUN, an executed one with the name of a recorded one
-        executed-RUN. Raises ArtifactError, InputError."""
+        """The runs of all sources, named by `named_runs`. Raises ArtifactError, InputError."""
         from r2s2r_cli.stages.identify.load import run_data
-        from r2s2r_cli.store.read import read_artifact
 
-        found: dict[str, RunData] = {}
-        for source in self.sources:
-            recording = read_artifact(source.recording, "recording")[1]
-            estimate = read_artifact(source.estimate, "estimate")[1]
-            prefix = "" if source.place == self.sources[0].place else f"{source.place.number:03d}-"
-            for run in estimate.runs():
-                name = prefix + run
-                name = f"executed-{name}" if name in found else name
-                found[name] = run_data(recording, estimate, run, name=name)
-        return list(found.values())
+        return [run_data(one.recording, one.estimate, one.run, name=one.name) for one in named_runs(self.sources)]
 
     def artifacts(self) -> list[Path]:
         """Recordings and estimates that are read, those of the main iteration first."""

@@ -3,7 +3,6 @@ shrinks."""
 
 from __future__ import annotations
 
-import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -13,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from r2s2r_cli.commands.interrupts import resumable
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import Interrupted
 from r2s2r_cli.options import (
     DrawOption,
     DryRunOption,
@@ -111,19 +110,12 @@ def diagnose(
     digests = [ref.sha256 for ref in run.inputs]
     key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
     checkpoint = CheckpointFile(unfinished, key, resume)
-    try:
+    again = [word for word in sys.argv[1:] if word != "--resume"]
+    with resumable(checkpoint, here.relative(unfinished), again):
         result, report = run.run(
             lambda: _compute(asked, settings, checkpoint, console), _draw if draw else None,
             lambda said: checkpoint.clear(),
         )  # fmt: skip
-    except KeyboardInterrupt:
-        if not checkpoint.kept():
-            raise
-        again = [word for word in sys.argv[1:] if word != "--resume"]
-        raise Interrupted(
-            f"what was fitted so far is kept in {here.relative(unfinished)}, nothing else was written",
-            hint=shlex.join(["r2s2r", *again, "--resume"]),
-        ) from None
     show_outcome(_answer(result, report), console)
     if report is not None:
         _show(report, console)

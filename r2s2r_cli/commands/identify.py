@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import shlex
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from r2s2r_cli.commands.interrupts import resumable
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import Interrupted, UsageError
+from r2s2r_cli.errors import UsageError
 from r2s2r_cli.options import (
     DrawOption,
     DryRunOption,
@@ -189,19 +189,13 @@ def _fit(asked: Asked, overrides: dict[str, Any], console: Console, how: _Ways) 
     digests = [ref.sha256 for ref in run.inputs]
     key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
     checkpoint = CheckpointFile(unfinished, key, resume)
-    try:
+    again = ["identify", *asked.typed]
+    with resumable(checkpoint, here.relative(unfinished), again):
         result, report = run.run(
             lambda: compute(asked, settings, checkpoint, console),
             _draw if how.draw else None,
             lambda said: checkpoint.clear(),
         )
-    except KeyboardInterrupt:
-        if not checkpoint.kept():
-            raise
-        raise Interrupted(
-            f"what was fitted so far is kept in {here.relative(unfinished)}, nothing else was written",
-            hint=shlex.join(["r2s2r", "identify", *asked.typed, "--resume"]),
-        ) from None
     show_outcome(_answer(result, report), console)
     if report is not None:
         _show(report, console)

@@ -1,13 +1,19 @@
-"""Ctrl-C between pictures, not inside one."""
+"""Ctrl-C between pictures, not inside one, and what it leaves behind."""
 
 from __future__ import annotations
 
 import contextlib
 import importlib
+import shlex
 import signal
 import threading
-from collections.abc import Iterable, Iterator
-from typing import Any, TypeVar
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from r2s2r_cli.errors import Interrupted
+
+if TYPE_CHECKING:
+    from r2s2r_cli.store.checkpoint import CheckpointFile
 
 Item = TypeVar("Item")
 
@@ -37,6 +43,23 @@ def loaded(stage: str) -> Any:
 
     (found,) = whole_items(made())
     return found
+
+
+@contextlib.contextmanager
+def resumable(
+    checkpoint: CheckpointFile, where: str, command: Sequence[str], *, done: str = "fitted"
+) -> Iterator[None]:
+    """Work that leaves a checkpoint (`where`, for people) when it is interrupted: raises Interrupted with `command` and
+    --resume as its hint; KeyboardInterrupt as it came where nothing was kept yet."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if not checkpoint.kept():
+            raise
+        raise Interrupted(
+            f"what was {done} so far is kept in {where}, nothing else was written",
+            hint=shlex.join(["r2s2r", *command, "--resume"]),
+        ) from None
 
 
 @contextlib.contextmanager

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from r2s2r_cli.commands.interrupts import resumable
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import Interrupted
 from r2s2r_cli.options import (
     DrawOption,
     DryRunOption,
@@ -97,19 +96,13 @@ def plan(
     digests = [ref.sha256 for ref in run.inputs]
     key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
     checkpoint = CheckpointFile(unfinished, key, resume)
-    try:
+    again = ["plan", *_typed(behaviour, to, seed, iteration, set_, project)]
+    with resumable(checkpoint, here.relative(unfinished), again, done="found"):
         result, report = run.run(
             lambda: _compute(asked, settings, checkpoint, console),
             (lambda data, said: _draw(data, here.robot(), said)) if draw else None,
             lambda said: checkpoint.clear(),
         )
-    except KeyboardInterrupt:
-        if not checkpoint.kept():
-            raise
-        raise Interrupted(
-            f"what was found so far is kept in {here.relative(unfinished)}, nothing else was written",
-            hint=shlex.join(["r2s2r", "plan", *_typed(behaviour, to, seed, iteration, set_, project), "--resume"]),
-        ) from None
     show_outcome(result, console)
     if report is not None:
         _show(report, console)

@@ -168,7 +168,12 @@ def test_the_player_shows_real_and_simulated_where_they_were(tmp_path: Path) -> 
     data = builders.comparison()
     shown: dict[str, Any] = playback_data(data, builders.robot())
     (tmp_path / "data.json").write_text(json.dumps(shown))
-    files = [tmp_path / "data.json", SCRIPTS / "playback_scene.js", SCRIPTS / "playback_page.js", SCRIPTS / "compare.js"]
+    files = [
+        tmp_path / "data.json",
+        SCRIPTS / "playback_scene.js",
+        SCRIPTS / "playback_page.js",
+        SCRIPTS / "compare.js",
+    ]
     assert NODE is not None
     done = subprocess.run([NODE, HARNESS, *files], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

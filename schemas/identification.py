@@ -7,7 +7,7 @@ Numbers of a parameter stand in the unit of its row (`parameters/unit`); their d
 from __future__ import annotations
 
 from schemas.base import ArtifactSpec, AttributeSpec, GroupSpec, column
-from schemas.identification_runs import FIT, FREE_RUN, RUN
+from schemas.identification_runs import FIT, FREE_RUN, REPEATING, RUN
 
 COORDINATES = {0: "linear: z = x", 1: "log: z = ln x", 2: "logit: z = ln((x - lower) / (upper - x))"}
 
@@ -182,13 +182,16 @@ MEASURES = GroupSpec(
     datasets=(
         column("role", "uint8", ("measure",), "code", "over which segments", codes=ROLES),
         column("metric", "str", ("measure",), "1", "name: keyframe_cap_rmse, free_run_cap_mean, free_run_closed_loop_cap_mean"),
-        column("value", "float64", ("measure",), "m", "with the identified parameters", nan_means="it does not exist for these segments"),
+        column("value", "float64", ("measure",), "m", "of the predictor", nan_means="it does not exist for these segments"),
         column("interval", "float64", ("measure", "pair"), "m", "95 % interval by bootstrap over segments", nan_means="fewer than two segments"),
         column("floor", "float64", ("measure",), "m", "what remains when nothing is wrong", nan_means="not known"),
         column("baseline", "str", ("baseline",), "1", "name of each baseline"),
         column("baseline_value", "float64", ("measure", "baseline"), "m", "the same measure of each baseline",
                nan_means="the baseline has nothing to say here"),
         column("baseline_interval", "float64", ("measure", "baseline", "pair"), "m", "its 95 % interval", nan_means="as baseline_value"),
+    ),
+    attributes=(
+        AttributeSpec(name="predictor", type="str", required=False, description="whose errors `value` holds over test segments: the simulator with the identified numbers, or that with what repeats; over training segments it is the simulator"),
     ),
 )  # fmt: skip
 
@@ -232,7 +235,7 @@ IDENTIFICATION = ArtifactSpec(
     filename="30-identify.h5",
     level="iteration",
     groups=(
-        FIT_FACTS, PARAMETERS, COVARIANCE, IDENTIFIABILITY, TRACE, STARTS, PROFILES, WINDOWS, SEGMENTS, MEASURES, SITES,
+        FIT_FACTS, PARAMETERS, COVARIANCE, IDENTIFIABILITY, TRACE, STARTS, PROFILES, WINDOWS, SEGMENTS, MEASURES, REPEATING, SITES,
         SENSING, HISTORY, RUN, FIT, FREE_RUN,
     ),
 )  # fmt: skip

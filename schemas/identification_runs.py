@@ -14,6 +14,30 @@ RUN = GroupSpec(
     ),
 )  # fmt: skip
 
+REPEATING = GroupSpec(
+    path="repeating",
+    description="test segments with what the simulator leaves behind in training segments and the robot repeats with the same target "
+    "after the same target: a statistical term beside the simulator, not physics",
+    datasets=(
+        column("run", "str", ("held",), "1", "run"),
+        column("interval", "int64", ("held",), "index", "target interval, 1-based"),
+        column("repeats", "int64", ("held",), "count", "training segments of the same transition that start on the same caps"),
+        column("weight", "float64", ("held",), "1", "what these count beside the simulator at the key frame, 0 to 1; 0: there are none"),
+        column("keyframe_error", "float64", ("held", "cap", "xyz"), "m", "predicted minus observed end caps at the key frame", frame="W"),
+        column("keyframe_cap_rmse", "float64", ("held",), "m", "root mean square over caps of the distance at the key frame"),
+    ),
+    attributes=(
+        AttributeSpec(name="used", type="bool", description="it is part of the prediction: training segments are predicted better with it"),
+        AttributeSpec(name="gap", type="float", unit="m", description="what the simulator is off at training key frames beyond the floor"),
+        AttributeSpec(name="floor", type="float", unit="m", description="how far the robot repeats itself in training segments"),
+        AttributeSpec(name="contrasts", type="int", description="independent differences that the floor rests on"),
+        AttributeSpec(name="dof", type="float", description="independent squares in the error of one segment"),
+        AttributeSpec(name="left_out", type="float", unit="m", required=False, description="key-frame error of training segments with the repeats of the others"),
+        AttributeSpec(name="left_out_alone", type="float", unit="m", required=False, description="the same, the simulator alone"),
+        AttributeSpec(name="left_out_segments", type="int", required=False, description="segments that both rest on"),
+    ),
+)  # fmt: skip
+
 FIT = GroupSpec(
     path="runs/{run}/fit",
     description="every complete target interval, simulated from its own start by command replay; frames in order of time",
@@ -37,5 +61,7 @@ FREE_RUN = GroupSpec(
         column("simulated", "float64", ("free_frame", "cap", "xyz"), "m", "end caps of the simulation", frame="W"),
         column("closed_loop", "float64", ("free_frame", "cap", "xyz"), "m", "the same with the controller in the loop", frame="W",
                required=False, nan_means="the simulation had ended"),
+        column("predicted", "float64", ("free_frame", "cap", "xyz"), "m", "simulated, and what repeats added to it: no physics", frame="W",
+               required=False),
     ),
 )  # fmt: skip

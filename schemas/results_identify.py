@@ -60,13 +60,40 @@ class Baseline(Measures):
 
 
 class HeldOut(Measures):
-    """What was not fitted: the test segments."""
+    """What was not fitted: the test segments. With the controller in the loop it is the simulator alone."""
 
+    predictor: str = "identified"
+    """Whose errors these are: `identified`, the simulator with the numbers found; or `identified + what repeats`, with
+    what it leaves behind and the robot repeats added, where training segments speak for it. The simulator alone is then
+    among the baselines."""
     intervals: Intervals = Intervals()
     baselines: dict[str, Baseline] = Field(default_factory=dict)
     """`nothing moves`, `repeat the same phase`, `nominal`, `refit of two parameters`: by name."""
     floor_m: float | None = None
     """What remains when nothing is wrong; None: not known."""
+
+
+class RepeatsFigures(Frozen):
+    """What the simulator leaves behind in training segments and the robot repeats with the same two targets. No physics."""
+
+    used: bool
+    """Whether it is part of the prediction: training segments are predicted better with it."""
+    gap_m: float
+    """What the simulator is off at the key frames of training segments, beyond the floor."""
+    floor_m: float
+    """How far the robot repeats itself in training segments."""
+    contrasts: int
+    """Independent differences that the floor rests on."""
+    weights: tuple[float, ...]
+    """What the repeats count beside the simulator, 0 to 1, of each test segment; 0: its transition was never seen."""
+    repeats: tuple[int, ...]
+    """How many training segments repeat it."""
+    left_out_alone_m: float | None
+    """Key-frame error of training segments, the simulator alone; None: none of them has a repeat."""
+    left_out_m: float | None
+    """The same with the repeats of the others."""
+    left_out: int
+    """Segments that this rests on."""
 
 
 class Direction(Frozen):
@@ -103,8 +130,11 @@ class SegmentFigures(Frozen):
     """1-based."""
     role: Literal["train", "test", "not used"]
     keyframe_cap_rmse_m: float
+    """Of the simulator alone."""
     cap_rmse_m: float
     """Over all frames."""
+    predicted_cap_rmse_m: float | None = None
+    """At the key frame, with what repeats; None: that is no part of the prediction, or it was trained on."""
     baselines: dict[str, float | None] = Field(default_factory=dict)
     """keyframe_cap_rmse_m of each."""
     not_white: tuple[int, ...] = ()
@@ -136,6 +166,8 @@ class IdentifyReport(Frozen):
     train: Measures
     heldout: HeldOut | None
     """None: all segments were trained on."""
+    repeating: RepeatsFigures | None = None
+    """None: not asked for, or no training segment has a repeat."""
     segments: tuple[SegmentFigures, ...]
     weak: tuple[Direction, ...] = ()
     correlations: tuple[Correlation, ...] = ()

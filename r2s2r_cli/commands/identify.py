@@ -80,6 +80,14 @@ def identify(
             "--drive", metavar="HOW", help="replay recorded motor commands, or closed-loop: simulate the PID."
         ),
     ] = "replay",
+    discrepancy: Annotated[
+        bool,
+        typer.Option(
+            "--discrepancy/--no-discrepancy",
+            help="Add to the prediction of test intervals what the simulator leaves behind in training intervals and the "
+            "robot repeats, where these speak for it; no physics.",
+        ),
+    ] = True,
     online: Annotated[
         bool,
         typer.Option("--online", help="Go on from the last iteration's estimate, run after run; parameters may drift."),
@@ -129,13 +137,13 @@ def identify(
     typed = typed_options(
         train=train, test=test, free=free, fix=fix, with_effect=with_effect,
         method=None if method == "default" else method, drive=None if drive == "replay" else drive,
-        online=online, also=also, self_test=self_test, starts=starts, seed=seed or None, project=project,
+        online=online, no_discrepancy=not discrepancy, also=also, self_test=self_test, starts=starts, seed=seed or None, project=project,
         iteration=iteration, set_=set_, no_draw=not draw,
     )  # fmt: skip
     asked = Asked(
         here, place, train=tuple(train or ()), test=tuple(test or ()), free=tuple(free or ()), fix=tuple(fix or ()),
         effects=tuple(with_effect or ()), method=method, drive=DRIVES.get(drive, drive),  # type: ignore[arg-type]
-        online=online, also=tuple(also or ()), seed=seed, typed=tuple(typed),
+        online=online, discrepancy=discrepancy, also=tuple(also or ()), seed=seed, typed=tuple(typed),
     )  # fmt: skip
     with whole_hints(typed, asked.artifacts):
         _require_one_of(method, METHODS, "--method")

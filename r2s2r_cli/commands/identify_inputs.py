@@ -85,6 +85,7 @@ class Asked:
     method: Method = "default"
     drive: Drive = "command replay"
     online: bool = False
+    discrepancy: bool = True
     also: tuple[int, ...] = ()
     seed: int = 0
     typed: tuple[str, ...] = ()
@@ -94,7 +95,9 @@ class Asked:
         """What else than settings and inputs decides the result, for the provenance."""
         names = ("train", "test", "free", "fix", "effects", "method", "drive", "online", "also", "seed")
         values = {name: getattr(self, name) for name in names}
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+        # As before it could be chosen: what was made without the option is not stale for it.
+        more = {} if self.discrepancy else {"discrepancy": False}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()} | more
 
     @cached_property
     def sources(self) -> tuple[Source, ...]:
@@ -200,6 +203,7 @@ class Asked:
             train=train, test=test, free=self.free, fixed=fixed, effects=wanted.ids,
             of_effects=wanted.specs,
             method=self.method, drive=self.drive, seed=self.seed, online=self.online, before=before,
+            discrepancy=self.discrepancy,
         )  # fmt: skip
 
 

@@ -26,7 +26,7 @@ def draw_errors(data: ArtifactData) -> bytes:
     segments, measures = data.groups["segments"], data.groups["measures"]
     figure = new_figure(15, 9)
     top, bottom = figure.subplots(2, 1, height_ratios=(1.5, 1))
-    _bars(top, segments, measures)
+    _bars(top, segments, measures, data.groups.get("repeating"))
     _whiteness(figure, bottom, segments)
     return png_bytes(figure)
 
@@ -38,15 +38,30 @@ def floor_of(measures: Group) -> float:
     return known[-1] if known else math.nan
 
 
-def _bars(axes: Axes, segments: Group, measures: Group) -> None:
+def errors_with_repeats(segments: Group, repeats: Group | None) -> np.ndarray | None:
+    """Key-frame error with what repeats of every segment [m], NaN in training; None where it was not looked at."""
+    if repeats is None:
+        return None
+    known = zip(words(repeats, "run"), repeats["interval"].tolist(), repeats["keyframe_cap_rmse"].tolist(), strict=True)
+    errors = {(run, interval): error for run, interval, error in known}
+    names = zip(words(segments, "run"), segments["interval"].tolist(), strict=True)
+    return np.array([errors.get(name, math.nan) for name in names])
+
+
+def _bars(axes: Axes, segments: Group, measures: Group, repeats: Group | None = None) -> None:
     x = np.arange(len(segments["interval"]))
     roles = segments["role"].tolist()
     axes.bar(x, 1e3 * segments["keyframe_cap_rmse"], color=[ROLE_COLORS[role] for role in roles], width=0.6)
     for role in sorted(set(roles)):
         axes.bar([0], [0], color=ROLE_COLORS[role], label=f"identified, {ROLE_WORDS[role]}")
     for k, name in enumerate(words(measures, "baseline")):
+        if name == "identified":
+            continue  # the bars
         error, mark = 1e3 * segments["baseline_cap_rmse"][:, k], _MARKS[k % len(_MARKS)]
         axes.plot(x, error, mark, ms=11, mew=1.8, color="#303842", alpha=0.35 + 0.5 * (k % 2), label=name)
+    repeating = errors_with_repeats(segments, repeats)
+    if repeating is not None:
+        axes.plot(x, 1e3 * repeating, "P", ms=10, color="#c0392b", label="identified + what repeats")
     floor = floor_of(measures)
     if math.isfinite(floor):
         axes.axhline(1e3 * floor, color="black", lw=1, ls="--", label=f"floor {1e3 * floor:.1f} mm")

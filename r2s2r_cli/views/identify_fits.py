@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 _COLUMNS = 4
 _CLOSED = "#6b3fa0"
+_REPEATS = "#c0392b"
 
 
 def draw_fit(data: ArtifactData, run: str) -> bytes:
@@ -56,7 +57,7 @@ def draw_free_run(data: ArtifactData, run: str) -> bytes:
             )
     left.set_aspect("equal", adjustable="datalim")
     left.set(xlabel="x [m]", ylabel="y [m]", title="from above: dots observed, lines simulated")
-    for name, color in (("simulated", "black"), ("closed_loop", _CLOSED)):
+    for name, color in (("simulated", "black"), ("predicted", _REPEATS), ("closed_loop", _CLOSED)):
         if name in free:
             error = cap_rmse(free[name] - free["observed"])
             right.plot(
@@ -72,7 +73,8 @@ def draw_free_run(data: ArtifactData, run: str) -> bytes:
     return png_bytes(figure)
 
 
-_WORDS = {"observed": "observed", "simulated": "command replay", "closed_loop": "controller in the loop"}
+_WORDS = {"observed": "observed", "simulated": "command replay", "closed_loop": "controller in the loop",
+          "predicted": "and what repeats"}  # fmt: skip
 
 
 def cap_rmse(error: np.ndarray) -> np.ndarray:

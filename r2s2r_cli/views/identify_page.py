@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.views.identify_data import figure_of, millimetres, spread
 from r2s2r_cli.views.page import Page, PageTable, Picture, counted, render
-from schemas.results_identify import Baseline, HeldOut, IdentifyReport, Measures, ParameterFigures
+from schemas.results_identify import Baseline, HeldOut, IdentifyReport, Measures, ParameterFigures, RepeatsFigures, SegmentFigures
 
 _STRONG = 0.9
 """Parameters correlated by more cannot be told apart."""
@@ -29,8 +29,9 @@ def verdict(report: IdentifyReport) -> str:
     rivals = ", ".join(f"{name} {millimetres(error)}{_of_them(name, report)}" for name, error in known.items())
     count = sum(segment.role == "test" for segment in report.segments)
     floor = "not known" if held.floor_m is None else f"{millimetres(held.floor_m)} mm"
+    by = "" if held.predictor == "identified" else f" by '{held.predictor}'"
     error = f"{millimetres(held.keyframe_cap_rmse_m)} mm{spread(held.intervals.keyframe_cap_rmse_m)}"
-    found = f"{error} at the key frames of {counted(count, 'segment')}, floor {floor}"
+    found = f"{error} at the key frames of {counted(count, 'segment')}{by}, floor {floor}"
     level = [name for name, one in held.baselines.items() if _open(one)]
     more = f" Not decided against: {', '.join(level)}." if level else ""
     return f"{told} Held out: {found}; in mm: {rivals or 'no baseline'}.{more}"
@@ -44,6 +45,8 @@ def report_tables(report: IdentifyReport) -> Iterator[PageTable]:
         [_parameter(name, found) for name, found in report.parameters.items()],
     )
     yield _errors(report)
+    if report.repeating is not None:
+        yield _repeating(report.repeating)
     if report.weak:
         yield PageTable("what the runs hardly tell, before any fit", ["information", "direction"],
                         [[figure_of(one.eigenvalue, 3), one.words] for one in report.weak])  # fmt: skip
@@ -94,7 +97,7 @@ def _errors(report: IdentifyReport) -> PageTable:
     columns = [
         "prediction",
         "key frames [mm]",
-        "identified minus this [mm]",
+        "ours minus this [mm]",
         "free run [mm]",
         "free run, PID in the loop [mm]",
     ]
@@ -102,7 +105,7 @@ def _errors(report: IdentifyReport) -> PageTable:
     held = report.heldout
     if held is not None:
         key, *free = _three(held)
-        rows.append(["identified, held out", key, "-", *free])
+        rows.append([f"{held.predictor}, held out", key, "-", *free])
         for name, one in held.baselines.items():
             key, *free = _three(one)
             rows.append([f"{name}, held out{_of_them(name, report)}", key, _against(name, one, report), *free])
@@ -121,11 +124,30 @@ def _against(name: str, one: Baseline, report: IdentifyReport) -> str:
     ends = one.difference.keyframe_cap_rmse_m
     if ends is None:
         return "-"
-    pairs = [(s.keyframe_cap_rmse_m, s.baselines.get(name)) for s in report.segments if s.role == "test"]
+    pairs = [(_own(s), s.baselines.get(name)) for s in report.segments if s.role == "test"]
     known = [(ours, theirs) for ours, theirs in pairs if theirs is not None]
     better = sum(ours < theirs for ours, theirs in known)
     undecided = " (undecided)" if _open(one) else ""
     return f"{millimetres(ends[0])} .. {millimetres(ends[1])}{undecided}, better in {better} of {len(known)}"
+
+
+def _own(segment: SegmentFigures) -> float:
+    """Key-frame error of our prediction [m]."""
+    predicted = segment.predicted_cap_rmse_m
+    return segment.keyframe_cap_rmse_m if predicted is None else predicted
+
+
+def _repeating(found: RepeatsFigures) -> PageTable:
+    counts = ", ".join(f"{weight:.2f} ({n})" for weight, n in zip(found.weights, found.repeats, strict=True))
+    rows = [
+        ["part of the prediction", "yes" if found.used else "no: training intervals are not predicted better with it"],
+        ["training intervals, the simulator alone [mm]", millimetres(found.left_out_alone_m)],
+        [f"the same with the repeats of the others [mm], {found.left_out} intervals", millimetres(found.left_out_m)],
+        ["simulator beyond the floor, training [mm]", millimetres(found.gap_m)],
+        [f"floor [mm], from {counted(found.contrasts, 'difference')}", millimetres(found.floor_m)],
+        ["weight (repeats) of each test interval", counts or "-"],
+    ]
+    return PageTable("what the simulator leaves behind and the robot repeats: no physics", ["what", "found"], rows)
 
 
 def _of_them(name: str, report: IdentifyReport) -> str:

@@ -81,7 +81,7 @@ def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:
         train_segments=judged.train_segments, train=judged.train, test_segments=judged.test_segments, test=judged.test,
         cost=fit.solution.cost, residuals=len(fit.solution.residual), converged=fit.solution.reason.converged,
         reason=fit.solution.message, rollouts=predictor.rollouts + judged.rollouts, floor=judged.floor,
-        free_runs=judged.free_runs, closed_loop_m=judged.closed_loop_m,
+        free_runs=judged.free_runs, closed_loop_m=judged.closed_loop_m, repeats=judged.repeats,
         covariance=widened(sure.spread.covariance, len(fixed)), information=made.before, trace=made.trace,
         starts=made.starts, profiles=profiles, windows=start_shifts(fit), updates=made.updates, p_RS=judged.p_RS,
         sensing=sensing if sensing.arrivals or sensing.by_camera else None, command_delay=late,

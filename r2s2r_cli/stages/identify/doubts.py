@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from r2s2r_cli.stages.identify.found import OURS, ParameterFound, ProfileFound
+from r2s2r_cli.stages.identify.found import OURS, REPEATS, ParameterFound, ProfileFound
 from r2s2r_cli.stages.identify.free.base import Coordinate, Free
 from r2s2r_cli.stages.identify.trust.identifiability import Trust
 from r2s2r_cli.stages.measures.baselines import NOTHING_MOVES
 from r2s2r_cli.stages.measures.table import Row
 
+WORDS = {OURS: "the identified simulator", REPEATS: "the identified simulator with what repeats"}
 RATE = "motor_speed"
 """Names of winding rates begin like this; their unit is the no-load speed."""
 BEYOND = 0.05
@@ -19,19 +20,19 @@ ON_BOUND = 1e-6
 """Relative distance from a bound that is none."""
 
 
-def outdone(rows: Mapping[str, Row], closed_loop_m: float | None) -> tuple[str, ...]:
+def outdone(rows: Mapping[str, Row], closed_loop_m: float | None, own: str = OURS) -> tuple[str, ...]:
     """Rivals of no larger held-out error, and a free run with the controller that is worse than none. rows: predictors
-    over the test intervals; closed_loop_m: mean error of that free run."""
-    ours, found = rows.get(OURS), list[str]()
+    over the test intervals; closed_loop_m: mean error of that free run; own: the row that is our prediction."""
+    ours, found = rows.get(own), list[str]()
     if ours is None or ours.key.rmse_m is None:
         return ()
     for name, row in rows.items():
-        if name == OURS or row.key.rmse_m is None or row.key.rmse_m >= ours.key.rmse_m:
+        if name == own or row.key.rmse_m is None or row.key.rmse_m >= ours.key.rmse_m:
             continue
         difference = ours.against(row)
         surely = difference is not None and difference.interval.lower > 0.0
         how = "better than" if surely else "at least as well as"
-        found.append(f"'{name}' predicts the held-out key frames {how} the identified simulator")
+        found.append(f"'{name}' predicts the held-out key frames {how} {WORDS.get(own, own)}")
     idle = rows[NOTHING_MOVES].free_m if NOTHING_MOVES in rows else None
     if closed_loop_m is not None and idle is not None and closed_loop_m > idle:
         found.append(

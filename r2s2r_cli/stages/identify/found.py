@@ -10,6 +10,7 @@ import numpy as np
 
 from r2s2r_cli.stages.identify.closed_sensing import Sensing
 from r2s2r_cli.stages.identify.free.base import Free
+from r2s2r_cli.stages.identify.repeating import Repeats
 from r2s2r_cli.stages.identify.request import Request
 from r2s2r_cli.stages.identify.trust.covariance import correlation_of
 from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, Trust
@@ -19,7 +20,9 @@ from r2s2r_cli.stages.measures.steps import Step
 from r2s2r_cli.stages.measures.table import Row
 
 OURS = "identified"
-"""Name of our own row in the tables of predictors; all others are baselines."""
+"""Name of our own row in the tables of predictors: the simulator with the identified numbers."""
+REPEATS = "identified + what repeats"
+"""The same with the discrepancy of `repeating` added, which is no physics."""
 
 
 @dataclass(frozen=True)
@@ -128,13 +131,15 @@ class SegmentFound:
 
 @dataclass(frozen=True)
 class FreeRunFound:
-    """Test intervals that follow each other, from one start: t (frame,) [s], end caps (frame, cap, 3) [m]."""
+    """Test intervals that follow each other, from one start: t (frame,) [s], end caps (frame, cap, 3) [m]; predicted:
+    simulated, with what repeats."""
 
     run: str
     t: np.ndarray
     observed: np.ndarray
     simulated: np.ndarray
     closed_loop: np.ndarray | None = None
+    predicted: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -176,6 +181,7 @@ class Found:
     floor: Floor | None = None
     free_runs: tuple[FreeRunFound, ...] = ()
     closed_loop_m: float | None = None
+    repeats: Repeats | None = None
     covariance: np.ndarray | None = None
     information: Identifiability | None = None
     trace: tuple[TraceStep, ...] = ()
@@ -191,6 +197,12 @@ class Found:
     natures: Mapping[str, str] = field(default_factory=dict)
     computed_by_torch: bool = False
     warnings: tuple[str, ...] = ()
+
+    @property
+    def headline(self) -> str:
+        """The row of `test` that is our prediction: with what repeats, where training intervals speak for it."""
+        used = self.repeats is not None and self.repeats.used and REPEATS in (self.test or {})
+        return REPEATS if used else OURS
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -20,13 +20,15 @@ def judged_groups(found: Found) -> dict[str, Group]:
     """Segments, measures, and of every run its replayed intervals and free runs; segments only where there are any."""
     segments = _segments(found)
     groups = {} if segments is None else {"segments": segments}
-    return {**groups, "measures": _measures(found), **_runs(found)}
+    repeating = _repeating(found)
+    more = {} if repeating is None else {"repeating": repeating}
+    return {**groups, "measures": _measures(found), **more, **_runs(found)}
 
 
 def baselines(found: Found) -> tuple[str, ...]:
     """Names of all baselines, in the order in which they were first judged."""
     rows = [*found.train, *(found.test or {})]
-    return tuple(name for name in dict.fromkeys(rows) if name != OURS)
+    return tuple(name for name in dict.fromkeys(rows) if name != found.headline)
 
 
 def _sides(found: Found) -> list[tuple[int, SegmentFound, dict[str, float]]]:
@@ -69,7 +71,8 @@ def _measures(found: Found) -> Group:
     names = baselines(found)
     table: list[tuple[int, str, list[float | None], list[Interval | None]]] = []
     for role, rows in sides:
-        picked = [rows.get(name) for name in (OURS, *names)]
+        own = found.headline if role == _TEST else OURS
+        picked = [rows.get(name) for name in (own, *names)]
         keys = [(row.key.rmse_m, row.key_interval) if row else (None, None) for row in picked]
         table.append((role, "keyframe_cap_rmse", [value for value, _ in keys], [interval for _, interval in keys]))
         if role == _TEST:
@@ -91,7 +94,33 @@ def _measures(found: Found) -> Group:
             "baseline": texts(names),
             "baseline_value": value[:, 1:],
             "baseline_interval": interval[:, 1:],
-        }
+        },
+        {"predictor": found.headline},
+    )
+
+
+def _repeating(found: Found) -> Group | None:
+    own = found.repeats
+    if own is None or own.made is None:
+        return None
+    error = own.made.predicted.key - np.array([one.step.key for one in found.test_segments])
+    facts: dict[str, Scalar] = {
+        "used": own.used, "gap": own.model.gap_m, "floor": own.model.floor.floor_m,
+        "contrasts": own.model.floor.contrasts, "dof": own.model.dof,
+    }  # fmt: skip
+    if own.evidence is not None:
+        facts |= {"left_out": own.evidence.with_m, "left_out_alone": own.evidence.alone_m,
+                  "left_out_segments": own.evidence.intervals}  # fmt: skip
+    return Group(
+        {
+            "run": texts([one.step.run for one in found.test_segments]),
+            "interval": np.array([one.step.interval for one in found.test_segments], np.int64),
+            "repeats": own.made.repeats.astype(np.int64),
+            "weight": own.made.weights.astype(float),
+            "keyframe_error": error,
+            "keyframe_cap_rmse": np.sqrt(np.sum(error**2, axis=-1).mean(axis=-1)),
+        },
+        facts,
     )
 
 
@@ -124,6 +153,9 @@ def _free_run(chains: Sequence[FreeRunFound]) -> Group:
         "observed": np.concatenate([one.observed for one in chains]),
         "simulated": np.concatenate([one.simulated for one in chains]),
     }
+    more = [one.predicted for one in chains if one.predicted is not None]
+    if more:
+        table["predicted"] = np.concatenate(more)
     loops = [one.closed_loop for one in chains if one.closed_loop is not None]
     return Group({**table, "closed_loop": np.concatenate(loops)} if len(loops) == len(chains) else table)
 

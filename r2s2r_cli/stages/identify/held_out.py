@@ -12,12 +12,13 @@ from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.identify.closed_free_run import closed_free_run
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.fit import fit
-from r2s2r_cli.stages.identify.found import OURS, FreeRunFound, SegmentFound
+from r2s2r_cli.stages.identify.found import OURS, REPEATS, FreeRunFound, SegmentFound
 from r2s2r_cli.stages.identify.free import Mapping as FreeMapping, select
 from r2s2r_cli.stages.identify.judged import Replayed, replayed, starts_of, steps_from
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import PAPER_FREE, Recipe
 from r2s2r_cli.stages.identify.replays import free_runs_found, segments_found
+from r2s2r_cli.stages.identify.repeating import Repeats, repeats_from
 from r2s2r_cli.stages.identify.request import Request
 from r2s2r_cli.stages.measures.floor import Floor, floor_of
 from r2s2r_cli.stages.measures.keyframes import free_run
@@ -46,6 +47,7 @@ class Judged:
     p_RS: np.ndarray
     rollouts: int
     warnings: tuple[str, ...]
+    repeats: Repeats | None = None
 
 
 def held_out(
@@ -63,11 +65,15 @@ def held_out(
     ours_train, ours_test = _both(runs, request, predictor, values, recipe)
     progress(1, ROUNDS)
     rivals, rollouts, warnings = _rivals(robot, runs, request, recipe, predictor, cache_dir, progress)
-    test = None
+    test, smoothed = None, steps_from(runs, request.train, smoothed=True)
+    wanted = request.discrepancy and request.method != "paper"
+    repeats = repeats_from(ours_train, smoothed, ours_test) if wanted else None
     if ours_test.steps:
         table = {OURS: ours_test.predicted}
+        if repeats is not None and repeats.made is not None:
+            table[REPEATS] = repeats.made.predicted
         table.update({name: one[1] for name, one in rivals.items()})
-        table.update(baselines_of(ours_test.steps, steps_from(runs, request.train, smoothed=True)))
+        table.update(baselines_of(ours_test.steps, smoothed))
         test = judge(ours_test.steps, table)
     train = judge(ours_train.steps, {OURS: ours_train.predicted, **{name: one[0] for name, one in rivals.items()}})
     loop = None
@@ -81,8 +87,9 @@ def held_out(
     progress(ROUNDS, ROUNDS)
     return Judged(
         train_segments=segments_found(ours_train), train=train, test_segments=segments_found(ours_test), test=test,
-        floor=_floor(runs, request), free_runs=free_runs_found(ours_test, closed), closed_loop_m=loop,
+        floor=_floor(runs, request), free_runs=free_runs_found(ours_test, closed, repeats), closed_loop_m=loop,
         p_RS=sites(predictor, values), rollouts=rollouts, warnings=tuple(warnings),
+        repeats=repeats,
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from r2s2r_cli.stages.identify.found import FreeRunFound, SegmentFound
 from r2s2r_cli.stages.identify.judged import Replayed
+from r2s2r_cli.stages.identify.repeating import Repeats
 from r2s2r_cli.stages.identify.trust.whiteness import whiteness
 from r2s2r_cli.stages.measures.replay import observed_run
 from r2s2r_cli.stages.measures.steps import chains
@@ -35,11 +36,15 @@ def segments_found(made: Replayed, *, seed: int = 0) -> tuple[SegmentFound, ...]
     )
 
 
-def free_runs_found(made: Replayed, closed: tuple[np.ndarray, ...] = ()) -> tuple[FreeRunFound, ...]:
+def free_runs_found(
+    made: Replayed, closed: tuple[np.ndarray, ...] = (), repeats: Repeats | None = None
+) -> tuple[FreeRunFound, ...]:
     """The free runs, chain by chain. closed: the same with the controller in the loop, (frame, cap, 3) [m] of every
-    chain, or none."""
+    chain, or none. repeats: the same with what repeats."""
     found = []
+    predicted = () if repeats is None or repeats.made is None else repeats.made.predicted.free
     for k, (chain, simulated) in enumerate(zip(chains(made.steps), made.free, strict=True)):
         t, observed = observed_run(chain)
-        found.append(FreeRunFound(chain[0].run, t, observed, simulated, closed[k] if closed else None))
+        found.append(FreeRunFound(chain[0].run, t, observed, simulated, closed[k] if closed else None,
+                                  predicted[k] if predicted else None))  # fmt: skip
     return tuple(found)

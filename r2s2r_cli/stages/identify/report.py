@@ -21,6 +21,7 @@ from schemas.results_identify import (
     Measures,
     ParameterFigures,
     ProfileFigures,
+    RepeatsFigures,
     SegmentFigures,
     StartFigures,
 )
@@ -42,6 +43,7 @@ def report_of(found: Found) -> IdentifyReport:
         parameters={one.free.name: _parameter(one) for one in found.parameters},
         train=Measures(keyframe_cap_rmse_m=_rmse(found.train.get(OURS))),
         heldout=_heldout(found),
+        repeating=_repeating(found),
         segments=_segments(found),
         weak=_weak(found),
         correlations=tuple(_correlations(found)),
@@ -66,7 +68,7 @@ def report_of(found: Found) -> IdentifyReport:
         rollouts=found.rollouts,
         computed_by="torch" if found.computed_by_torch else "machine code",
         warnings=(
-            *found.warnings, *outdone(found.test or {}, found.closed_loop_m), *doubtful(found.parameters),
+            *found.warnings, *outdone(found.test or {}, found.closed_loop_m, found.headline), *doubtful(found.parameters),
             *ranging(found.parameters), *contradicted(found.parameters, found.profiles),
         ),
     )  # fmt: skip
@@ -88,13 +90,14 @@ def _heldout(found: Found) -> HeldOut | None:
     rows = found.test
     if not rows:
         return None
-    ours = rows[OURS]
+    ours = rows[found.headline]
     return HeldOut(
+        predictor=found.headline,
         keyframe_cap_rmse_m=ours.key.rmse_m,
         free_run_cap_mean_m=ours.free_m,
         free_run_closed_loop_cap_mean_m=found.closed_loop_m,
         intervals=_intervals(ours),
-        baselines={name: _baseline(ours, row) for name, row in rows.items() if name != OURS},
+        baselines={name: _baseline(ours, row) for name, row in rows.items() if name != found.headline},
         floor_m=None if found.floor is None else found.floor.floor_m,
     )
 
@@ -117,22 +120,38 @@ def _intervals(row: Row) -> Intervals:
 
 def _segments(found: Found) -> tuple[SegmentFigures, ...]:
     sides = [
-        *_side("train", found.train_segments, found.train), *_side("test", found.test_segments, found.test or {})
-    ]  # fmt: skip
+        *_side("train", found.train_segments, found.train, OURS),
+        *_side("test", found.test_segments, found.test or {}, found.headline),
+    ]
     return tuple(sorted(sides, key=lambda one: (one.run, one.interval)))
 
 
-def _side(role: str, segments: Sequence[SegmentFound], rows: Mapping[str, Row]) -> list[SegmentFigures]:
+def _side(role: str, segments: Sequence[SegmentFound], rows: Mapping[str, Row], own: str) -> list[SegmentFigures]:
     return [
         SegmentFigures(
             run=one.step.run, interval=one.step.interval, role=role,  # type: ignore[arg-type]
             keyframe_cap_rmse_m=one.keyframe_cap_rmse,
             cap_rmse_m=one.cap_rmse,
-            baselines={name: _finite(row.key.per_segment_m[i]) for name, row in rows.items() if name != OURS},
+            predicted_cap_rmse_m=None if own == OURS else float(rows[own].key.per_segment_m[i]),
+            baselines={name: _finite(row.key.per_segment_m[i]) for name, row in rows.items() if name != own},
             not_white=tuple(int(cap) for cap in np.flatnonzero(~np.asarray(one.white, dtype=bool))),
         )
         for i, one in enumerate(segments)
     ]  # fmt: skip
+
+
+def _repeating(found: Found) -> RepeatsFigures | None:
+    own = found.repeats
+    if own is None:
+        return None
+    made, evidence = own.made, own.evidence
+    return RepeatsFigures(
+        used=own.used, gap_m=own.model.gap_m, floor_m=own.model.floor.floor_m, contrasts=own.model.floor.contrasts,
+        weights=() if made is None else tuple(made.weights.tolist()),
+        repeats=() if made is None else tuple(made.repeats.tolist()),
+        left_out_alone_m=None if evidence is None else evidence.alone_m,
+        left_out_m=None if evidence is None else evidence.with_m, left_out=0 if evidence is None else evidence.intervals,
+    )  # fmt: skip
 
 
 def _weak(found: Found) -> tuple[Direction, ...]:

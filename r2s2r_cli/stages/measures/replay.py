@@ -40,14 +40,15 @@ def free_same_phase(
         like = repeats_of(step, train, standing=support(now))
         if not like:
             return None
-        carried = [_carried(one, step, now, by) for one in (like[-1:] if last_only else like)]
-        frames.append(np.mean([at_frames for at_frames, _ in carried], axis=0))
-        now = np.mean([after for _, after in carried], axis=0)
+        each = [carried(one, step, now, by) for one in (like[-1:] if last_only else like)]
+        frames.append(np.mean([at_frames for at_frames, _ in each], axis=0))
+        now = np.mean([after for _, after in each], axis=0)
     return np.concatenate(frames)
 
 
-def _carried(training: Step, step: Step, now: np.ndarray, by: Carry) -> tuple[np.ndarray, np.ndarray]:
-    """One training step from pose `now`: at the frames of the test step, and at the start of the interval after it."""
+def carried(training: Step, step: Step, now: np.ndarray, by: Carry = "pose") -> tuple[np.ndarray, np.ndarray]:
+    """One training step from pose `now` (cap, 3) [m]: at the frames of the test step (frame, cap, 3), and at the start of
+    the interval after it."""
     move = planar(training.start, now)
     kept = now - move.move(training.start) if by == "displacement" else np.zeros_like(now)
     path = move.move(training.p_WE) + kept

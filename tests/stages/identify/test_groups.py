@@ -15,9 +15,12 @@ from r2s2r_cli.checks import CHECKS
 from r2s2r_cli.checks.base import run_checks
 from r2s2r_cli.checks.subjects import Content
 from r2s2r_cli.stages.identify.columns import texts
-from r2s2r_cli.stages.identify.found import ParameterFound
+from r2s2r_cli.stages.identify.found import OURS, REPEATS, ParameterFound
 from r2s2r_cli.stages.identify.groups import identification
+from r2s2r_cli.stages.identify.repeating import LeftOut, Repeating, Repeats, WithRepeats
 from r2s2r_cli.stages.identify.report import report_of
+from r2s2r_cli.stages.measures.floor import Floor
+from r2s2r_cli.stages.measures.table import Predicted, judge
 from r2s2r_cli.store.read import read_artifact
 from r2s2r_cli.store.write import write_artifact
 from schemas.results_identify import IdentifyReport
@@ -104,6 +107,42 @@ def test_the_report_says_the_same() -> None:
 def test_nothing_held_out_is_said_so() -> None:
     """No test intervals: no held-out error, instead of one of 0."""
     assert report_of(found(**BARE)).heldout is None
+
+
+def repeating(used: bool) -> dict[str, Any]:
+    """What repeats, planted: 2 mm and 1 mm off at the key frames of the test intervals, which the simulator misses by 3
+    and 4; training intervals speak for it, or against."""
+    plain, evidence = found(), (0.004, 0.003) if used else (0.003, 0.004)
+    keys = np.array([one.step.key + [0.0, 0.0, off] for one, off in zip(plain.test_segments, (2e-3, 1e-3), strict=True)])
+    free = tuple(one.step.p_WE for one in plain.test_segments)
+    model = Repeating((), 16e-6, 2, Floor(0.003, None, 2, 0.001, ()), 5.0, 0.0)
+    made = WithRepeats(Predicted(keys, free), np.array([0.5, 0.0]), np.array([2, 0]))
+    rows = judge([one.step for one in plain.test_segments], {REPEATS: made.predicted})
+    runs = tuple(replace(one, predicted=path) for one, path in zip(plain.free_runs, free, strict=True))
+    return {"repeats": Repeats(model, LeftOut(*evidence, 2), made), "test": {**(plain.test or {}), **rows},
+            "free_runs": runs}  # fmt: skip
+
+
+def test_what_repeats_is_the_prediction_where_training_speaks_for_it(tmp_path: Path) -> None:
+    """Then its errors come first, under its own name, and the simulator's stand among the baselines; else the other way
+    round. What the artifact calls simulated is the simulator's either way."""
+    data, said = identification(found(**repeating(True))), report_of(found(**repeating(True)))
+    assert said.heldout is not None and said.heldout.predictor == REPEATS
+    assert said.heldout.keyframe_cap_rmse_m == pytest.approx(np.sqrt(2.5e-6))
+    assert said.heldout.baselines[OURS].keyframe_cap_rmse_m == pytest.approx(np.sqrt(12.5e-6))
+    assert [one.predicted_cap_rmse_m for one in said.segments] == pytest.approx([None, None, 0.002, 0.001])
+    assert [one.keyframe_cap_rmse_m for one in said.segments] == pytest.approx([0.001, 0.001, 0.003, 0.004])
+    assert said.repeating is not None and said.repeating.weights == (0.5, 0.0) and said.repeating.left_out_m == 0.003
+    write_artifact(tmp_path / "30-identify.h5", data, provenance())
+    assert run_checks(CHECKS, Content(data), "a.h5") == []
+    assert data.groups["measures"].attributes["predictor"] == REPEATS
+    assert data.groups["measures"]["value"][1] == pytest.approx(np.sqrt(2.5e-6))
+    assert data.groups["repeating"]["keyframe_cap_rmse"] == pytest.approx([0.002, 0.001])
+    assert data.groups["segments"]["keyframe_cap_rmse"] == pytest.approx([0.001, 0.001, 0.003, 0.004])
+    not_used = report_of(found(**repeating(False)))
+    assert not_used.heldout is not None and not_used.heldout.predictor == OURS
+    assert not_used.heldout.keyframe_cap_rmse_m == pytest.approx(np.sqrt(12.5e-6))
+    assert REPEATS in not_used.heldout.baselines and not_used.segments[2].predicted_cap_rmse_m is None
 
 
 def test_free_runs_of_one_run_are_put_together() -> None:

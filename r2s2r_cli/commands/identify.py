@@ -84,8 +84,8 @@ def identify(
         bool,
         typer.Option(
             "--discrepancy/--no-discrepancy",
-            help="Add to the prediction of test intervals what the simulator leaves behind in training intervals and the "
-            "robot repeats, where these speak for it; no physics.",
+            help="Add to the prediction of test intervals what the simulator leaves behind in training intervals and "
+            "the robot repeats, where these speak for it; no physics.",
         ),
     ] = True,
     online: Annotated[
@@ -137,8 +137,8 @@ def identify(
     typed = typed_options(
         train=train, test=test, free=free, fix=fix, with_effect=with_effect,
         method=None if method == "default" else method, drive=None if drive == "replay" else drive,
-        online=online, no_discrepancy=not discrepancy, also=also, self_test=self_test, starts=starts, seed=seed or None, project=project,
-        iteration=iteration, set_=set_, no_draw=not draw,
+        online=online, no_discrepancy=not discrepancy, also=also, self_test=self_test, starts=starts, seed=seed or None,
+        project=project, iteration=iteration, set_=set_, no_draw=not draw,
     )  # fmt: skip
     asked = Asked(
         here, place, train=tuple(train or ()), test=tuple(test or ()), free=tuple(free or ()), fix=tuple(fix or ()),

@@ -11,7 +11,18 @@ from pathlib import Path
 
 from r2s2r_cli.errors import R2S2RError
 
-FLAGS = ("--online", "--no-discrepancy", "--self-test", "--resume", "--json", "--quiet", "--no-draw", "--dry-run", "--force", "--draw")
+FLAGS = (
+    "--online",
+    "--no-discrepancy",
+    "--self-test",
+    "--resume",
+    "--json",
+    "--quiet",
+    "--no-draw",
+    "--dry-run",
+    "--force",
+    "--draw",
+)
 """Options without a value."""
 SINGLE = ("--method", "--drive", "--seed", "--starts", "--iteration", "--project")
 """Options that are given once."""

@@ -7,7 +7,15 @@ from collections.abc import Iterator, Sequence
 from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.views.identify_data import figure_of, millimetres, spread
 from r2s2r_cli.views.page import Page, PageTable, Picture, counted, render
-from schemas.results_identify import Baseline, HeldOut, IdentifyReport, Measures, ParameterFigures, RepeatsFigures, SegmentFigures
+from schemas.results_identify import (
+    Baseline,
+    HeldOut,
+    IdentifyReport,
+    Measures,
+    ParameterFigures,
+    RepeatsFigures,
+    SegmentFigures,
+)
 
 _STRONG = 0.9
 """Parameters correlated by more cannot be told apart."""

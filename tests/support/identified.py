@@ -134,6 +134,13 @@ def _of_motion(robot: Robot, frames: int) -> dict[str, Group]:
             "baseline_cap_rmse": np.array([[0.05, _NAN, 0.02, 0.009], [0.048, 0.011, 0.02, 0.012]]),
             "lag1": np.tile([0.1, 0.2, 0.1, 0.0, -0.1, 0.7], (2, 1)), "white": np.tile([True] * 5 + [False], (2, 1)),
         }),
+        "repeating": Group(
+            {
+                "run": text("walk"), "interval": np.array([2]), "repeats": np.array([2]), "weight": np.array([0.5]),
+                "keyframe_error": 0.5 * error[1:], "keyframe_cap_rmse": 0.5 * rmse[1:],
+            },
+            {"used": False, "gap": 0.004, "floor": 0.005, "contrasts": 1, "dof": 5.0},
+        ),
         "windows": Group({
             "run": text("walk"), "interval": np.array([1]), "t_first": m.t[:1], "t_last": m.t[half - 1 : half],
             "p_WE": m.p_WE[:1], "v_WE": np.zeros((1, 6, 3)), "shift": np.full((1, 6, 3), 0.001),
@@ -143,6 +150,6 @@ def _of_motion(robot: Robot, frames: int) -> dict[str, Group]:
         "runs/walk/fit": Group(fit),
         "runs/walk/free_run": Group({
             "t": m.t[half:], "chain": np.zeros(frames - half, np.int64), "observed": observed[half:],
-            "simulated": simulated[half:],
+            "simulated": simulated[half:], "predicted": 0.5 * (simulated + observed)[half:],
         }),
     }  # fmt: skip

@@ -17,8 +17,8 @@ from r2s2r_cli.stages.identify.free import Mapping as FreeMapping, select
 from r2s2r_cli.stages.identify.judged import Replayed, replayed, starts_of, steps_from
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import PAPER_FREE, Recipe
-from r2s2r_cli.stages.identify.replays import free_runs_found, segments_found
 from r2s2r_cli.stages.identify.repeating import Repeats, repeats_from
+from r2s2r_cli.stages.identify.replays import free_runs_found, segments_found
 from r2s2r_cli.stages.identify.request import Request
 from r2s2r_cli.stages.measures.floor import Floor, floor_of
 from r2s2r_cli.stages.measures.keyframes import free_run

@@ -58,11 +58,13 @@ class Repeating:
         """How much repeats count beside the simulator, 0 to 1, and the share of each (k,).
 
         unlike: mean square by which each one's start differs from the start that is predicted from [m^2]; what goes
-        beyond the usual adds to its variance. Both variances are known from few intervals: the weight is its mean over
-        their posteriors, scaled inverse chi-square (Jeffreys prior).
+        beyond the usual adds to its variance; none: weight 0. Both variances are known from few intervals: the weight
+        is its mean over their posteriors, scaled inverse chi-square (Jeffreys prior).
         """
         from scipy.stats import chi2
 
+        if not len(unlike):
+            return 0.0, np.zeros(0)
         excess = np.maximum(0.0, np.asarray(unlike, dtype=float) - self.unlike)
         levels = 1.0 - (np.arange(QUANTILES) + 0.5) / QUANTILES
 
@@ -93,8 +95,8 @@ class WithRepeats:
 
 @dataclass(frozen=True)
 class Repeats:
-    """The model, its evidence, and the test intervals with it; None: no training interval has a repeat, nothing was held
-    out."""
+    """The model, its evidence, and the test intervals with it; None: no training interval has a repeat, or nothing was
+    held out."""
 
     model: Repeating
     evidence: LeftOut | None
@@ -150,9 +152,8 @@ def with_repeats(model: Repeating, made: Replayed) -> WithRepeats:
     """Steps and free runs of `made` with what repeats. Nothing of a step is used but its start and its targets."""
     keys, weights, counts = [], [], []
     for step, path in zip(made.steps, made.simulated, strict=True):
-        like = repeats_of(step, model.steps)
-        found = [carry(one, path[0]) for one in like]
-        weight, share = model.weight([one.start_rmse_m**2 for one in found]) if found else (0.0, np.zeros(0))
+        found = [carry(one, path[0]) for one in repeats_of(step, model.steps)]
+        weight, share = model.weight([one.start_rmse_m**2 for one in found])
         keys.append(_blend(weight, share, path[-1], [one.key for one in found]))
         weights.append(weight)
         counts.append(len(found))
@@ -192,7 +193,7 @@ def _free(model: Repeating, chain: Sequence[Step], path: np.ndarray) -> np.ndarr
         end = begin + len(step.t)
         last = path[min(end, len(path) - 1)]
         like = repeats_of(step, model.steps, standing=support(now))
-        weight, share = model.weight([carry(one, now).start_rmse_m ** 2 for one in like]) if like else (0.0, np.zeros(0))
+        weight, share = model.weight([carry(one, now).start_rmse_m ** 2 for one in like])
         parts = [carried(one, step, now) for one in like]
         found.append(_blend(weight, share, move.move(path[begin:end]), [frames for frames, _ in parts]))
         now = _blend(weight, share, move.move(last), [after for _, after in parts])

@@ -68,8 +68,8 @@ def report_of(found: Found) -> IdentifyReport:
         rollouts=found.rollouts,
         computed_by="torch" if found.computed_by_torch else "machine code",
         warnings=(
-            *found.warnings, *outdone(found.test or {}, found.closed_loop_m, found.headline), *doubtful(found.parameters),
-            *ranging(found.parameters), *contradicted(found.parameters, found.profiles),
+            *found.warnings, *outdone(found.test or {}, found.closed_loop_m, found.headline),
+            *doubtful(found.parameters), *ranging(found.parameters), *contradicted(found.parameters, found.profiles),
         ),
     )  # fmt: skip
 
@@ -150,7 +150,8 @@ def _repeating(found: Found) -> RepeatsFigures | None:
         weights=() if made is None else tuple(made.weights.tolist()),
         repeats=() if made is None else tuple(made.repeats.tolist()),
         left_out_alone_m=None if evidence is None else evidence.alone_m,
-        left_out_m=None if evidence is None else evidence.with_m, left_out=0 if evidence is None else evidence.intervals,
+        left_out_m=None if evidence is None else evidence.with_m,
+        left_out=0 if evidence is None else evidence.intervals,
     )  # fmt: skip
 
 

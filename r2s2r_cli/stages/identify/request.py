@@ -20,8 +20,8 @@ class Request:
     train, test: target intervals by run, complete and disjoint; test may be empty. free: what is free, as after --free;
     empty: the default set of the method. fixed: values by parameter, in its unit, not fitted. effects: ids of the
     catalogue that are in the simulator. of_effects: what is free of them unless `free` or `fixed` names it, as after
-    --free. before: the identification to continue from (online), or None. discrepancy: whether what the simulator leaves
-    behind in training intervals and the robot repeats may be added to the prediction of test intervals.
+    --free. before: the identification to continue from (online), or None. discrepancy: whether what the simulator
+    leaves behind in training intervals and the robot repeats may be added to the prediction of test intervals.
     """
 
     train: tuple[Selection, ...]

@@ -47,8 +47,8 @@ def free_same_phase(
 
 
 def carried(training: Step, step: Step, now: np.ndarray, by: Carry = "pose") -> tuple[np.ndarray, np.ndarray]:
-    """One training step from pose `now` (cap, 3) [m]: at the frames of the test step (frame, cap, 3), and at the start of
-    the interval after it."""
+    """One training step from pose `now` (cap, 3) [m]: at the frames of the test step (frame, cap, 3), and at the start
+    of the interval after it."""
     move = planar(training.start, now)
     kept = now - move.move(training.start) if by == "displacement" else np.zeros_like(now)
     path = move.move(training.p_WE) + kept

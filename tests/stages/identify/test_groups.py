@@ -113,7 +113,8 @@ def repeating(used: bool) -> dict[str, Any]:
     """What repeats, planted: 2 mm and 1 mm off at the key frames of the test intervals, which the simulator misses by 3
     and 4; training intervals speak for it, or against."""
     plain, evidence = found(), (0.004, 0.003) if used else (0.003, 0.004)
-    keys = np.array([one.step.key + [0.0, 0.0, off] for one, off in zip(plain.test_segments, (2e-3, 1e-3), strict=True)])
+    up = np.array([0.0, 0.0, 1e-3])
+    keys = np.array([one.step.key + off * up for one, off in zip(plain.test_segments, (2, 1), strict=True)])
     free = tuple(one.step.p_WE for one in plain.test_segments)
     model = Repeating((), 16e-6, 2, Floor(0.003, None, 2, 0.001, ()), 5.0, 0.0)
     made = WithRepeats(Predicted(keys, free), np.array([0.5, 0.0]), np.array([2, 0]))

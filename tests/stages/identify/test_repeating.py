@@ -1,4 +1,4 @@
-"""What the simulator leaves behind and the robot repeats: learned where it is there, shrunk to nothing where it is not."""
+"""What the simulator leaves behind and the robot repeats: learned where it is there, shrunk away where it is not."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ def errors(test: Replayed, predicted: Predicted) -> tuple[float, float]:
 
 
 def test_what_repeats_is_predicted() -> None:
-    """The error falls from sqrt(off^2 + scatter^2) to the scatter and what ten noisy repeats leave, off^2 s^2 / (n off^2 +
-    s^2): in any place and heading, at key frames and in free run. The training intervals say so beforehand."""
+    """The error falls from sqrt(off^2 + scatter^2) to the scatter and what ten noisy repeats leave, off^2 s^2 / (n
+    off^2 + s^2): in any place and heading, at key frames and in free run. The training intervals say so beforehand."""
     train, test = planted(OFF), planted(OFF, first=31, count=30, seed=1)
     found = repeats_from(train, train.steps, test)
     assert found is not None and found.used and found.evidence is not None and found.made is not None
@@ -103,7 +103,8 @@ def test_nothing_of_a_test_interval_is_used_but_its_start() -> None:
 
     one, other = with_repeats(model, test), with_repeats(model, replace(test, steps=tuple(map(thrown, test.steps))))
     assert np.array_equal(one.predicted.key, other.predicted.key)
-    assert all(np.array_equal(a, b) for a, b in zip(one.predicted.free, other.predicted.free, strict=True))
+    for a, b in zip(one.predicted.free, other.predicted.free, strict=True):
+        assert a is not None and b is not None and np.array_equal(a, b)
 
 
 def model_of(gap: float, floor: float, *, contrasts: int, intervals: int) -> Repeating:
@@ -139,7 +140,9 @@ def test_evidence_needs_an_interval_with_a_repeat() -> None:
     train = planted(OFF)
     model = learned(train, train.steps)
     assert model is not None
-    assert left_out(replace(model, steps=train.steps[3:6]), Replayed(train.steps[3:6], train.simulated[3:6], ())) is None
+    one = slice(3, 6)
+    cycle = Replayed(train.steps[one], train.simulated[one], ())
+    assert left_out(replace(model, steps=cycle.steps), cycle) is None
 
 
 def test_squares_that_move_together_count_once() -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.identify import draw_identification
-from r2s2r_cli.views.identify_errors import floor_of
+from r2s2r_cli.views.identify_errors import errors_with_repeats, floor_of
 from r2s2r_cli.views.identify_fits import cap_rmse
 from r2s2r_cli.views.identify_information import draw_information, information_figure
 from r2s2r_cli.views.identify_page import identify_page, report_tables, verdict
@@ -20,8 +20,8 @@ from schemas.results_identify import Intervals, Recovered, RecoveredCase, SelfTe
 from tests.stages.identify.reports import report
 from tests.support import builders
 
-OPTIONAL = ("covariance", "identifiability", "trace", "starts", "profiles", "windows", "segments", "sites", "history",
-            "runs/walk/fit", "runs/walk/free_run")  # fmt: skip
+OPTIONAL = ("covariance", "identifiability", "trace", "starts", "profiles", "windows", "segments", "repeating", "sites",
+            "history", "runs/walk/fit", "runs/walk/free_run")  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +48,15 @@ def test_every_part_is_drawn(pictures: dict[str, tuple[str, bytes]]) -> None:
     """One picture for each question, every run among them, each a PNG."""
     assert list(pictures) == ["parameters", "information", "errors", "fit-walk", "free-walk", "search", "history"]
     assert all(png.startswith(b"\x89PNG") and len(png) > 5000 for _, png in pictures.values())
+
+
+def test_what_repeats_stands_at_its_own_segment() -> None:
+    """Training segments have none; without that part there is no line at all."""
+    groups = builders.identification().groups
+    off = errors_with_repeats(groups["segments"], groups["repeating"])
+    assert off is not None
+    assert off == pytest.approx([np.nan, 0.5 * groups["segments"]["keyframe_cap_rmse"][1]], nan_ok=True)
+    assert errors_with_repeats(groups["segments"], None) is None
 
 
 def test_what_is_not_there_is_not_drawn() -> None:

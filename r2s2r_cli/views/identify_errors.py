@@ -61,7 +61,7 @@ def _bars(axes: Axes, segments: Group, measures: Group, repeats: Group | None = 
         axes.plot(x, error, mark, ms=11, mew=1.8, color="#303842", alpha=0.35 + 0.5 * (k % 2), label=name)
     repeating = errors_with_repeats(segments, repeats)
     if repeating is not None:
-        axes.plot(x, 1e3 * repeating, "P", ms=10, color="#c0392b", label="identified + what repeats")
+        axes.plot(x, 1e3 * repeating, "P", ms=10, mec="black", color="#f5c518", label="identified + what repeats")
     floor = floor_of(measures)
     if math.isfinite(floor):
         axes.axhline(1e3 * floor, color="black", lw=1, ls="--", label=f"floor {1e3 * floor:.1f} mm")

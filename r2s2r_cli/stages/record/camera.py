@@ -18,20 +18,23 @@ from schemas.config import RecordSettings
 _IDLE_S = 0.004
 """Between two looks for a frame: an eighth of the time between frames."""
 _PNG_LEVEL = 1
+LATE_S = 0.06
+"""A picture is stamped when it comes, this much after its exposure at most (tick, transfer): stamped earlier than that in
+a run it may show the robot where it lay before, and a tracker that begins there finds it nowhere."""
 
 
 class Pictures:
     """Frames of one run into its `camera` stream, until the context ends.
 
     feed: frames as they come. stamp: from a frame to its time in the run [s]. waits: a robot in lock-step, whose time
-    does not go on while the camera is slow. Counts: `written`, `lost` (gaps in the camera's own count), `repeated`.
+    does not go on while the camera is slow. since: frames stamped before this are not of the run [s]. Counts: `written`, `lost` (gaps in the camera's own count), `repeated`.
     """
 
     def __init__(
         self, feed: CameraFeed, writer: Writer, stream: str, settings: RecordSettings, stamp: Callable[[Frame], float],
-        *, waits: bool = False,
+        *, waits: bool = False, since: float = 0.0,
     ) -> None:  # fmt: skip
-        self._waits = waits
+        self._waits, self._since = waits, since
         self._feed, self._writer, self._stream, self._settings, self._stamp = feed, writer, stream, settings, stamp
         self._ended = threading.Event()
         self._error: BaseException | None = None
@@ -97,7 +100,7 @@ class Pictures:
     def _write(self, frame: Frame) -> None:
         self._last_seen = time.monotonic()
         t = float(self._stamp(frame))
-        if t < 0 or t <= self._last_t:
+        if t < self._since or t <= self._last_t:
             return  # of the time before the run, or delivered twice
         if self._last_number is not None:
             self.lost += max(0, frame.number - self._last_number - 1)

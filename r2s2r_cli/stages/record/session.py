@@ -11,7 +11,7 @@ import numpy as np
 from r2s2r_cli.devices.camera import CameraFeed, Frame
 from r2s2r_cli.devices.link import RobotLink
 from r2s2r_cli.errors import R2S2RError
-from r2s2r_cli.stages.record.camera import Pictures
+from r2s2r_cli.stages.record.camera import LATE_S, Pictures
 from r2s2r_cli.stages.record.plan import RunPlan
 from r2s2r_cli.stages.record.run import RunLoop, Watch
 from r2s2r_cli.stages.record.writer import Sink, Writer
@@ -107,7 +107,7 @@ class Session:
                     stamp = self._stamp(loop)
                     pictures = Pictures(
                         self.feed, writer, f"runs/{plan.name}/camera", self.settings, stamp,
-                        waits=self.link.facts.lock_step,
+                        waits=self.link.facts.lock_step, since=LATE_S,
                     )  # fmt: skip
                     stack.enter_context(pictures)
                 loop.run(pictures)

@@ -14,7 +14,7 @@ from r2s2r_cli.devices.camera import CameraError, FeedStatistics, Frame
 from r2s2r_cli.devices.link import Sample
 from r2s2r_cli.errors import ArtifactError, HardwareError
 from r2s2r_cli.stages.record import Session, plans
-from r2s2r_cli.stages.record.camera import Pictures, encode_color, encode_depth
+from r2s2r_cli.stages.record.camera import LATE_S, Pictures, encode_color, encode_depth
 from r2s2r_cli.stages.record.run import RunLoop
 from r2s2r_cli.stages.record.writer import Writer
 from r2s2r_cli.stages.simulate.policies import random_policy
@@ -98,6 +98,21 @@ def test_gaps_in_the_count_are_lost_frames() -> None:
     pictures = written(Still([frame(n, t) for n, t in numbers]), rows)
     assert rows.column("camera", "source_frame").tolist() == [1, 2, 5, 9]
     assert pictures.lost == 5
+
+
+def test_what_may_show_the_time_before_the_run_is_not_of_it() -> None:
+    """Pictures are stamped when they come: one stamped a moment after the start was exposed before it, where the robot
+    lay on another place; those from LATE_S on are all kept."""
+    robot = calibrated()
+    link, rows = FakeLink(robot), Rows()
+    begun = link.now()
+    feed = Still([frame(i, begun + 0.02 * i) for i in range(12)])
+    slow = link.read
+    link.read = lambda timeout: (time.sleep(0.001), slow(timeout))[1]  # type: ignore[method-assign]
+    plan = plans([random_policy(robot, 20, 0)], repeats=1, rest=0.0)
+    Session(plan, robot, link, RecordSettings(), feed=feed).record(rows)
+    stamps = rows.column("runs/random-0/camera", "t")
+    assert np.allclose(stamps, [0.02 * i for i in range(12) if 0.02 * i >= LATE_S - 1e-9]) and len(stamps) > 5
 
 
 def test_a_camera_that_is_gone_ends_the_run() -> None:

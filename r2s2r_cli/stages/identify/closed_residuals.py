@@ -50,12 +50,9 @@ class ClosedResiduals(CapResiduals):
         period = predictor.mapping.robot.pid.rate_hz**-1
         theta = predictor.mapping.theta(torch.as_tensor(self.at))
         slack = noise / float(theta.speed_in.mean())
-        each = [np.maximum(f.window.run.noise, max(noise, LEAST_NOISE)) for f in self.flights]
-        self._key_sd = np.concatenate([np.tile(sd, (f.count, 1, 1)) for f, sd in zip(self.flights, each, strict=True)])
-        own = [np.maximum(f.window.run.noise, LEAST_NOISE) for f in self.flights]
-        self._key_noise = np.concatenate(
-            [np.tile(sd, (f.count, 1, 1)) for f, sd in zip(self.flights, own, strict=True)]
-        )
+        both = [(f.window.run, f.window.run.intervals.last[np.array(f.numbers) - 1]) for f in self.flights]
+        self._key_sd = np.concatenate([run.sd_at(keys, max(noise, LEAST_NOISE)) for run, keys in both])
+        self._key_noise = np.concatenate([run.sd_at(keys, LEAST_NOISE) for run, keys in both])
         # Ticks of the robot and of the simulation, neither of which falls on the other's.
         known = [np.hypot(f.log.between(f.numbers), period / np.sqrt(6.0)) for f in self.flights]
         ends = np.concatenate([np.where(np.isfinite(sd[1:]), 1.0, np.inf) for sd in known])

@@ -14,7 +14,8 @@ class RunData:
     """One recorded run; frames are the kept frames, frame W has the ground at z = 0.
 
     t: (frame,) [s]. observed: end caps as the tracker gave them, moved on to the ground [m], (frame, cap, 3); noise:
-    their sd [m], (cap, 3). p_WE, sd_p, v_WE, sd_v: smoothed end caps [m], [m/s] and sd per axis, (frame, cap, 3): they
+    their sd [m], (cap, 3); observed_sd: that of each frame, of camera images, where caps may be hidden, (frame, cap,
+    3), None: all are alike. p_WE, sd_p, v_WE, sd_v: smoothed end caps [m], [m/s] and sd per axis, (frame, cap, 3): they
     know later frames, so no test segment may start from them. quality: codes of schemas/estimate.py, (frame, cap).
     t_command: (row,) [s]; control, target: (row, actuated), a row holds until the next. intervals, segments: of the
     design. sampled: the rows are what the frames found in force, not the commands as they were sent. nature: what the
@@ -41,6 +42,15 @@ class RunData:
     nature: str = ""
     sensor_bias: np.ndarray | None = None
     sensor_delay: float | None = None
+    observed_sd: np.ndarray | None = None
+
+    def sd_at(self, frames: np.ndarray | int, least: float = 0.0) -> np.ndarray:
+        """Sd of the observed caps at some frames (..., cap, 3) [m]: the noise of the run, or what is known of the frame
+        where that is more; no less than `least`."""
+        run = np.maximum(self.noise, least)
+        if self.observed_sd is None:
+            return np.broadcast_to(run, (*np.shape(frames), *run.shape))
+        return np.maximum(run, self.observed_sd[frames])
 
 
 @dataclass(frozen=True)

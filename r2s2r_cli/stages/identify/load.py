@@ -51,6 +51,7 @@ def run_data(recording: ArtifactData | None, estimate: ArtifactData, run: str, *
         if caps is None
         else _observed(caps, frames, _group(estimate, run, "ground"), run),
         noise=tracks["noise_sd"],
+        observed_sd=tracks["observed_sd"] if caps is None and "observed_sd" in tracks else None,
         p_WE=frames["p_WE"],
         sd_p=np.sqrt(np.diagonal(frames["cov_p_WE"], axis1=-2, axis2=-1)),
         v_WE=frames["v_WE"],
@@ -160,8 +161,11 @@ def _control(commands: Group, run: str) -> np.ndarray:
 
 
 def _require_finite(data: RunData, run: str) -> None:
-    for name in ("t", "observed", "noise", "p_WE", "sd_p", "v_WE", "sd_v", "t_command"):
-        bad = ~np.isfinite(getattr(data, name))
+    for name in ("t", "observed", "noise", "observed_sd", "p_WE", "sd_p", "v_WE", "sd_v", "t_command"):
+        value = getattr(data, name)
+        if value is None:
+            continue
+        bad = ~np.isfinite(value)
         if bad.any():
             place = np.argwhere(bad)[0].tolist()
             raise InputError(

@@ -61,15 +61,9 @@ class CapResiduals:
         self.z0 = self.prior_mean.copy()
         self.kept = np.concatenate([w.key if key_only else np.ones(len(w.frames), bool) for w in windows])
         self._observed = np.concatenate([w.run.observed[w.frames] for w in windows])[self.kept]
-        own = [
-            np.broadcast_to(np.maximum(w.run.noise, LEAST_NOISE), (len(w.frames), *w.run.noise.shape)) for w in windows
-        ]
-        self._noise = np.concatenate(own)[self.kept]
-        wide = [
-            np.broadcast_to(np.maximum(w.run.noise, max(noise, LEAST_NOISE)), (len(w.frames), *w.run.noise.shape))
-            for w in windows
-        ]
-        self._sd = np.concatenate(wide)[self.kept]
+        self._noise = np.concatenate([w.run.sd_at(w.frames, LEAST_NOISE) for w in windows])[self.kept]
+        least = max(noise, LEAST_NOISE)
+        self._sd = np.concatenate([w.run.sd_at(w.frames, least) for w in windows])[self.kept]
         self._window = np.concatenate([np.full(len(w.frames), k) for k, w in enumerate(windows)])[self.kept]
         runs = list(dict.fromkeys(w.run.name for w in windows))
         most = 1 + max(max(w.intervals) for w in windows)

@@ -190,7 +190,7 @@ class _Ensemble:
         p_WE = observe(self.structure, self.in_view, now, caps[:, None])[:, 0].numpy() + self.ground
         middle = p_WE.mean(axis=0)
         innovation, seen = self.run.observed[frame] - middle, p_WE - middle
-        white = np.maximum(self.run.noise, self.belief.noise) ** 2
+        white = self.run.sd_at(frame, self.belief.noise) ** 2
         # n frames of errors with this memory say as much as n / (1 + 2 persistence / since) independent ones
         variance = white * (1 + 2 * self.belief.persistence / since)
         weight = student_weights(innovation, seen, variance, self.belief.dof)

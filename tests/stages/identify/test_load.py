@@ -211,3 +211,7 @@ def test_guesses_of_hidden_caps_count_as_faults() -> None:
     assert np.flatnonzero(fault[3:, 2]).tolist() == list(range(12, 27))
     assert (found[10:15, 2] == 1).all()
     assert run_data(recording, known, "walk").quality == pytest.approx(quality)
+    known_to = run_data(without(recording, "caps"), camera, "walk").sd_at(np.array([5, 20]))
+    noise = run_data(recording, known, "walk").noise
+    assert known_to[0] == pytest.approx(np.maximum(noise, 0.001)) and known_to[1, 2, 1] == max(noise[2, 1], 0.006)
+    assert run_data(recording, known, "walk").observed_sd is None  # these caps were logged, not seen

@@ -94,6 +94,23 @@ def test_residuals_are_simulated_less_observed_over_the_noise(least: float) -> N
     np.testing.assert_allclose(found.residual, expected, atol=1e-8)
 
 
+def test_a_frame_that_is_known_less_weighs_less() -> None:
+    """Where a cap was hidden its own sd divides, with key frames alone as well; elsewhere the noise of the run does."""
+    sd = np.zeros((18, 6, 3))
+    sd[windows()[0].frames[-1], 2] = 0.1  # the key frame of interval 2
+    hidden = tuple(replace(one, run=replace(one.run, observed_sd=sd)) for one in windows())
+    for key_only in (False, True):
+        plain = problem(key_only=key_only)
+        made = CapResiduals(linear(), hidden, noise=1e-9, key_only=key_only)
+        ratio = made.evaluate(plain.z0, jacobian=False).residual / plain.evaluate(plain.z0, jacobian=False).residual
+        changed = ratio.reshape(-1, 6, 3)
+        frames = np.concatenate([one.frames[one.key] if key_only else one.frames for one in windows()])
+        at = frames == windows()[0].frames[-1]
+        np.testing.assert_allclose(changed[at][:, 2], np.tile(windows()[0].run.noise[2] / 0.1, (at.sum(), 1)))
+        changed[at, 2] = 1.0
+        np.testing.assert_allclose(changed, 1.0)
+
+
 def test_key_frames_alone_are_those_of_all() -> None:
     """key_only leaves the rows of the key frames, in their order; blocks and clusters follow."""
     everything, keys = problem(), problem(key_only=True)

@@ -115,6 +115,20 @@ def test_a_filter_that_expects_a_worse_tracker() -> None:
     assert rms(caps - truth()[0][frame]) < rms(run().observed[frame] - truth()[0][frame]) / 2
 
 
+def test_a_cap_that_is_hidden_counts_as_little_as_it_is_known() -> None:
+    """The frames in which one cap is off say that it is only known to 0.3 m: it pulls nobody any more, and the start
+    behind them is nearer to the truth, Gaussian errors or not."""
+    belief = replace(WHITE, dof=1e9, members=16)
+    sd = np.zeros_like(run().observed)
+    sd[WHILE, OFF] = 0.3
+    frame, theta = EACH * 2, predictor().mapping.theta(SPEED)
+    off = []
+    for one in (run(), replace(run(), observed_sd=sd)):
+        caps = end_caps(theta, start_states(one, predictor(), SPEED, COUNT, belief=belief)[2])[0].numpy()
+        off.append(rms(caps - truth()[0][frame]))
+    assert off[1] < off[0] / 2
+
+
 def test_what_no_frame_shows() -> None:
     """Rest lengths come out to 3 mm where the winches wound by 50 mm, and velocities of rods to 3 cm/s."""
     for k in (1, 2):

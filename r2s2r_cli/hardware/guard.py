@@ -197,10 +197,14 @@ class GuardedLink:
         return f"; this machine itself stood still for {pause * 1e3:.0f} ms of it" if now - end < STALE else ""
 
     def _hold(self, sample: Sample) -> Sample:
-        """The sample, with what is in doubt; where something newly is, after the motors were told to stop."""
+        """The sample, with what is in doubt; where something newly is, after all motors were told 0.
+
+        A command of zeros, not `stop`: the run is not over (the rig's hand would put the robot back in the midst of it).
+        """
         doubt = self._watch.doubt
         if doubt and not self._held:
-            self.stop()
+            self._moving = np.zeros_like(self._moving)
+            self.inner.command(self._moving)
         self._held = doubt
         return dataclasses.replace(sample, doubt=doubt) if doubt else sample
 

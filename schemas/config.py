@@ -113,6 +113,9 @@ class PlanSettings(Frozen):
     """Start poses for each draw, rest lengths anywhere in the tolerance of the controller; as many again after a gait."""
     sensor_sd_m: Annotated[float, Field(strict=True, ge=0, le=0.1)] = 0.004
     """Error of the length sensors [m], one standard deviation, drawn for every cable and draw but the first."""
+    doubt: Annotated[float, Field(strict=True, ge=0, le=1)] = 0.2
+    """Least standard deviation of a drawn number, as a share of that of its prior: an identification tells what noise
+    leaves open, and a simulator errs by more."""
     candidates: Annotated[int, Field(strict=True, ge=1, le=10_000)] = 60
     """Gaits of each behaviour that are judged on a few draws; a third of them is judged on all."""
     kept: Annotated[int, Field(strict=True, ge=1, le=1000)] = 10

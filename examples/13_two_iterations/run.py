@@ -29,28 +29,29 @@ def r2s2r(project: Path, *words: str, quiet: bool = True) -> None:
     subprocess.run([*COMMAND, *words, *(["--quiet"] if quiet else [])], cwd=project, check=True, stdout=sys.stderr)
 
 
+# One fit of few iterations, small searches: minutes. The range over starts and the profiles say how far a fit can be
+# trusted, and take as long again.
+SHORT: Mapping[str, Mapping[str, int]] = {
+    "identify": {"starts": 1, "profiles": 0, "max_iterations": 8},
+    "plan": {"draws": 4, "candidates": 24, "kept": 4, "beam": 100, "cycles": 3},
+}
+
+
 @dataclass(frozen=True)
 class Profile:
-    """How much is done. targets: of the random policy of iteration 1; repeats: of every policy, they make the floor;
+    """How much is done. targets: of the random policy of iteration 1; policies: executed in iteration 1, and those of
+    iteration 2, which are others so that nothing learned from them; repeats: of every policy, they make the floor;
     settings: of project.toml, by stage."""
 
-    targets: int = 12
-    policies: tuple[str, ...] = ("straight", "turn-counterclockwise")
+    targets: int = 10
+    policies: tuple[tuple[str, ...], tuple[str, ...]] = (
+        ("straight", "turn-clockwise"), ("arching", "turn-counterclockwise"),
+    )  # fmt: skip
     repeats: int = 2
-    # One fit: the range over starts and the profiles say how far it can be trusted, and take minutes.
-    settings: Mapping[str, Mapping[str, int]] = field(
-        default_factory=lambda: {"identify": {"starts": 1, "profiles": 0}}
-    )
+    settings: Mapping[str, Mapping[str, int]] = field(default_factory=lambda: SHORT)
 
 
-DEMO = Profile(
-    targets=8,
-    policies=("straight",),
-    settings={
-        "identify": {"starts": 1, "profiles": 0, "max_iterations": 8},
-        "plan": {"draws": 4, "candidates": 24, "kept": 4, "beam": 100, "cycles": 3},
-    },
-)  # fmt: skip
+DEMO = Profile(targets=8, policies=(("straight",), ("arching",)))
 """Minutes instead of a quarter of an hour: `make demo`."""
 
 
@@ -73,13 +74,13 @@ def prepared(out: Path, seed: int, profile: Profile) -> Path:
 
 def iterate(project: Path, number: int, seed: int, profile: Profile) -> None:
     """One iteration, the robot being the rig."""
-    names = [word for name in profile.policies for word in ("--policy", name)]
+    names = [word for name in profile.policies[number - 1] for word in ("--policy", name)]
     with rig(project) as robot:
         r2s2r(project, "run", "--iteration", str(number), *robot, "--random", str(profile.targets), "--seed", str(seed),
               *names, "--repeats", str(profile.repeats), "--yes", quiet=False)  # fmt: skip
 
 
-def compared(project: Path, models: Mapping[str, Path]) -> dict[str, object]:
+def compared(project: Path, models: Mapping[str, Path]) -> None:
     """The executed runs of both iterations beside these simulators and that of robot.toml; none named: those of both
     iterations. Kept as comparison.json."""
     words = [word for name, path in models.items() for word in ("--model", f"{name}={path}")]
@@ -87,7 +88,6 @@ def compared(project: Path, models: Mapping[str, Path]) -> dict[str, object]:
     done = subprocess.run(command, cwd=project, check=True, stdout=subprocess.PIPE, text=True)
     report: dict[str, object] = json.loads(done.stdout)["report"]
     (project / "comparison.json").write_text(json.dumps(report, indent=1), "utf-8")
-    return report
 
 
 def papers(project: Path) -> Path:
@@ -107,21 +107,27 @@ def papers(project: Path) -> Path:
     return found
 
 
-def measured(project: Path, *, paper: bool) -> list[Row]:
-    """The rows of one seed: runs of iteration 1, from which iteration 2 learned, and new ones of iteration 2."""
+def measured(project: Path, *, paper: bool) -> None:
+    """The comparison of one seed: runs of iteration 1, from which iteration 2 learned, and new ones of iteration 2."""
     found = {f"iteration {n}": project / "iterations" / f"{n:03d}" / "30-identify.h5" for n in (1, 2)}
-    models = {**found, "paper": papers(project)} if paper else {}
-    return list(rows_of(compared(project, models), project.name))
+    models = {**found, "the paper's preset": papers(project)} if paper else {}
+    compared(project, models)
+
+
+def rows_so_far(out: Path) -> list[Row]:
+    """The rows of all seeds that were ever finished in `out`."""
+    done = sorted(out.glob("seed-*/comparison.json"))
+    return [row for path in done for row in rows_of(json.loads(path.read_text("utf-8")), path.parent.name)]
 
 
 def main(out: Path, seeds: Sequence[int], profile: Profile, *, paper: bool, say: Callable[[str], None] = print) -> None:
-    """Everything, into `out`. say: where the table goes."""
-    found: list[Row] = []
+    """Everything, into `out`; a seed a call will do, the table is of all that are there. say: where it goes."""
     for seed in seeds:
         project = prepared(out, seed, profile)
         for number in (1, 2):
             iterate(project, number, seed, profile)
-        found += measured(project, paper=paper)
+        measured(project, paper=paper)
+        found = rows_so_far(out)
         say(f"\nafter seed {seed}: median (range) over {len({row.seed for row in found})} seeds")
         for line in summary(found):
             say(line)

@@ -13,7 +13,7 @@ import numpy as np
 import tomlkit
 
 COMMAND = [sys.executable, "-m", "r2s2r_cli"]
-FRICTION, SPEED, STIFFNESS, REST = (0.42, 0.6), (0.68, 0.82), (0.75, 1.35), (0.9, 1.0)
+FRICTION, SPEED, STIFFNESS, REST = (0.32, 0.45), (0.62, 0.75), (0.8, 1.25), (0.8, 0.9)
 """From where the truth is drawn: friction (0.76 in robot.toml); factors of the motors' speed, of stiffness and rest
 length of each passive tendon."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +25,9 @@ class Belief:
 
     model: found.Identified
     identified: bool
+    doubt: float = 0.0
+    """Least standard deviation of drawn numbers, as a share of that of their priors: what an identification states is
+    what noise leaves open, and a simulator errs by more than that."""
 
     @property
     def words(self) -> str:
@@ -33,7 +36,14 @@ class Belief:
 
     def draws(self, count: int, generator: np.random.Generator) -> np.ndarray:
         """Values (count, n): the first is the best one, the others are drawn; each within its bounds."""
-        return self.model.draws(count, int(generator.integers(2**31)))
+        prior = np.array([free.prior_sd for free in self.model.mapping.frees])
+        known = np.diag(self.model.covariance)
+        told = np.isfinite(prior) & np.isfinite(known)
+        least = np.zeros(len(prior))
+        least[told] = (self.doubt * prior[told]) ** 2 - known[told]
+        more = np.diag(np.maximum(least, 0.0))
+        model = replace(self.model, covariance=self.model.covariance + more)
+        return model.draws(count, int(generator.integers(2**31)))
 
 
 def assumed(robot: Robot) -> Belief:

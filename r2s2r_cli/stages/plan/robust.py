@@ -2,7 +2,8 @@
 
 The score is mean minus so many standard deviations of the reward over all pairs of drawn numbers and start poses; a
 gait that gives a target up, does not come back to rest, or not on its usual triangle, has earned nothing there. A gait
-that works in one simulator only loses to one that works in all of them.
+that works in one simulator only loses to one that works in all of them. One that ends here or there, as a tip-over on
+the brink does, is not fit for long policies: `Primitive.same_element` says it.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from r2s2r_cli.stages.plan.executor import Executor
 from r2s2r_cli.stages.plan.gaits import Gait, padded, run_gaits
-from r2s2r_cli.stages.plan.placement import Reference
+from r2s2r_cli.stages.plan.placement import Reference, wrapped
 from r2s2r_cli.stages.plan.rewards import Outcomes, Reward
 from r2s2r_cli.stages.plan.standing import Standing, stacked
 from schemas.robot import Robot
@@ -26,7 +27,7 @@ class Primitive:
 
     move: (3,) shift [m] of the centre of mass over the ground in the frame of the start and turn [rad] of the principal
     axis, means where it worked and ended on its usual triangle; move_sd: (3,) their standard deviations; element: that
-    triangle's symmetry; same_element: its share of the pairs that worked; duration: mean [s].
+    triangle's symmetry; same_element: share of the pairs that worked which ended on it, and not astray; duration: [s].
     """
 
     name: str
@@ -93,6 +94,23 @@ def steady(came: Outcomes, good: np.ndarray) -> tuple[int, np.ndarray]:
     return usual, good & (came.element == usual)
 
 
+STRAY_M, STRAY_RAD, STRAY_SHARE = 0.04, float(np.radians(10.0)), 0.2
+"""An end farther from the median of all ends than this, and this share of the way or turn: it tipped another way."""
+
+
+def usual_ends(moves: np.ndarray) -> np.ndarray:
+    """Which of the moves (B, 3), shift [m] and turn [rad], end where most do, (B,)."""
+    middle = np.median(moves[:, :2], axis=0)
+    far = np.linalg.norm(moves[:, :2] - middle, axis=1)
+    # The median of angles is that of their differences from a direction among them.
+    among = float(np.angle(np.exp(1j * moves[:, 2]).sum()))
+    turn = wrapped(moves[:, 2] - among)
+    usual = float(np.median(turn))
+    most_m = STRAY_M + STRAY_SHARE * np.linalg.norm(middle)
+    most_rad = STRAY_RAD + STRAY_SHARE * abs(float(wrapped(np.array(among + usual))))
+    return np.asarray((far <= most_m) & (np.abs(turn - usual) <= most_rad))
+
+
 def earned(reward: Reward, came: Outcomes, good: np.ndarray) -> np.ndarray:
     """Rewards (B,), 0 where the gait did not come back to rest, or on another triangle than it mostly does: what
     follows it would then go astray."""
@@ -110,8 +128,10 @@ def primitive(
     value = earned(reward, came, good)
     mean, sd = float(value.mean()), float(value.std())
     usual, of = steady(came, good)
-    shown = came.take(np.flatnonzero(of) if of.any() else np.arange(1))
-    moves = np.column_stack([shown.com[:, :2], shown.turn])
+    every = np.column_stack([came.com[:, :2], came.turn])
+    of[of] = usual_ends(every[of])
+    rows = np.flatnonzero(of) if of.any() else np.arange(1)
+    shown, moves = came.take(rows), every[rows]
     same = float(of.sum() / good.sum()) if good.any() else 0.0
     return Primitive(
         name, behaviour, gait, float(value[0]), mean, sd, mean - spread * sd, float(good.mean()), moves.mean(axis=0),

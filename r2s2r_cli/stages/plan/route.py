@@ -282,7 +282,7 @@ def _cells(paths: Paths) -> list[tuple[int, ...]]:
     return [tuple(row) for row in np.round(place).astype(int).tolist()]
 
 
-def without_rare(primitives: Sequence[Primitive], least: float = 0.9) -> list[Primitive]:
+def without_rare(primitives: Sequence[Primitive], least: float = 0.95) -> list[Primitive]:
     """Primitives fit for sequences: they come back to rest, on one and the same triangle, nearly always; each gait
     once. Where none is, all."""
     fit = [one for one in primitives if one.worked * one.same_element >= least] or list(primitives)

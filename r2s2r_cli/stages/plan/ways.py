@@ -10,7 +10,7 @@ import numpy as np
 
 from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.plan.long import Walk, walks
-from r2s2r_cli.stages.plan.robust import Primitive
+from r2s2r_cli.stages.plan.robust import Primitive, usual_ends
 from r2s2r_cli.stages.plan.route import (
     LONG,
     Goal,
@@ -24,11 +24,15 @@ from r2s2r_cli.stages.plan.route import (
     way_to,
     without_rare,
 )
+from r2s2r_cli.stages.plan.standing import Standing
 from r2s2r_cli.stages.plan.world import Progress, Request, World
 from schemas.config import PlanSettings
 
 SEQUENCES = 4
 """Sequences of gaits that are tried for each long policy."""
+ASTRAY = 2.0
+"""[m] or [rad] that a sequence may be worth less for ending where it should from all drawn numbers and starts: the loss
+where none of them ends where most do."""
 LOST = -10.0
 """Worth of a sequence in which the robot gives a target up or leaves its area: less than any other."""
 MARGIN = 0.9
@@ -64,22 +68,33 @@ def ways(
         tried += [(name, path) for path in different_sequences(moves, partial(_way_or_none, goal), SEQUENCES)]
     longest = max((path.picks.shape[1] for _, path in tried), default=0)
 
-    def walked_along(paths: list[tuple[str, Paths]], *, smooth: bool, part: str) -> list[Walk]:
+    def walked_along(paths: list[tuple[str, Paths]], start: Standing, *, smooth: bool, part: str) -> list[Walk]:
         sequences = [[fit[k] for k in path.picks[0]] for _, path in paths]
-        return walks(world.executor, world.reference, world.few, sequences, smooth=smooth,
+        return walks(world.executor, world.reference, start, sequences, smooth=smooth,
                      progress=lambda done: progress(part, done, longest))  # fmt: skip
 
     score: dict[str, tuple[float, Paths]] = {}
-    for (name, path), walk in zip(tried, walked_along(tried, smooth=False, part="sequences"), strict=True):
+    for (name, path), walk in zip(tried, walked_along(tried, world.pairs, smooth=False, part="sequences"), strict=True):
         came = walked(walk.way)
         away = (farthest(came) > request.reach) & (name not in request.goals)
         worth = np.where(walk.lost | away, LOST, values[name](came))
-        one = float(worth.mean() - settings.spread * worth.std())
+        one = float(worth.mean() - settings.spread * worth.std()) - ASTRAY * share_astray(walk)
         if name not in score or one > score[name][0]:
             score[name] = one, path
     chosen_paths = [(name, path) for name, (_, path) in score.items()]
-    made = walked_along(chosen_paths, smooth=settings.smooth, part="long policies")
+    made = walked_along(chosen_paths, world.few, smooth=settings.smooth, part="long policies")
     return [Way(name, path, walk) for (name, path), walk in zip(chosen_paths, made, strict=True)]
+
+
+def share_astray(walk: Walk) -> float:
+    """Share of the robots that gave a target up, or ended where most of the others did not."""
+    came = walked(walk.way)
+    moves = np.column_stack([came.xy[:, -1], came.heading[:, -1]])
+    good = ~walk.lost
+    if not good.any():
+        return 1.0
+    good[good] = usual_ends(moves[good])
+    return float(1.0 - good.mean())
 
 
 def _near(goal: Goal, paths: Paths) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +52,7 @@ class World:
         self, robot: Robot, request: Request, settings: PlanSettings, cache_dir: Path | None, threads: int
     ) -> None:
         generator = np.random.default_rng(request.seed)
-        draws = request.belief.draws(settings.draws, generator)
+        draws = replace(request.belief, doubt=settings.doubt).draws(settings.draws, generator)
         self.robot = robot
         group = symmetry_group(robot)
         shared: dict[str, Any] = {

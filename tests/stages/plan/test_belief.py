@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -25,6 +27,16 @@ def test_an_identification_is_believed() -> None:
     # The last is not identifiable, and its prior is flat: it stays where it is.
     assert np.allclose(draws[:, 3], 0.3, rtol=1e-12)
     assert (draws[:, 2] < 50.0).all() and belief.words == "30-identify.h5"
+
+
+def test_a_simulator_errs_by_more_than_noise_leaves_open() -> None:
+    """With doubt no number varies less than that share of its prior; what was known less well stays as it was."""
+    known = identified(robot(), identification(), "30-identify.h5")
+    doubted = replace(known, doubt=0.2).draws(4000, np.random.default_rng(0))
+    speed, friction = known.model.mapping.frees[0], known.model.mapping.frees[1]
+    spread = np.log(doubted[1:, :2]).std(axis=0)
+    assert np.allclose(spread, [max(0.0125, 0.2 * speed.prior_sd), max(0.08, 0.2 * friction.prior_sd)], rtol=0.05)
+    assert spread[0] > 2 * 0.0125 and np.allclose(doubted[0], known.draws(1, np.random.default_rng(0))[0])
 
 
 def test_without_one_the_priors_count() -> None:

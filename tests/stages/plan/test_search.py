@@ -10,7 +10,7 @@ from r2s2r_cli.stages.plan.alike import alike, carried, told_targets
 from r2s2r_cli.stages.plan.gaits import Gait, neighbours, run_gaits
 from r2s2r_cli.stages.plan.placement import turned
 from r2s2r_cli.stages.plan.rewards import BEHAVIOURS, Outcomes, reward_named
-from r2s2r_cli.stages.plan.robust import primitive
+from r2s2r_cli.stages.plan.robust import primitive, usual_ends
 from r2s2r_cli.stages.plan.search import Found, Search, SearchSettings, best_of
 from tests.stages.plan.planted import bench
 
@@ -118,6 +118,18 @@ def test_a_gait_that_works_in_one_simulator_only_loses() -> None:
     broken = primitive("c", "forward", reward, gait, outcome(forward=[0.3] * 4), np.array([True, False, False, True]),
                        spread=1.0)  # fmt: skip
     assert np.isclose(broken.mean, 0.15) and broken.worked == 0.5
+
+
+def test_a_gait_on_the_brink_of_tipping_is_not_steady() -> None:
+    """Ends in two heaps: those far from the median are astray, whatever they earn; scatter of the size of a gait is
+    not, nor the side of half a turn on which an angle lies."""
+    gait, reward, good = Gait(np.ones((1, 6))), BEHAVIOURS["forward"], np.ones(5, dtype=bool)
+    brink = primitive("a", "forward", reward, gait, outcome(forward=[0.3, 0.3, 0.31, 0.1, 0.45]), good, spread=1.0)
+    assert np.isclose(brink.same_element, 0.6) and np.isclose(brink.move[1], 0.91 / 3) and brink.worked == 1.0
+    apart = primitive("b", "forward", reward, gait, outcome(forward=[0.3, 0.28, 0.33, 0.26, 0.31]), good, spread=1.0)
+    assert apart.same_element == 1.0
+    turns = np.array([[0.0, 0.0, np.pi - 0.01], [0.0, 0.0, -np.pi + 0.01], [0.0, 0.0, np.pi - 0.02], [0.0, 0.0, 1.0]])
+    assert usual_ends(turns).tolist() == [True, True, True, False]
 
 
 def sideways(came: Outcomes) -> np.ndarray:

@@ -72,12 +72,11 @@ def prepared(out: Path, seed: int, profile: Profile) -> Path:
     return project
 
 
-def iterate(project: Path, number: int, seed: int, profile: Profile) -> None:
-    """One iteration, the robot being the rig."""
+def iterate(project: Path, number: int, seed: int, profile: Profile, robot: Sequence[str]) -> None:
+    """One iteration. robot: the options that name it."""
     names = [word for name in profile.policies[number - 1] for word in ("--policy", name)]
-    with rig(project) as robot:
-        r2s2r(project, "run", "--iteration", str(number), *robot, "--random", str(profile.targets), "--seed", str(seed),
-              *names, "--repeats", str(profile.repeats), "--yes", quiet=False)  # fmt: skip
+    r2s2r(project, "run", "--iteration", str(number), *robot, "--random", str(profile.targets), "--seed", str(seed),
+          *names, "--repeats", str(profile.repeats), "--yes", quiet=False)  # fmt: skip
 
 
 def compared(project: Path, models: Mapping[str, Path]) -> None:
@@ -124,8 +123,10 @@ def main(out: Path, seeds: Sequence[int], profile: Profile, *, paper: bool, say:
     """Everything, into `out`; a seed a call will do, the table is of all that are there. say: where it goes."""
     for seed in seeds:
         project = prepared(out, seed, profile)
-        for number in (1, 2):
-            iterate(project, number, seed, profile)
+        # One robot for both: its first run, and no other, begins as robot.toml says and not as a run leaves it.
+        with rig(project) as robot:
+            for number in (1, 2):
+                iterate(project, number, seed, profile, robot)
         measured(project, paper=paper)
         found = rows_so_far(out)
         say(f"\nafter seed {seed}: median (range) over {len({row.seed for row in found})} seeds")

@@ -78,7 +78,7 @@ def first_fit(task: Task, predictor: Predictor, kept: Kept) -> Fit:
         predictor.rollouts = saved["rollouts"]
     return fit(
         task.runs, task.request.train, predictor, task.recipe, seed=task.request.seed, progress=told, checkpoint=hold,
-        resume=resume,
+        resume=resume, near=None if task.held else task.near,  # with numbers held it was another fit
     )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
-from r2s2r_cli.stages.identify.rounds import Fit, first_round, later_round
+from r2s2r_cli.stages.identify.rounds import Fit, Near, first_round, later_round
 from r2s2r_cli.stages.identify.solve.record import Checkpoint, Progress
 from r2s2r_cli.stages.identify.training import filtered_windows, training_windows
 
@@ -36,11 +36,13 @@ def fit(
     progress: Told | None = None,
     checkpoint: Kept | None = None,
     resume: tuple[int, np.ndarray, Checkpoint | None] | None = None,
+    near: Near | None = None,
 ) -> Fit:
     """Fit the free parameters of `predictor` to the training intervals.
 
     begin: values (n,) to start from, default those of the free parameters. known: see `training_windows`; where every
-    window starts known there is one round. resume is what the last checkpoint was called with.
+    window starts known there is one round. resume is what the last checkpoint was called with. near: of these training
+    intervals, predictor, recipe and values, where the beginning was made already.
 
     Raises NumericalError where nothing can be simulated, InputError for runs that cannot be started.
     """
@@ -62,7 +64,7 @@ def fit(
         keep = None if checkpoint is None else partial(checkpoint, number, values)
         if number == 0:
             found = first_round(predictor, windows, values, recipe, seed=seed, progress=hear, checkpoint=keep,
-                                resume=inner)  # fmt: skip
+                                resume=inner, near=near)  # fmt: skip
             if found.problem.exact or all(one.known for one in windows):
                 break  # the model explains the data, or there is nothing to make again
         else:

@@ -50,6 +50,16 @@ MOST_UNKNOWNS = 40
 
 
 @dataclass(frozen=True)
+class Near:
+    """What derivatives reach over the intervals that they can be trusted with, with what they said on the way, and how
+    many windows that simulated."""
+
+    solution: Solution
+    said: tuple[Progress, ...]
+    rollouts: int
+
+
+@dataclass(frozen=True)
 class Fit:
     """A finished fit. problem: at its last start states; solution: in its unknowns; values: (n,), units. drawn: their
     covariance as candidates showed it, None where none were drawn."""
@@ -70,21 +80,30 @@ def first_round(
     progress: Callable[[Progress], None] | None = None,
     checkpoint: Callable[[Checkpoint], None] | None = None,
     resume: Checkpoint | None = None,
+    near: Near | None = None,
 ) -> Fit:
     """From far off, over growing horizons: derivatives lead near, a population goes on where they mislead.
 
-    With many start states that are free there is no population, and derivatives go on to the end. Raises as `fit`.
+    With many start states that are free there is no population, and derivatives go on to the end. near: what `near_fit`
+    found for the same windows and values, which is not computed again. Raises as `fit`.
     """
     frees, loss = predictor.mapping.frees, LOSSES[recipe.loss]
-    names, stages, near = _stages(predictor, windows, recipe)
+    names, stages, count = _stages(predictor, windows, recipe)
     problem = stages[-1]
     few = len(moving_of(problem)) <= MOST_UNKNOWNS
-    smooth = near if few else len(stages)
+    smooth = count if few else len(stages)
     last = Limits(max_iterations=recipe.max_iterations, tolerance=FROM_AFAR, step_sd=0.05)
-    solution = solve_growing(
-        list(zip(names, stages, strict=True))[:smooth], started(problem, values), loss=loss, early=EARLY_HORIZONS,
-        last=BEFORE_POPULATION if few else last, progress=progress, checkpoint=checkpoint, resume=resume,
-    )  # fmt: skip
+    if near is not None and few and resume is None:
+        solution = near.solution
+        predictor.rollouts += near.rollouts
+        if progress is not None:
+            for one in near.said:
+                progress(one)
+    else:
+        solution = solve_growing(
+            list(zip(names, stages, strict=True))[:smooth], started(problem, values), loss=loss, early=EARLY_HORIZONS,
+            last=BEFORE_POPULATION if few else last, progress=progress, checkpoint=checkpoint, resume=resume,
+        )  # fmt: skip
     if few:
         cooling = Cooling(members=members_for(problem))
         led = Begin(solution.z, solution.normal, min(smooth, len(stages) - 1))
@@ -102,13 +121,16 @@ def first_round(
     return Fit(problem, solution, values_of(frees, solution.z[: len(frees)]))
 
 
-def cost_near(predictor: Predictor, windows: Sequence[Window], values: np.ndarray, recipe: Recipe) -> float:
-    """What derivatives reach over the intervals that they can be trusted with. Raises as `fit`."""
-    names, stages, near = _stages(predictor, windows, recipe)
-    return solve_growing(
-        list(zip(names, stages, strict=True))[:near], started(stages[-1], values), loss=LOSSES[recipe.loss],
-        early=EARLY_HORIZONS, last=BEFORE_POPULATION,
-    ).cost  # fmt: skip
+def near_fit(predictor: Predictor, windows: Sequence[Window], values: np.ndarray, recipe: Recipe) -> Near:
+    """The beginning of the first round alone. Raises as `fit`."""
+    names, stages, count = _stages(predictor, windows, recipe)
+    said: list[Progress] = []
+    before = predictor.rollouts
+    solution = solve_growing(
+        list(zip(names, stages, strict=True))[:count], started(stages[-1], values), loss=LOSSES[recipe.loss],
+        early=EARLY_HORIZONS, last=BEFORE_POPULATION, progress=said.append,
+    )  # fmt: skip
+    return Near(solution, tuple(said), predictor.rollouts - before)
 
 
 def later_round(

@@ -40,7 +40,7 @@ def self_tested(
 
     def once(planted: Sequence[RunData]) -> Fitted:
         before = predictor.rollouts
-        own, _ = holding(replace(task, runs=planted), predictor)
+        own, _ = holding(replace(task, runs=planted, near=None), predictor)
         made = first_fit(own, predictor, Kept(None))
         near = made.solution.z[None, : len(frees)]
         sure = sureness(made, near, loss=own.recipe.loss, seed=request.seed)

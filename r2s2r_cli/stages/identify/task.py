@@ -17,6 +17,7 @@ from r2s2r_cli.stages.identify.free.extend import PLUS, extended, name_of
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe, default_fixed, default_free, recipe_of
 from r2s2r_cli.stages.identify.request import Checkpoint, Progress, Request, silent
+from r2s2r_cli.stages.identify.rounds import Near
 from schemas.config import IdentifySettings
 from schemas.robot import Robot
 
@@ -41,6 +42,8 @@ class Task:
     """Free parameters that the training intervals do not show."""
     stock: bool = False
     """Winched cables as robot.toml has them, although the default set goes with softer ones (`cables.py`)."""
+    near: Near | None = None
+    """The beginning of the default fit, where choosing between them has made it."""
 
     @property
     def recipe(self) -> Recipe:

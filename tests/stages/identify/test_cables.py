@@ -34,6 +34,7 @@ def test_the_cables_that_the_robot_has_are_found(tmp_path: Path, softer: bool) -
     found = with_cables(task(tmp_path, softer=softer))
     assert found.stock is not softer
     assert found.given == (dict(SOFTER) if softer else {})
+    assert found.near is not None and found.near.rollouts > 0 and np.isfinite(found.near.solution.cost)
 
 
 @pytest.mark.parametrize(

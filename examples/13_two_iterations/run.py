@@ -41,7 +41,7 @@ SHORT: Mapping[str, Mapping[str, int]] = {
 class Profile:
     """How much is done. targets: of the random policy of iteration 1; policies: executed in iteration 1, and those of
     iteration 2, which are others so that nothing learned from them; repeats: of every policy, they make the floor;
-    settings: of project.toml, by stage."""
+    settings: of project.toml, by stage; draw: pictures and pages of every stage."""
 
     targets: int = 10
     policies: tuple[tuple[str, ...], tuple[str, ...]] = (
@@ -49,9 +49,10 @@ class Profile:
     )  # fmt: skip
     repeats: int = 2
     settings: Mapping[str, Mapping[str, int]] = field(default_factory=lambda: SHORT)
+    draw: bool = False
 
 
-DEMO = Profile(targets=8, policies=(("straight",), ("arching",)))
+DEMO = Profile(targets=8, policies=(("straight",), ("arching",)), draw=True)
 """Minutes instead of a quarter of an hour: `make demo`."""
 
 
@@ -76,7 +77,7 @@ def iterate(project: Path, number: int, seed: int, profile: Profile, robot: Sequ
     """One iteration. robot: the options that name it."""
     names = [word for name in profile.policies[number - 1] for word in ("--policy", name)]
     r2s2r(project, "run", "--iteration", str(number), *robot, "--random", str(profile.targets), "--seed", str(seed),
-          *names, "--repeats", str(profile.repeats), "--yes", quiet=False)  # fmt: skip
+          *names, "--repeats", str(profile.repeats), "--yes", *([] if profile.draw else ["--no-draw"]), quiet=False)  # fmt: skip
 
 
 def compared(project: Path, models: Mapping[str, Path]) -> None:

@@ -76,8 +76,9 @@ def prepared(out: Path, seed: int, profile: Profile) -> Path:
 def iterate(project: Path, number: int, seed: int, profile: Profile, robot: Sequence[str]) -> None:
     """One iteration. robot: the options that name it."""
     names = [word for name in profile.policies[number - 1] for word in ("--policy", name)]
-    r2s2r(project, "run", "--iteration", str(number), *robot, "--random", str(profile.targets), "--seed", str(seed),
-          *names, "--repeats", str(profile.repeats), "--yes", *([] if profile.draw else ["--no-draw"]), quiet=False)  # fmt: skip
+    words = ["--random", str(profile.targets), "--seed", str(seed), *names, "--repeats", str(profile.repeats), "--yes"]
+    words += [] if profile.draw else ["--no-draw"]
+    r2s2r(project, "run", "--iteration", str(number), *robot, *words, quiet=False)
 
 
 def compared(project: Path, models: Mapping[str, Path]) -> None:

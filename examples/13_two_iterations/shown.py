@@ -12,13 +12,16 @@ import json
 import math
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 from typing import Any
 
-from world import COMMAND
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+from world import COMMAND  # noqa: E402 - beside this file
 
 
 @dataclass(frozen=True)

@@ -72,3 +72,18 @@ def test_the_table_says_by_what_the_gap_fell() -> None:
     assert "200.00 (200.00 .. 200.00)" in lines[1]
     (blind,) = [r for r in table.rows_of(report(0.04, 0.0, None), "0") if r.measure == "com_end_m" and r.error]
     assert blind.falls("iteration 2") is None
+
+
+def test_prior_and_truth_are_apart_by_so_many_floors() -> None:
+    """A line a policy and the median over all; without a floor no number of floors is told."""
+    shown = loaded("shown")
+    floors = {"com_end_m": 6.0, "heading_end_rad": None, "segment_s": 2.0}
+    found = [
+        shown.Apart("seed-0", 1, "straight", 0.06, math.radians(4.0), 0.2, floors),
+        shown.Apart("seed-0", 2, "arching", 0.03, 0.1, 0.3, {**floors, "com_end_m": 4.0}),
+    ]
+    _, first, _, whole = shown.lines(found)
+    assert "60.0 mm (6.0)" in first and "4.0 deg (-)" in first and "0.20 s a segment (2.0)" in first
+    assert "median 45 mm, 5.0 floors (4.0 .. 6.0)" in whole
+    blind = [shown.Apart("seed-0", 1, "straight", 0.06, 0.1, 0.2, dict.fromkeys(floors))]
+    assert len(list(shown.lines(blind))) == 2

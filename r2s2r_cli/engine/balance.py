@@ -35,9 +35,10 @@ class Balance:
     unbalanced: Tensor
 
 
-def balance(structure: Structure, theta: Parameters, state: State) -> Balance:
+def balance(structure: Structure, theta: Parameters, state: State, *, loose: Tensor | None = None) -> Balance:
     """Tensions of the winched cables (at least 0) and ground forces (pushing only) with the least unbalanced force.
 
+    loose: winched cables that are known to pull at nothing, (B, actuated) bool.
     Passive cables pull as their lengths say. Frame G; velocities are ignored; friction is not limited here, because
     what slides is for the simulation to decide. Projected gradients with Nesterov's momentum.
     """
@@ -55,7 +56,8 @@ def balance(structure: Structure, theta: Parameters, state: State) -> Balance:
         if structure.tendons:
             own[:, winched] = (theta.tendon_stiffness * torch.relu(rows.length - theta.tendon_rest))[:, winched]
         cables = _cable_wrenches(structure, rods, rows)
-        matrix = torch.cat([cables[..., winched], _ground_wrenches(structure, theta, rods)], dim=-1)
+        pulling = cables[..., winched] if loose is None else cables[..., winched] * ~loose[:, None]
+        matrix = torch.cat([pulling, _ground_wrenches(structure, theta, rods)], dim=-1)
         weight = (theta.mass[..., None] * theta.gravity[:, None]).expand_as(rods.p)
         load = torch.cat([weight, torch.zeros_like(rods.w)], dim=-1).flatten(1) + (cables @ own[..., None])[..., 0]
         x = _least(matrix, load, structure)

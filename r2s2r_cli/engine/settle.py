@@ -31,6 +31,9 @@ SPELL = 0.005
 CALM = 30.0
 """[1/s] times what the cables lack: the winches turn at an energy peak below this speed. A winch that follows a moving
 robot pumps energy into it: turned at every look, 8 of 8 noisy starts never came to rest."""
+LOOSE = 1e-2
+"""[m] A cable whose rest length exceeds the observed distance by more than this, which is more than noise, hangs loose,
+whatever tension would balance the pose."""
 TURNED = 1e-6
 """[m] winches that would turn by less have the observed lengths."""
 
@@ -131,11 +134,13 @@ def window_state(
     *,
     v_WE: Tensor | None = None,
     relax_roll: bool = False,
+    loose: float = LOOSE,
 ) -> State:
     """The state at the start of a window from observed caps (B, cap, 3) [m] and a simulated state at that time.
 
     carried: gives roll (turned by the smallest rotation on to the observed axes), the rest lengths of slack winched
-    cables, effect states, and velocities where v_WE (B, cap, 3) [m/s] is None. Tensions balance the observed pose.
+    cables, effect states, and velocities where v_WE (B, cap, 3) [m/s] is None. Tensions balance the observed pose, but
+    cables longer than seen by more than `loose` [m] hang.
     """
     structure = simulator.structure
     _check("p_WE", p_WE, (2 * structure.n_rods, 3))
@@ -150,7 +155,7 @@ def window_state(
     state = lowered(seen, state, only_up=True)
     if relax_roll:
         state = roll_relaxed(simulator, theta, state)
-    state = consistent(structure, theta, state, slack=rest)
+    state = consistent(structure, theta, state, slack=rest, margin=loose)
     v, w = (carried.v_WB, carried.w_R) if v_WE is None else _velocities(seen, state, v_WE)
     memory = {name: x.expand(len(p_WE), *x.shape[1:]) for name, x in carried.extra.items()}
     return replace(
@@ -167,22 +172,26 @@ def lowered(theta: Parameters, state: State, *, only_up: bool = False) -> State:
     return replace(state, p_WB=state.p_WB - down[:, None])
 
 
-def consistent(structure: Structure, theta: Parameters, state: State, slack: Tensor | None = None) -> State:
+def consistent(
+    structure: Structure, theta: Parameters, state: State, slack: Tensor | None = None, margin: float = LOOSE
+) -> State:
     """The state with rest lengths under which the winched cables have the balancing tensions.
 
-    slack: rest lengths that slack cables keep where they are long enough (a winch that paid out).
+    slack: rest lengths of before. A cable that they leave loose by more than margin [m] stays so, and pulls at nothing;
+    one that turns out to have no tension keeps them where they are long enough (a winch that paid out).
     """
     winched = list(structure.actuated)
-    tension = balance(structure, theta, state).tension[:, winched]
     reading = read(structure, theta, resting(state))
-    theta = effective(structure, theta)
+    seen = effective(structure, theta)
     # What effects add to the rest length comes off what the winches have to give.
-    added = rest_lengths(structure, theta, state.rest)[:, winched] - state.rest
+    added = rest_lengths(structure, seen, state.rest)[:, winched] - state.rest
     length = reading.length[:, winched] - added
-    stretched = length - tension / theta.stiffness[:, winched]
-    if slack is not None:
-        stretched = torch.where(tension > 0, stretched, torch.maximum(slack, length))
-    return replace(state, rest=torch.minimum(torch.maximum(stretched, theta.rest_min), theta.rest_max))
+    loose = None if slack is None else slack > length + margin
+    tension = balance(structure, theta, state, loose=loose).tension[:, winched]
+    stretched = length - tension / seen.stiffness[:, winched]
+    if slack is not None and loose is not None:
+        stretched = torch.where((tension > 0) & ~loose, stretched, torch.maximum(slack, length))
+    return replace(state, rest=torch.minimum(torch.maximum(stretched, seen.rest_min), seen.rest_max))
 
 
 def _velocities(theta: Parameters, state: State, v_WE: Tensor) -> tuple[Tensor, Tensor]:

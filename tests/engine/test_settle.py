@@ -315,6 +315,19 @@ def test_winches_that_paid_out_stay_paid_out() -> None:
     torch.testing.assert_close(found.rest[0, ~slack], (length - tension / 2000.0)[~slack], rtol=0, atol=1e-9)
 
 
+def test_noise_does_not_pull_a_hanging_cable_taut() -> None:
+    """Cables that hang 30 mm loose stay so under 2 mm of noise, though a little tension would balance the noisy pose."""
+    robot, (carried, p_WE) = subject(), midway()
+    length = read(robot.structure, robot.theta, carried).length[:, robot.winched]
+    hanging = torch.tensor([[True, False, False, True, False, False]])
+    paid_out = replace(carried, rest=torch.where(hanging, length + 0.03, carried.rest))
+    seen = noise(p_WE, 0.002, batch=8, seed=3)
+    found = window_state(robot.simulator, robot.theta, seen, paid_out)
+    assert torch.equal(found.rest[:, hanging[0]], paid_out.rest[:, hanging[0]].expand(8, -1))
+    tight = window_state(robot.simulator, robot.theta, seen, paid_out, loose=0.1)
+    assert float((tight.rest - paid_out.rest)[:, hanging[0]].min()) < -0.02
+
+
 def test_a_window_starts_without_a_jump() -> None:
     """Rest lengths carried as they are make of 2 mm of noise a jump of 10 to 20 g in the first ms (2000 N/m cables);
     consistent tensions leave what the passive cables do: a fifth over 16 draws, and less in every single one."""

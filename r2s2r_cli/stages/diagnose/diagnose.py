@@ -122,12 +122,9 @@ def diagnose(
     sd = compared.refit.sd
     return Diagnosis(
         robot=evidence.robot.name, floor=fitted.floor, parity=said, where=found, which=compared.which, much=shrunk,
-        next_gait=after, refit={
-            name: (float(value), float(sd[k]))
-            for k, (name, value) in enumerate(
-                zip(compared.arena.names[: compared.arena.shared], compared.base.z, strict=False)
-            )
-        },
+        next_gait=after,
+        refit={name: (float(z), float(sd[k])) for k, (name, z) in enumerate(
+            zip(compared.arena.names, compared.base.z, strict=True))},
         segments=_segments(compared), within_run=evidence.within_run, rollouts=replayer.rollouts,
         warnings=(*fitted.warnings, *compared.which.warnings),
     )  # fmt: skip
@@ -150,8 +147,15 @@ def _segments(compared: Compared) -> tuple[SegmentSeen, ...]:
 
     refit = compared.refit
     best = compared.scores[0] if compared.scores else None
-    size = np.array([white.size for white in compared.arena.white])
-    p = chi2.sf(refit.misfit * size, size)
+    arena = compared.arena
+    place = {(one.run, one.interval): k for k, one in enumerate(arena.whole)}
+    size, square = np.zeros(len(place)), np.zeros(len(place))
+    for one, white, misfit in zip(arena.many, arena.white, refit.misfit, strict=True):
+        k = place.get((one.run, one.interval))
+        if k is not None:
+            size[k] += white.size
+            square[k] += white.size * misfit
+    p = chi2.sf(square, size)
     gap = discoveries(np.where(np.isfinite(p), p, 0.0), FALSE)
     return tuple(
         SegmentSeen(
@@ -161,10 +165,10 @@ def _segments(compared: Compared) -> tuple[SegmentSeen, ...]:
             t=(one.window.start, float(one.t[-1])),
             refit=float(np.sqrt(refit.squared[k])),
             effect=None if best is None else float(np.sqrt(best.squared[k])),
-            misfit=float(refit.misfit[k]),
+            misfit=float(square[k] / size[k]),
             gap=bool(gap[k]),
             key=one.caps[-1],
             error=refit.key[k],
         )
-        for k, one in enumerate(compared.arena.many)
+        for k, one in enumerate(arena.whole)
     )

@@ -13,9 +13,9 @@ from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run
 from r2s2r_cli.stages.diagnose.starts import Starts, as_smoothed
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
+from r2s2r_cli.stages.diagnose.which.pieces import pieces
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
-from r2s2r_cli.stages.diagnose.which.score import LOST_M
-from r2s2r_cli.stages.diagnose.which.stretches import Stretch, stretches
+from r2s2r_cli.stages.diagnose.which.stretches import stretches
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.measures.floor import floor_of
 from r2s2r_cli.stages.measures.steps import steps_of
@@ -33,10 +33,10 @@ NO_FLOOR_M = 1e-4
 FROZEN = 1e8
 """Times its prior's precision that a nuisance has which is not fitted."""
 JACOBIANS = 2
-"""Times that derivatives are taken anew for one set of start states."""
+"""Times that derivatives are taken anew with the last start states."""
 AGED_ENGINE = 0.05
 """The same of what stands for another engine's numerics, or how the robot was built: that does not age."""
-AGED = 0.5
+AGED = 0.2
 """Of a nuisance's own prior: how far it may have moved since the healthy runs."""
 
 Told = Callable[[str, int, int], None]
@@ -88,12 +88,12 @@ def refit(
         simulator, noise = _calibrated(arena, base) if with_floor else (simulator, noise)
         arena.whiten(floor_m=simulator, noise=noise)
         prior = _posterior(arena, base)
-        begin = base.z[: arena.shared]
+        begin = base.z
         keep("healthy", base.z.tolist())
         if evidence.floor is None:
-            sensor = float(np.sqrt(np.mean([np.sum(one.noise[-1] ** 2, axis=-1).mean() for one in arena.many])))
+            sensor = float(np.sqrt(np.mean([np.sum(one.noise[-1] ** 2, axis=-1).mean() for one in arena.whole])))
             ends = Fits(arena)
-            key = arena.ends(ends.values(base.hypothesis, base.z[None], np.zeros((1, 0))), base.z[None])[0]
+            key = arena.keys(ends.values(base.hypothesis, base.z[None], np.zeros((1, 0))), base.z[None])[0]
             squared = np.sum(key**2, axis=-1).mean(axis=-1)
             usual = squared[squared <= np.quantile(squared, KEPT)]
             rmse = float(np.sqrt(np.mean(usual)))
@@ -105,10 +105,9 @@ def refit(
         arena, base = _frozen(arena, base, prior)
     keep("refit", base.z.tolist())
     asked = sum(len(one.intervals) for one in evidence.fit)
-    if len(arena.many) < asked:
+    if len(arena.whole) < asked:
         warnings.append(
-            f"{asked - len(arena.many)} of {asked} intervals to fit were left out: the robot tips over in them, or "
-            "they could not be simulated from where they start"
+            f"{asked - len(arena.whole)} of {asked} intervals have no key frame: the robot tips over as they begin"
         )
     return Refit(arena, base, floor, tuple(warnings))
 
@@ -164,19 +163,16 @@ def _fitted(
             values[list(model.nuisances)] = z[: len(model.nuisances)]
         states = starts.at([named[name] for name in last], replayer, values, last)
         states = as_smoothed(states, runs, replayer, values)
-        many = stretches(runs, part, states)
-        if not many:
+        whole = stretches(runs, part, states)
+        many = pieces(runs, part, states, replayer, values)
+        if not whole:
             raise InputError(
                 "the robot tips over in every interval: nothing can be fitted", where="--train",
                 expected="an interval without a tip-over", received="none", hint="r2s2r diagnose --also N",
             )  # fmt: skip
-        arena = Arena(replayer, many, floor_m=simulator, noise=noise, prior=prior)
+        arena = Arena(replayer, many, floor_m=simulator, noise=noise, prior=prior, whole=whole)
         z = _begun(arena, z)
-        kept = _simulated(arena, z)
-        if 2 <= len(kept) < len(many):
-            arena = Arena(replayer, kept, floor_m=simulator, noise=noise, prior=prior)
-            z = _begun(arena, z[: arena.shared])
-        for _ in range(JACOBIANS):
+        for _ in range(JACOBIANS if number == rounds - 1 else 1):
             arena.prepare(z)
             fits = Fits(arena)
             residual = arena.residuals(arena.values(z[None]), z[None])[0]
@@ -188,18 +184,11 @@ def _fitted(
     return arena, base
 
 
-def _simulated(arena: Arena, z: np.ndarray) -> list[Stretch]:
-    """The stretches that the nominal simulator does not throw across the room: where a start is tangled, nothing can be
-    learned from what follows."""
-    away = np.abs(arena.ends(arena.values(z[None]), z[None])[0]).max(axis=(1, 2))
-    return [one for one, far in zip(arena.many, away, strict=True) if far < LOST_M]
-
-
 def _frozen(arena: Arena, base: Fit, prior: tuple[np.ndarray, np.ndarray] | None) -> tuple[Arena, Fit]:
     """The arena in which no nuisance can move from its prior."""
     del base
-    z = arena.mean.copy() if prior is None else np.concatenate([prior[0], arena.mean[len(prior[0]) :]])
-    arena.mean, arena.precision = z, FROZEN * arena.precision
+    z = arena.mean.copy()
+    arena.precision = FROZEN * arena.precision
     arena.prepare(z)
     residual = arena.residuals(arena.values(z[None]), z[None])[0]
     return arena, Fits(arena).begin(Hypothesis(), z, np.zeros(0), residual)
@@ -207,11 +196,7 @@ def _frozen(arena: Arena, base: Fit, prior: tuple[np.ndarray, np.ndarray] | None
 
 def _begun(arena: Arena, z: np.ndarray | None) -> np.ndarray:
     """Nuisances to begin with: those of before, as far as they are the same ones; else the prior's."""
-    found = arena.mean.copy()
-    if z is not None:
-        count = len(z) if len(z) == len(found) else arena.shared
-        found[:count] = z[:count]
-    return np.clip(found, arena.lower, arena.upper)
+    return np.clip(z if z is not None and len(z) == len(arena.mean) else arena.mean, arena.lower, arena.upper)
 
 
 def _calibrated(arena: Arena, base: Fit) -> tuple[float, float]:
@@ -238,9 +223,8 @@ def _posterior(arena: Arena, base: Fit) -> tuple[np.ndarray, np.ndarray]:
         base.hypothesis, base.z, base.x, arena.residuals(arena.values(base.z[None]), base.z[None])[0]
     )  # fmt: skip
     H, _ = fits.normal(again)
-    n = arena.shared
     own = [arena.model.numbers[k].kind == "own" for k in arena.engine]
-    share = np.full(n, AGED)
+    share = np.full(len(base.z), AGED)
     share[: len(own)] = np.where(own, AGED_ENGINE, AGED)
-    aged = np.diag(share**2 / np.diag(arena.precision)[:n])
-    return base.z[:n], np.linalg.inv(np.linalg.inv(H)[:n, :n] + aged)
+    aged = np.diag(share**2 / np.diag(arena.precision))
+    return base.z, np.linalg.inv(np.linalg.inv(H) + aged)

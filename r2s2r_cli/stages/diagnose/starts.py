@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 APART_S = 0.25
 """Frames that the filter looks at are at least so far apart: by its own belief errors of a tracker last 0.5 s, and
 frames nearer than that say little more."""
+LOOSE_SD, LOOSE_M = 3.0, 3e-3
+"""Standard deviations of a distance, and the least, beyond which a cable hangs."""
 
 
 class Starts:
@@ -72,16 +74,33 @@ def as_smoothed(
     theta = predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64))
     up = np.array([0.0, 0.0, predictor.mapping.observation(values).ground_height])
     named = {run.name: run.caps for run in runs}
-    found = {}
+    at = [(named[name], int(named[name].intervals.first[number - 1])) for name, number in states]
+    if not at:
+        return {}
     with torch.no_grad():
-        for (name, number), state in states.items():
-            run = named[name]
-            frame = int(run.intervals.first[number - 1])
-            found[name, number] = window_state(
-                predictor.simulator, theta, torch.as_tensor(run.p_WE[frame] - up)[None], state,
-                v_WE=torch.as_tensor(run.v_WE[frame])[None],
-            )  # fmt: skip
-    return found
+        found = window_state(
+            predictor.simulator, theta, torch.as_tensor(np.array([run.p_WE[frame] - up for run, frame in at])),
+            batched(list(states.values())), loose=float(np.mean([loose(run, frame) for run, frame in at])),
+            v_WE=torch.as_tensor(np.array([run.v_WE[frame] for run, frame in at])),
+        )  # fmt: skip
+    return {place: found.select(k) for k, place in enumerate(states)}
+
+
+def batched(states: Sequence[State]) -> State:
+    """Single states as one batch."""
+    import torch
+
+    named = {
+        f.name: torch.cat([getattr(one, f.name) for one in states]) for f in fields(states[0]) if f.name != "extra"
+    }
+    return replace(
+        states[0], **named, extra={name: torch.cat([one.extra[name] for one in states]) for name in states[0].extra}
+    )
+
+
+def loose(run: RunData, frame: int) -> float:
+    """How much longer than the distance seen at a frame a rest length must be before the cable surely hangs [m]."""
+    return max(LOOSE_M, LOOSE_SD * float(np.sqrt(2.0 * np.mean(run.sd_p[frame] ** 2))))
 
 
 def thinned(run: RunData) -> RunData:

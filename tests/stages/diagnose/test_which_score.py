@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from r2s2r_cli.stages.diagnose.which.arena import White
 from r2s2r_cli.stages.diagnose.which.candidates import Candidate
 from r2s2r_cli.stages.diagnose.which.fit import Fits, Hypothesis
+from r2s2r_cli.stages.diagnose.which.mixture import ENOUGH, FACTORS, density, minus_log, weight
 from r2s2r_cli.stages.diagnose.which.rivals import chance, no_gap
-from r2s2r_cli.stages.diagnose.which.robust import DOF, minus_log, weight
 from r2s2r_cli.stages.diagnose.which.score import Score, scores
 from r2s2r_cli.stages.diagnose.which.screen import Response, screen
+from r2s2r_cli.stages.diagnose.which.white import Kind, White
 
 STRETCHES, EACH = 6, 60
 
 
 class LinearArena:
-    """residual = y - (A z + B x), white; stretches of EACH numbers, two a gait. The model's values are [z | x]."""
+    """residual = y - (A z + B x), white; stretches of EACH numbers, two a gait. The model's values are [z | x]. Of the
+    kinds of errors each is FACTORS times as large as the first."""
 
     def __init__(self, truth: float, *, noise: float = 1.0, seed: int = 0) -> None:
         rng = np.random.default_rng(seed)
@@ -28,14 +30,20 @@ class LinearArena:
         self.y = self.A @ [0.3, -0.2] + self.B[:, 0] * truth + noise * rng.standard_normal(M)
         self.mean, self.precision = np.zeros(2), np.eye(2)
         self.lower, self.upper = np.full(2, -10.0), np.full(2, 10.0)
-        self.by_nuisance = self.A.copy()
+        self.by_nuisance = _kinds(self.A.T).T
         self.engine = [0, 1]
-        self.many = tuple(range(STRETCHES))
+        self.many = tuple(SimpleNamespace(run="a", interval=k + 1) for k in range(STRETCHES))
+        self.whole = self.many
         self.gait = np.arange(STRETCHES) // 2
         self.white = [
-            White(np.zeros((0, 0, 0)), np.zeros((0, 0)), np.zeros(0), slice(k * EACH, (k + 1) * EACH), EACH)
+            White(tuple(
+                Kind(np.zeros((0, 0, 0)), np.zeros((0, 0)), np.zeros(0),
+                     slice(c * M + k * EACH, c * M + (k + 1) * EACH), 2 * EACH * float(np.log(factor)))
+                for c, factor in enumerate(FACTORS)
+            ), EACH)
             for k in range(STRETCHES)
-        ]
+        ]  # fmt: skip
+        self.logdets = np.array([white.logdet for white in self.white])
         self.sizes = np.full(STRETCHES, float(EACH))
 
     def values(self, z: np.ndarray) -> np.ndarray:
@@ -43,17 +51,21 @@ class LinearArena:
         return np.concatenate([z, np.zeros((len(z), 2))], axis=1)
 
     def residuals(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """(k, M)."""
-        return np.asarray(z @ self.A.T + values[:, 2:] @ self.B.T - self.y)
+        """White under each kind, (k, kind M)."""
+        return _kinds(z @ self.A.T + values[:, 2:] @ self.B.T - self.y)
 
-    def look(self, values: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """With key frames of one cap."""
-        white = self.residuals(values, z)
-        return white, np.zeros((len(white), STRETCHES, 1, 3))
+    def keys(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Key frames of one cap."""
+        return np.zeros((len(z), STRETCHES, 1, 3))
 
     def squares(self, residual: np.ndarray) -> np.ndarray:
-        """By stretch."""
-        return np.asarray((residual.reshape(len(residual), STRETCHES, EACH) ** 2).sum(axis=-1))
+        """By stretch and kind."""
+        found = (residual.reshape(len(residual), len(FACTORS), STRETCHES, EACH) ** 2).sum(axis=-1)
+        return np.asarray(found.transpose(0, 2, 1))
+
+
+def _kinds(residual: np.ndarray) -> np.ndarray:
+    return np.concatenate([residual / factor for factor in FACTORS], axis=1)
 
 
 def candidate(name: str, place: int) -> Candidate:
@@ -105,8 +117,8 @@ def test_leaving_a_gait_out_is_fitting_without_it() -> None:
     """The one step to the numbers without a gait lands where a weighted fit of the others is."""
     found = tried(0.8)
     fit, arena = found.fits[1], found.arena
-    w = weight(arena.squares(fit.residual[None])[0], arena.sizes)
-    rows = np.repeat(w, EACH)
+    w = weight(arena.squares(fit.residual[None])[0], arena.logdets, arena.sizes)
+    rows = np.repeat(w @ np.array(FACTORS) ** -2.0, EACH)
     keep = np.repeat(arena.gait != 0, EACH)
     J = np.concatenate([arena.A, arena.B[:, :1]], axis=1)[keep]
     prior = np.diag([1.0, 1.0, 0.25])
@@ -127,12 +139,34 @@ def test_without_an_effect_chance_is_not_beaten_often() -> None:
 
 
 def test_one_bad_stretch_does_not_decide() -> None:
-    """A stretch that is off by a hundred sd costs about as much under every hypothesis."""
-    squares, size = np.array([60.0, 60.0 * 1e4]), np.array([60.0, 60.0])
-    better = np.array([60.0, 60.0 * 0.9e4])
-    gained = minus_log(squares, size) - minus_log(better, size)
-    assert gained[1] == pytest.approx(0.5 * (DOF + 60) * np.log(1 / 0.9), rel=1e-3)
-    assert weight(squares, size)[1] < 1e-3
+    """What a stretch costs grows by the logarithm of its excess: one that fell is worth little more than a bad one."""
+    logdet = 2.0 * 60 * np.log(np.array([FACTORS]))
+    size = np.array([60.0])
+
+    def cost(share: float) -> float:
+        squares = share * 60.0 / np.array(FACTORS) ** 2
+        return float(minus_log(squares[None], logdet, size)[0])
+
+    def whole(share: float) -> float:
+        return float(density(share * 60.0 / np.array(FACTORS)[None] ** 2, logdet)[0])
+
+    assert cost(0.8) == pytest.approx(whole(0.8))
+    assert whole(1e4) - whole(1.0) > 200
+    assert cost(1e4) - cost(1.0) < ENOUGH * np.log1p(400 / ENOUGH)
+    assert cost(1e4) - cost(0.9e4) < 1.0
+
+
+@pytest.mark.parametrize("share", [0.5, 1.5, 4.0, 40.0, 4000.0])
+def test_weights_are_the_slope_of_the_cost(share: float) -> None:
+    """Half the weighted sum of squares has the derivative of the cost by every sum of squares."""
+    logdet = 2.0 * 60 * np.log(np.array([FACTORS]))
+    size = np.array([60.0])
+    squares = share * 60.0 / np.array(FACTORS)[None] ** 2
+    for c in range(len(FACTORS)):
+        by = np.zeros_like(squares)
+        by[0, c] = 1e-4 * max(1.0, squares[0, c])
+        slope = (minus_log(squares + by, logdet, size) - minus_log(squares - by, logdet, size))[0] / (2 * by[0, c])
+        assert weight(squares, logdet, size)[0, c] / 2 == pytest.approx(slope, abs=1e-6)
 
 
 def test_equivalence_needs_data() -> None:

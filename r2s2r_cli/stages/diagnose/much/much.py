@@ -32,7 +32,7 @@ def much(
     refit = compared.refit
     if fit is None or score is None:
         return None
-    runs = [one.run for one in compared.arena.many]
+    runs = [one.run for one in compared.arena.whole]
     predicted, spread = share_with_interval(refit.squared, score.squared, floor_m, groups=runs, seed=seed)
     arena = compared.arena
     solver = Fits(arena)
@@ -55,7 +55,7 @@ def much(
         squared[name] = np.sum(errors**2, axis=-1).mean(axis=-1)
         names = tuple(one.name for one in judged)
         if name == "refit":
-            left = corrected(arena.many, refit.key, judged, errors)
+            left = corrected(arena.whole, refit.key, judged, errors)
             squared["ceiling"] = np.sum(left**2, axis=-1).mean(axis=-1)
     told("judged", len(models), len(models))
     share, ci90 = (None, None)
@@ -90,6 +90,4 @@ def _judged(
         raise NumericalError("no judged interval can be simulated", where="judge", expected="an interval",
                              received="none", hint="r2s2r identify --test RUN:8-11")  # fmt: skip
     own = Arena(arena.replayer, many, floor_m=arena.floor_m)
-    shifts = own.mean.copy()
-    shifts[: own.shared] = z[: own.shared]
-    return own.ends(values[None], shifts[None])[0], many
+    return own.keys(values[None], z[None])[0], many

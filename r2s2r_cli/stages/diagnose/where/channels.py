@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.where.columns import Design
-from r2s2r_cli.stages.diagnose.which.robust import minus_log, weight
+from r2s2r_cli.stages.diagnose.where.student import minus_log, weight
 
 ROUNDS = 12
 ENOUGH_NATS = 15.0

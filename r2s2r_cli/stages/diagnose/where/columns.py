@@ -10,8 +10,8 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.parity.finding import Element
 from r2s2r_cli.stages.diagnose.where.probes import KINDS, WINCHED_N, ProbeModel
-from r2s2r_cli.stages.diagnose.which.arena import Arena, White
-from r2s2r_cli.stages.diagnose.which.robust import weight
+from r2s2r_cli.stages.diagnose.where.student import weight
+from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.identify.predict import Predictor
 
 if TYPE_CHECKING:
@@ -91,8 +91,8 @@ def design(
         by = np.concatenate([seen.by_value[rows], later[rows][..., None], _observed(own, one.t)], axis=-1)
         whole = np.concatenate([_channels(arena, own, by), _sensing(arena, len(own))], axis=0)
         white = arena.white[k]
-        probes = _bounded(_whitened(white, whole) * scale[:, None], white.size)
-        timing = _whitened(white, _timing(arena, own, later[rows]))
+        probes = _bounded(white.white(whole) * scale[:, None], white.size)
+        timing = white.white(_timing(arena, own, later[rows]))
         nuisances = _bounded(arena.by_nuisance[white.rows].T * spread[:, None], white.size) / spread[:, None]
         joined = np.concatenate([nuisances, timing, probes, -residual[None, white.rows]], axis=0)
         grams.append(joined @ joined.T)
@@ -197,9 +197,3 @@ def _sensing(arena: Arena, frames: int) -> np.ndarray:
     for s in range(count):
         found[s, caps + s] = 1.0
     return found
-
-
-def _whitened(white: White, columns: np.ndarray) -> np.ndarray:
-    """(k, channel, F) -> (k, channel F), white."""
-    found = np.einsum("cfg,kcg->kcf", white.roots, columns, optimize=True).reshape(len(columns), -1)
-    return np.asarray(found - ((found @ white.U) * white.shrink) @ white.U.T)

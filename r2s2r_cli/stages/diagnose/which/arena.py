@@ -1,19 +1,15 @@
-"""Where hypotheses meet the data: residuals of all streams together, white under noise, floor and unknown starts.
-
-Every stretch starts in a state that is not quite known. Its offsets are normal numbers of their own, so they are not
-fitted: they are part of the covariance, the same for every hypothesis. So is the floor, a simulator's own error, which
-grows along a stretch like a random walk.
-"""
+"""Where hypotheses meet the data: residuals of all streams together, white under noise, floor and unknown starts."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from r2s2r_cli.stages.diagnose.which.mixture import density
 from r2s2r_cli.stages.diagnose.which.replay import Replayer, Seen
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
+from r2s2r_cli.stages.diagnose.which.white import White, whitened, whites
 from r2s2r_cli.stages.identify.offsets import StartSpread
 
 CAMERA = (("camera_height", "m", 2e-3), ("camera_tilt_x", "rad", 5e-3), ("camera_tilt_y", "rad", 5e-3))
@@ -26,28 +22,12 @@ SENSOR_LAG_SD = 0.04
 control tick are in no log, and a lag of 40 ms is 2 to 3 mm on every ramp."""
 SECANT = 0.3
 """Of a nuisance's prior sd, to both sides: over what its derivative is taken."""
-TRIMMED = 0.85
-"""Share of the stretches that the size of the floor is learned from."""
-ABSENT = 1e3
-"""[m] Sd of a reading that is not there."""
-REST_SD = 5e-3
-"""[m] What the rest length of a winched cable is off by throughout a run: nobody sees it, and the filter hardly."""
+LOST_M = 0.25
+"""A cap that is simulated so far from where it was is lost, and farther off is not worse."""
+FARTHEST_M = 0.03
+"""[m] An offset of a start moves a cap by at most so much within a piece."""
 START = StartSpread(position=3e-3, tilt=0.015, roll=0.08, rest=3e-3)
 """Of the offsets that are free (`Replayer.moved`)."""
-
-
-@dataclass(frozen=True)
-class White:
-    """How residuals of one stretch become white. roots (channel, F, F): inverse Cholesky factors of noise and floor;
-    U (channel F, offset), shrink (offset,): what is taken off along the offsets of the start. rows: its place among all
-    residuals; size: how many of them are data; logdet: of the covariance."""
-
-    roots: np.ndarray
-    U: np.ndarray
-    shrink: np.ndarray
-    rows: slice
-    size: int
-    logdet: float = 0.0
 
 
 class Arena:
@@ -56,40 +36,36 @@ class Arena:
 
     def __init__(
         self, replayer: Replayer, many: Sequence[Stretch], *, floor_m: float, noise: float = 1.0,
-        prior: tuple[np.ndarray, np.ndarray] | None = None,
+        prior: tuple[np.ndarray, np.ndarray] | None = None, whole: Sequence[Stretch] = (),
     ) -> None:  # fmt: skip
-        """floor_m: of the simulator alone, cap RMSE at the end of a stretch. noise: factor on the stated noise. prior:
+        """many: what is fitted; whole: the target intervals, whose ends are the key frames; empty: those of `many`.
+        floor_m: of the simulator alone, cap RMSE after FLOOR_S. noise: factor on the stated noise. prior:
         mean and precision matrix of the nuisances, of healthy runs; None: nominal."""
         self.replayer, self.model, self.many = replayer, replayer.model, tuple(many)
+        self.whole = tuple(whole) or self.many
         self.floor_m, self.noise = floor_m, noise
         self.sensors = next((one.sensors for one in many if one.length is not None), ())
         self.engine = list(self.model.nuisances)
-        self.runs = tuple(dict.fromkeys(one.run for one in many))
-        winched = self.model.robot.actuated
-        shared = (
+        self.names = (
             *(self.model.names[k] for k in self.engine), *(name for name, _, _ in CAMERA),
             *(f"sensor_bias_{k}" for k in self.sensors), *(("sensor_lag",) if self.sensors else ()),
         )  # fmt: skip
-        self.shared = len(shared)
-        """How many nuisances are the same in every run; the others are the rest lengths that runs began with."""
-        self.names = (*shared, *(f"rest_{run}_{cable}" for run in self.runs for cable in winched))
         own = [self.model.numbers[k] for k in self.engine]
         sd = np.array([n.sd for n in own] + [sd for _, _, sd in CAMERA] + [SENSOR_SD] * len(self.sensors)
-                      + [SENSOR_LAG_SD] * bool(self.sensors) + [REST_SD] * (len(self.runs) * len(winched)))  # fmt: skip
+                      + [SENSOR_LAG_SD] * bool(self.sensors))  # fmt: skip
         low, high = np.array([n.within for n in own]).T
         self.lower = np.concatenate([low, np.full(len(sd) - len(own), -np.inf)])
         self.upper = np.concatenate([high, np.full(len(sd) - len(own), np.inf)])
         own_mean = np.concatenate([self.model.values0[self.engine], np.zeros(len(sd) - len(own))])
         self.mean, self.precision = own_mean, np.diag(sd**-2.0)
         if prior is not None:
-            n = self.shared
-            self.mean[:n], self.precision[:n, :n] = prior
+            self.mean, self.precision = prior[0].copy(), prior[1].copy()
         self.gaits = tuple(dict.fromkeys(one.gait for one in many))
         self.gait = np.array([self.gaits.index(one.gait) for one in many])
-        self.white: list[White] = []
+        self.white: tuple[White, ...] = ()
         self.by_nuisance = np.zeros((0, 0))
-        self._constant = [self._shift_columns(one) for one in many]
-        self._shifts = self._with_rest(None)
+        self._ends: list[np.ndarray] = []
+        self._shifts = [self._shift_columns(k) for k in range(len(self.many))]
 
     def values(self, z: np.ndarray) -> np.ndarray:
         """Values (k, n) of the model at nuisances z (k, p + q), effects off."""
@@ -102,9 +78,10 @@ class Arena:
         secants by the nuisances, over a share of their prior: contacts make a derivative say little of a step."""
         seen = self.replayer.derivatives(self.many, self.values(z[None])[0])
         assert seen.by_offset is not None  # noqa: S101 - it was asked for
-        self._by_offset = [seen.by_offset[seen.window == k] for k in range(len(self.many))]
+        sd = [self._start_sd(one) for one in self.many]
+        self._by_offset = [_bounded(seen.by_offset[seen.window == k], sd[k]) for k in range(len(self.many))]
         self._ends = [seen.p_WE[seen.window == k] for k in range(len(self.many))]
-        self._shifts = self._with_rest(self._by_offset)
+        self._shifts = [self._shift_columns(k) for k in range(len(self.many))]
         p = len(self.engine)
         by = SECANT * np.array([self.model.numbers[k].sd for k in self.engine])
         low, high = np.maximum(z[:p] - by, self.lower[:p]), np.minimum(z[:p] + by, self.upper[:p])
@@ -119,23 +96,17 @@ class Arena:
         """Covariances anew, with another floor [m] or factor on the noise, at the same derivatives."""
         self.floor_m = self.floor_m if floor_m is None else floor_m
         self.noise = self.noise if noise is None else noise
-        sd = START.sd(self.replayer.structure)[self.replayer.moved]
-        self.white, columns, begin = [], [], 0
-        for k, one in enumerate(self.many):
-            roots, size = self._roots(one)
-            by_offset = self._channels(k, self._by_offset[k])
-            white = White(
-                roots, np.zeros((0, 0)), np.zeros(0), slice(begin, begin + roots.shape[0] * roots.shape[1]), size
-            )
-            offsets = _rooted(white, by_offset) * sd[:, None]
-            U, s, _ = np.linalg.svd(offsets.T, full_matrices=False)
-            logdet = float(np.log1p(s**2).sum() - 2.0 * np.log(np.diagonal(roots, axis1=1, axis2=2)).sum())
-            white = White(roots, U, 1.0 - 1.0 / np.sqrt(1.0 + s**2), white.rows, size, logdet)
-            self.white.append(white)
-            own = np.concatenate([self._by_engine[k], self._shifts[k]], axis=0)
-            columns.append(_whitened(white, own))
-            begin = white.rows.stop
-        self.by_nuisance = np.concatenate(columns, axis=1).T  # (M, p + q)
+        self.white = whites(
+            self.many, [self._channels(k, d) for k, d in enumerate(self._by_offset)],
+            [self._start_sd(one) for one in self.many], sensors=len(self.sensors), floor_m=self.floor_m,
+            noise=self.noise,
+        )  # fmt: skip
+        own = [np.concatenate([e, s], axis=0) for e, s in zip(self._by_engine, self._shifts, strict=True)]
+        self.by_nuisance = whitened(self.white, own).T  # (M, p + q)
+
+    def _start_sd(self, one: Stretch) -> np.ndarray:
+        sd = START.sd(self.replayer.structure) if one.start_sd is None else one.start_sd
+        return np.asarray(sd[self.replayer.moved])
 
     @property
     def sizes(self) -> np.ndarray:
@@ -143,47 +114,43 @@ class Arena:
         return np.array([white.size for white in self.white], dtype=float)
 
     def residuals(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """White residuals (k, M), simulated minus observed, at values (k, n) of the model, with the shifts of z."""
-        return self.whitened(self.raw(values, z))
+        """Residuals (k, M), simulated minus observed, white under each kind of error, at values (k, n) of the model,
+        with the shifts of z."""
+        return whitened(self.white, self.raw(values, z))
 
     def raw(self, values: np.ndarray, z: np.ndarray) -> list[np.ndarray]:
-        """Residuals as they are, of every stretch (k, channel, F) [m]: caps by axis, then sensors."""
+        """Residuals as they are, of every stretch (k, channel, F) [m]: caps by axis, then sensors; at most LOST_M."""
         seen = self.replayer.seen(self.many, values)
-        return [self._residual(k, seen[k], z) for k in range(len(self.many))]
-
-    def whitened(self, raw: Sequence[np.ndarray]) -> np.ndarray:
-        """Residuals of `raw`, white, (k, M)."""
-        return np.concatenate([_whitened(w, r) for w, r in zip(self.white, raw, strict=True)], axis=1)
-
-    def look(self, values: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """White residuals as `residuals` has them, and those of the caps at the last frame of every stretch as they
-        are, (k, stretch, cap, 3) [m]."""
-        raw = self.raw(values, z)
-        return self.whitened(raw), self._last(raw)
+        found = [self._residual(k, seen[k], z) for k in range(len(self.many))]
+        return [np.clip(np.nan_to_num(one, nan=LOST_M), -LOST_M, LOST_M) for one in found]
 
     def ends(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Simulated minus observed caps at the last frame of every stretch, (k, stretch, cap, 3) [m]."""
-        return self._last(self.raw(values, z))
-
-    def log_density(self, raw: Sequence[np.ndarray]) -> float:
-        """Of one hypothesis's residuals under the covariance as it is, nothing left out [nats].
-
-        Normal, since Student's t over a stretch does not care how large all of it is; without the worst stretches,
-        since one tip-over must not set the floor of all.
-        """
-        squares = self.squares(self.whitened(raw))[0]
-        excess = squares / self.sizes
-        kept = excess <= np.quantile(excess, TRIMMED)
-        logdet = np.array([white.logdet for white in self.white])
-        return float(-0.5 * np.sum((squares + logdet)[kept]))
-
-    def _last(self, raw: Sequence[np.ndarray]) -> np.ndarray:
         caps = self.many[0].caps.shape[1]
+        raw = self.raw(values, z)
         return np.stack([r[:, : 3 * caps, -1].reshape(len(r), caps, 3) for r in raw], axis=1)
 
+    def keys(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """The same of the target intervals as a whole: errors at key frames, (k, interval, cap, 3) [m]."""
+        seen = self.replayer.seen(self.whole, values)
+        caps = np.stack([s.caps[:, -1] - one.caps[-1] for s, one in zip(seen, self.whole, strict=True)], axis=1)
+        columns = np.array([self._camera_columns(one.caps[-1]) for one in self.whole])
+        camera = z[:, len(self.engine) : len(self.engine) + len(CAMERA)]
+        return np.asarray(caps + np.einsum("kq,sqci->ksci", camera, columns))
+
+    @property
+    def logdets(self) -> np.ndarray:
+        """Log determinants of every stretch under each kind of error, (stretch, kind)."""
+        return np.array([white.logdet for white in self.white])
+
+    def log_density(self, raw: Sequence[np.ndarray]) -> float:
+        """Of one hypothesis's residuals under the covariance as it is [nats]."""
+        return -float(density(self.squares(whitened(self.white, raw)), self.logdets).sum())
+
     def squares(self, residual: np.ndarray) -> np.ndarray:
-        """Sums of squares of every stretch (k, stretch) of white residuals (k, M)."""
-        return np.stack([np.sum(residual[:, white.rows] ** 2, axis=1) for white in self.white], axis=1)
+        """Sums of squares (k, stretch, kind) of white residuals (k, M)."""
+        found = [[np.sum(residual[:, kind.rows] ** 2, axis=1) for kind in white.kinds] for white in self.white]
+        return np.array(found).transpose(2, 0, 1)
 
     def _residual(self, k: int, seen: Seen, z: np.ndarray) -> np.ndarray:
         """(hypothesis, channel, F): caps, then sensors; 0 where there is no reading."""
@@ -214,65 +181,34 @@ class Arena:
             length = np.zeros_like(length)
         return np.concatenate([caps, length], axis=1)
 
-    def _with_rest(self, by_offset: Sequence[np.ndarray] | None) -> list[np.ndarray]:
-        """What is added to the residuals per unit of all nuisances that are simple shifts, (q, channel, F) of every
-        stretch. What a run's rest lengths at its begin are off by is still so in its later stretches; a reading that is
-        late shows a length that was, as fast as the simulated one changes."""
-        found = []
-        winches = len(self.model.robot.actuated)
-        for k, one in enumerate(self.many):
-            constant = self._constant[k]
-            rest = np.zeros((len(self.runs) * winches, *constant.shape[1:]))
-            if by_offset is not None:
-                begin = self.runs.index(one.run) * winches
-                rest[begin : begin + winches] = self._channels(k, by_offset[k][..., -winches:])
-            late = np.zeros((1 if self.sensors else 0, *constant.shape[1:]))
-            if by_offset is not None and self.sensors and len(one.t) > 1:
-                late[0, -len(self.sensors) :] = -np.gradient(self._lengths(k), one.t, axis=0).T
-            found.append(np.concatenate([constant, late, rest]))
-        return found
-
     def _lengths(self, k: int) -> np.ndarray:
         """Simulated lengths of the sensed cables of a stretch where derivatives were taken, (F, sensor) [m]."""
         ends = np.array([self.replayer.cable_caps[cable] for cable in self.sensors])
         return np.asarray(np.linalg.norm(self._ends[k][:, ends[:, 0]] - self._ends[k][:, ends[:, 1]], axis=-1))
 
-    def _shift_columns(self, one: Stretch) -> np.ndarray:
-        """What camera and sensor biases add, per unit, (q, channel, F)."""
+    def _shift_columns(self, k: int) -> np.ndarray:
+        """What camera and sensors add per unit, (q, channel, F). A reading that is late shows a length that was, as
+        fast as the simulated one changes."""
+        one = self.many[k]
         F, caps = len(one.t), one.caps.shape[1]
-        found = np.zeros((3 + len(self.sensors), 3 * caps + len(self.sensors), F))
-        for c in range(caps):
-            x, y = one.caps[:, c, 0], one.caps[:, c, 1]
-            found[0, 3 * c + 2], found[1, 3 * c + 2], found[2, 3 * c + 2] = 1.0, y, -x
+        found = np.zeros((len(self.names) - len(self.engine), 3 * caps + len(self.sensors), F))
+        found[: len(CAMERA), : 3 * caps] = self._camera_columns(one.caps).reshape(len(CAMERA), F, -1).transpose(0, 2, 1)
         for s in range(len(self.sensors)):
-            found[3 + s, 3 * caps + s] = 1.0
+            found[len(CAMERA) + s, 3 * caps + s] = 1.0
+        if self.sensors and self._ends and F > 1:
+            found[-1, 3 * caps :] = -np.gradient(self._lengths(k), one.t, axis=0).T
         return found
 
-    def _roots(self, one: Stretch) -> tuple[np.ndarray, int]:
-        """Inverse Cholesky factors of every channel, and how many numbers are data."""
-        since = one.t - one.window.start
-        share = since / since[-1]
-        walk = np.minimum(share[:, None], share[None, :]) * (self.floor_m**2 / 3.0)
-        caps = one.noise.reshape(len(since), -1).T * self.noise
-        sd, size = caps, caps.size
-        if self.sensors:
-            absent = np.full((len(self.sensors), len(since)), ABSENT)
-            if one.length is not None and one.length_sd is not None:
-                there = np.isfinite(one.length).T
-                absent = np.where(there, one.length_sd.T, ABSENT)
-                size += int(there.sum())
-            sd = np.concatenate([caps, absent])
-        covariance = walk[None] + np.eye(len(since))[None] * sd[:, :, None] ** 2
-        return np.linalg.inv(np.linalg.cholesky(covariance)), size
+    @staticmethod
+    def _camera_columns(caps: np.ndarray) -> np.ndarray:
+        """What height and tilts of CAMERA add to caps (..., cap, 3), per unit, (3, ..., cap, 3)."""
+        found = np.zeros((len(CAMERA), *caps.shape))
+        found[0, ..., 2], found[1, ..., 2], found[2, ..., 2] = 1.0, caps[..., 1], -caps[..., 0]
+        return found
 
 
-def _rooted(white: White, residual: np.ndarray) -> np.ndarray:
-    """(k, channel, F) -> (k, channel F), white but for the start."""
-    found: np.ndarray = np.einsum("cfg,kcg->kcf", white.roots, residual, optimize=True)
-    return found.reshape(len(residual), -1)
-
-
-def _whitened(white: White, residual: np.ndarray) -> np.ndarray:
-    """(k, channel, F) -> (k, channel F), white."""
-    found = _rooted(white, residual)
-    return found - ((found @ white.U) * white.shrink) @ white.U.T
+def _bounded(d: np.ndarray, sd: np.ndarray) -> np.ndarray:
+    """Derivatives d (F, cap, 3, offset) of caps by offsets of sd (offset,), none larger than what such an offset does:
+    where caps slip and stick, a derivative at a point may be a thousand times the change over a millimetre."""
+    most = FARTHEST_M / sd
+    return np.asarray(np.clip(np.nan_to_num(d), -most, most))

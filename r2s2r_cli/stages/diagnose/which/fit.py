@@ -13,7 +13,7 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.candidates import Candidate
-from r2s2r_cli.stages.diagnose.which.robust import minus_log, weight
+from r2s2r_cli.stages.diagnose.which.mixture import minus_log, weight
 
 ITERATIONS = 6
 LENGTHS = (1.0, 0.4, 0.1)
@@ -89,7 +89,6 @@ class Fits:
 
     def __init__(self, arena: Arena) -> None:
         self.arena = arena
-        self.sizes = arena.sizes
 
     def cost(self, hypothesis: Hypothesis, z: np.ndarray, x: np.ndarray, residual: np.ndarray) -> np.ndarray:
         """Robust cost with priors, (k,), at z (k, p + q), x (k, n), residuals (k, M); inf where not finite."""
@@ -98,7 +97,7 @@ class Fits:
         if x.shape[1]:
             sd = PRIOR_SCALES * hypothesis.stack("scale")
             prior = prior + 0.5 * np.sum(((x - hypothesis.stack("off")) / sd) ** 2, axis=1)
-        data = minus_log(self.arena.squares(residual), self.sizes).sum(axis=1)
+        data = minus_log(self.arena.squares(residual), self.arena.logdets, self.arena.sizes).sum(axis=1)
         return np.where(np.isfinite(data), data, np.inf) + prior
 
     def values(self, hypothesis: Hypothesis, z: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -151,15 +150,12 @@ class Fits:
 
     def normal(self, fit: Fit, keep: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Re-weighted normal matrix and gradient, with priors; keep (stretch,) bool: of these stretches only."""
-        w = weight(self.arena.squares(fit.residual[None])[0], self.sizes)
         n = fit.jacobian.shape[1]
         H, g = np.zeros((n, n)), np.zeros(n)
-        for k, white in enumerate(self.arena.white):
-            if keep is not None and not keep[k]:
-                continue
-            J = fit.jacobian[white.rows]
-            H += w[k] * J.T @ J
-            g += w[k] * J.T @ fit.residual[white.rows]
+        for k, (own, pull) in enumerate(zip(*self.products(fit), strict=True)):
+            if keep is None or keep[k]:
+                H += own
+                g += pull
         p = len(fit.z)
         H[:p, :p] += self.arena.precision
         g[:p] += self.arena.precision @ (fit.z - self.arena.mean)
@@ -167,6 +163,27 @@ class Fits:
             sd = PRIOR_SCALES * fit.hypothesis.stack("scale")
             H[p:, p:] += np.diag(sd**-2.0)
             g[p:] += (fit.x - fit.hypothesis.stack("off")) / sd**2
+        return H, g
+
+    def likely(self, fit: Fit) -> np.ndarray:
+        """Square roots of the weights of all its residuals, (M,): of what fell, nothing can be told."""
+        w = weight(self.arena.squares(fit.residual[None])[0], self.arena.logdets, self.arena.sizes)
+        found = np.zeros(len(fit.residual))
+        for white, own in zip(self.arena.white, w, strict=True):
+            for kind, one in zip(white.kinds, own, strict=True):
+                found[kind.rows] = np.sqrt(one)
+        return found
+
+    def products(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+        """What every stretch adds to the normal matrix, (stretch, n, n), and to the gradient, (stretch, n)."""
+        w = weight(self.arena.squares(fit.residual[None])[0], self.arena.logdets, self.arena.sizes)
+        n = fit.jacobian.shape[1]
+        H, g = np.zeros((len(w), n, n)), np.zeros((len(w), n))
+        for k, white in enumerate(self.arena.white):
+            for c, kind in enumerate(white.kinds):
+                J = fit.jacobian[kind.rows]
+                H[k] += w[k, c] * J.T @ J
+                g[k] += w[k, c] * J.T @ fit.residual[kind.rows]
         return H, g
 
     def _moved(self, fit: Fit, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from r2s2r_cli.engine import Parameters
 
 NUMERICS = {
-    "rolling_resistance": 0.15,
-    "soft_ground": 0.15,
+    "rolling_resistance": 0.6,
+    "soft_ground": 0.3,
     "command_latency": 0.4,
     "motor_lag": 0.4,
     "load_droop": 0.3,

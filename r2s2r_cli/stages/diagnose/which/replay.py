@@ -12,13 +12,13 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.identify.commands import CommandLog
-from r2s2r_cli.stages.identify.offsets import displacement_jacobian
+from r2s2r_cli.stages.identify.offsets import count, displacement_jacobian
 from r2s2r_cli.stages.identify.predict import Prediction, Predictor, alike
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from r2s2r_cli.engine import Parameters
+    from r2s2r_cli.engine import Parameters, State
 
 EVERY = 10
 """Engine steps between stored states."""
@@ -42,25 +42,42 @@ class Replayer(Predictor):
     def __init__(self, model: Model, **how: object) -> None:
         super().__init__(model, **how)  # type: ignore[arg-type]
         self.model = model
-        rods, winches = self.structure.n_rods, self.structure.n_actuated
-        self.moved = np.r_[np.arange(6 * rods), 12 * rods + np.arange(winches)]
-        """Offsets of a start that are free: place, tilt and roll of every rod, rest lengths; not how fast it moves."""
+        self.moved = np.arange(count(self.structure))
+        """Offsets of a start that are free: all of them."""
 
     def seen(self, many: Sequence[Stretch], values: np.ndarray) -> list[Seen]:
-        """Of every stretch at values (k, n)."""
+        """Of every stretch at values (k, n). A piece that comes after another one of `many` goes on with what that left
+        of slack cables and the memory of effects, each hypothesis with its own."""
         parts: dict[int, Seen] = {}
-        for group in alike([one.window for one in many]):
-            together = max(1, MOST // len(group))
-            chunks = [
-                self._batch([many[k] for k in group], values[first : first + together])
-                for first in range(0, len(values), together)
-            ]
-            for i, k in enumerate(group):
-                parts[k] = Seen(
-                    np.concatenate([chunk[i].caps for chunk in chunks]),
-                    np.concatenate([chunk[i].length for chunk in chunks]),
-                )
+        after: dict[tuple[str, int, int], Tensor] = {}
+        for depth in sorted({one.piece for one in many}):
+            rows = [k for k, one in enumerate(many) if one.piece == depth]
+            for group in alike([many[k].window for k in rows]):
+                own = [rows[i] for i in group]
+                together = max(1, MOST // len(own))
+                begin = [after.get((many[k].run, many[k].interval, depth - 1)) for k in own]
+                chunks = [
+                    self._batch([many[k] for k in own], values[first : first + together],
+                                [None if one is None else one[first : first + together] for one in begin])
+                    for first in range(0, len(values), together)
+                ]  # fmt: skip
+                for i, k in enumerate(own):
+                    parts[k] = Seen(
+                        np.concatenate([chunk[i][0].caps for chunk in chunks]),
+                        np.concatenate([chunk[i][0].length for chunk in chunks]),
+                    )
+                    after[many[k].run, many[k].interval, depth] = _cat([chunk[i][1] for chunk in chunks])
         return [parts[k] for k in range(len(many))]
+
+    def finals(self, many: Sequence[Stretch], values: np.ndarray) -> State:
+        """States at the last frame of stretches, a batch, at values (n,)."""
+        from r2s2r_cli.engine.flat import unpack_state
+
+        found: dict[int, Tensor] = {}
+        for group in alike([one.window for one in many]):
+            for k, (_, last) in zip(group, self._batch([many[k] for k in group], values[None]), strict=True):
+                found[k] = last
+        return unpack_state(self.structure, _cat([found[k] for k in range(len(many))]))
 
     def derivatives(self, many: Sequence[Stretch], values: np.ndarray) -> Prediction:
         """Caps, and their exact derivatives by the free offsets of the starts, at values (n,)."""
@@ -107,29 +124,72 @@ class Replayer(Predictor):
         p_WE = vmap(caps)(states).numpy() + np.array([0.0, 0.0, self.model.observation().ground_height])
         return Prediction(p_WE, index.numpy(), None, d)
 
-    def _batch(self, many: Sequence[Stretch], values: np.ndarray) -> list[Seen]:
-        """K hypotheses of some stretches of about the same length."""
+    def _batch(
+        self, many: Sequence[Stretch], values: np.ndarray, begin: Sequence[Tensor | None] = ()
+    ) -> list[tuple[Seen, Tensor]]:
+        """K hypotheses of some stretches of about the same length: what is seen, and states (k, NS) at the last frame.
+        begin: states (k, NS) that the piece before each ended in, None: its own start is all there is."""
         import torch
 
         from r2s2r_cli.engine import delay_of
         from r2s2r_cli.engine.flat import pack_parameters, pack_state, unpack_state
 
         structure, step, k = self.structure, self.step, len(values)
-        own = self.model.theta(values)
+        own, behind = self._undelayed(self.model.theta(values), k)
         theta = own.map(lambda x: x.expand(k, *x.shape[1:]).repeat_interleave(len(many), dim=0))
-        s0 = torch.cat([pack_state(structure, one.window.state) for one in many]).repeat(k, 1)
-        rows = EVERY * (math.ceil(max(one.window.duration for one in many) / step / EVERY - TINY) + 1)
+        starts = [pack_state(structure, one.window.state).expand(k, -1) for one in many]
+        for i, before in enumerate(begin):
+            if before is not None:
+                starts[i] = self._carried(many[i], starts[i], before)
+        s0 = torch.stack(starts, dim=1).flatten(0, 1)
+        lasting = max(one.window.duration for one in many) + max(0.0, float(behind.max()))
+        rows = EVERY * (math.ceil(lasting / step / EVERY - TINY) + 1)
         late = self.model.observation()
         own_delay = delay_of(structure, own)
         delays = np.zeros(k) if own_delay is None else own_delay.expand(k, 1)[:, 0].numpy()
-        u = self._commands_at(many, rows, delays + late.command_delay + late.camera_delay)
+        u = self._commands_at(many, rows, delays + behind + late.command_delay + late.camera_delay)
         self.rollouts += len(s0)
         n = self.simulator.substeps(theta, unpack_state(structure, s0), step)
         with torch.no_grad():
             flat = self.simulator.advance(
                 s0, u, pack_parameters(structure, theta), h=step / n, hold=n, every=EVERY * n
             )  # fmt: skip
-            return [self._one(own, k, flat[i :: len(many)], one, late.ground_height) for i, one in enumerate(many)]
+            seen = self._looked(own, behind, flat, many, late.ground_height)
+        return [(one, self._last(flat[i :: len(many)], many[i])) for i, one in enumerate(seen)]
+
+    def _undelayed(self, own: Parameters, k: int) -> tuple[Parameters, np.ndarray]:
+        """The parameters without the camera's delay, and that delay (k,) [s]. A stretch starts where the camera saw the
+        robot: by the camera's clock commands come later, and the sensors read what it will see."""
+        import torch
+
+        name = "camera_delay.tau_s"
+        if name not in own.extra:
+            return own, np.zeros(k)
+        behind = own.extra[name].expand(k, 1)[:, 0].numpy().copy()
+        return own.with_values({name: torch.zeros_like(own.extra[name])}), behind
+
+    def _last(self, flat: Tensor, one: Stretch) -> Tensor:
+        """States (k, NS) at the last frame, from those stored (k, stored, NS)."""
+        at = one.window.duration / (EVERY * self.step)
+        low = int(at + TINY)
+        return flat[:, low] * (1 - (at - low)) + flat[:, low + 1] * (at - low)
+
+    def _carried(self, one: Stretch, start: Tensor, before: Tensor) -> Tensor:
+        """Starts (k, NS) with what no cap shows from the states (k, NS) before: rest lengths of slack cables, winding
+        rates, the memory of effects. What left the finite numbers hands nothing on."""
+        import torch
+
+        from r2s2r_cli.engine.flat import state_slots
+
+        slots = state_slots(self.structure)
+        own = torch.zeros(start.shape[1], dtype=torch.bool)
+        rest = slots["rest"]
+        own[rest.start : rest.start + rest.size] = torch.as_tensor(
+            np.zeros(rest.size, bool) if one.slack is None else one.slack
+        )
+        for name, slot in slots.items():
+            own[slot.start : slot.start + slot.size] |= name == "winding" or "." in name
+        return torch.where(own & before.isfinite().all(dim=1, keepdim=True), before, start)
 
     def _commands_at(self, many: Sequence[Stretch], rows: int, delays: np.ndarray) -> Tensor:
         """Commands (k stretch, row, actuated), each hypothesis with its own delay [s]."""
@@ -143,35 +203,55 @@ class Replayer(Predictor):
         }
         return torch.as_tensor(np.stack([made[i, delay] for delay in delays.tolist() for i in range(len(many))]))
 
-    def _one(self, own: Parameters, k: int, flat: Tensor, one: Stretch, up: float) -> Seen:
-        """What is seen of one stretch, from its states (k, stored, NS)."""
+    def _looked(
+        self, own: Parameters, behind: np.ndarray, flat: Tensor, many: Sequence[Stretch], up: float
+    ) -> list[Seen]:
+        """What is seen of each stretch, from the states (k stretch, stored, NS). behind (k,) [s]: of the camera."""
         import torch
 
         from r2s2r_cli.engine import end_caps, observe, sense
         from r2s2r_cli.engine.flat import unpack_state
         from r2s2r_cli.engine.hooks import effective, overrides
 
-        stored = flat.shape[1]
-        every = EVERY * self.step
+        k, stored, every = len(behind), flat.shape[1], EVERY * self.step
         one_robot = own.map(lambda x: x[:1])  # no effect moves the caps on a rod
         caps = end_caps(effective(self.structure, one_robot), unpack_state(self.structure, flat.flatten(0, 1)))
-        caps = caps.unflatten(0, (k, stored))
+        caps = caps.unflatten(0, (k, len(many), stored))
         ends = torch.as_tensor(self.cable_caps)
-        length = torch.linalg.vector_norm(caps[:, :, ends[:, 0]] - caps[:, :, ends[:, 1]], dim=-1)
-        t = torch.as_tensor(one.window.start + every * np.arange(stored))
-        camera = observe(
-            self.structure, own.map(lambda x: x.expand(k, *x.shape[1:])), t,
-            caps + torch.tensor([0.0, 0.0, up], dtype=caps.dtype),
-        )  # fmt: skip
+        length = torch.linalg.vector_norm(caps[..., ends[:, 0], :] - caps[..., ends[:, 1], :], dim=-1)
+        begin = torch.as_tensor([one.window.start for one in many])
+        t = begin[:, None] + every * torch.arange(stored)
         sensing = {effect.name for effect in overrides(self.structure, "sensing")}
         read = one_robot.with_values({
-            name: x.expand(k, *x.shape[1:]).repeat_interleave(stored, dim=0)
+            name: x.expand(k, *x.shape[1:]).repeat_interleave(len(many) * stored, dim=0)
             for name, x in own.extra.items() if name.split(".")[0] in sensing
         })  # fmt: skip
-        length = sense(self.structure, read, length.flatten(0, 1), t.repeat(k)[:, None]).unflatten(0, (k, stored))
-        at = torch.as_tensor((one.t - one.window.start) / every)
-        low = (at + TINY).floor().long()
-        share = at - low
-        at_caps = camera[:, low] * (1 - share)[None, :, None, None] + camera[:, low + 1] * share[None, :, None, None]
-        at_length = length[:, low] * (1 - share)[None, :, None] + length[:, low + 1] * share[None, :, None]
-        return Seen(at_caps.numpy(), at_length.numpy()[..., list(one.sensors)])
+        length = sense(self.structure, read, length.flatten(0, 2), t.repeat(k, 1, 1).reshape(-1, 1))
+        length = length.unflatten(0, (k, len(many), stored))
+        wide = own.map(lambda x: x.expand(k, *x.shape[1:]))
+        lift = torch.tensor([0.0, 0.0, up], dtype=caps.dtype)
+        found = []
+        for i, one in enumerate(many):
+            since = torch.as_tensor(one.t - one.window.start)
+            shown = _at(caps[:, i], (since / every).expand(k, -1))
+            camera = observe(self.structure, wide, torch.as_tensor(one.t), shown + lift)
+            lengths = _at(length[:, i], (since + torch.as_tensor(behind)[:, None]) / every)
+            found.append(Seen(camera.numpy(), lengths.numpy()[..., list(one.sensors)]))
+        return found
+
+
+def _at(stored: Tensor, place: Tensor) -> Tensor:
+    """Values (k, F, ...) at places (k, F) among those stored (k, stored, ...), on straight lines between them; beyond
+    the ends those of the ends."""
+    import torch
+
+    low = (place + TINY).floor().long().clamp(0, stored.shape[1] - 2)
+    share = (place - low).clamp(0.0, 1.0).reshape(*place.shape, *[1] * (stored.ndim - 2))
+    row = torch.arange(len(stored))[:, None]
+    return stored[row, low] * (1 - share) + stored[row, low + 1] * share
+
+
+def _cat(parts: Sequence[Tensor]) -> Tensor:
+    import torch
+
+    return torch.cat(list(parts))

@@ -56,7 +56,8 @@ def chance(
     grams = []
     for name in names:
         rows = np.concatenate([
-            np.arange(arena.white[k].rows.start, arena.white[k].rows.stop) for k in np.flatnonzero(groups == name)
+            np.arange(kind.rows.start, kind.rows.stop)
+            for k in np.flatnonzero(groups == name) for kind in arena.white[k].kinds
         ])  # fmt: skip
         D = np.stack([one.direction[rows] for one in known], axis=1).astype(float)
         grams.append(D.T @ D)

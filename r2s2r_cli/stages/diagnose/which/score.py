@@ -11,19 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.arena import LOST_M, Arena
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
-from r2s2r_cli.stages.diagnose.which.robust import minus_log, weight
-
-LOST_M = 0.25
-"""A cap that is simulated so far from where it was has left the finite numbers in all but name."""
+from r2s2r_cli.stages.diagnose.which.mixture import minus_log
 
 
 @dataclass(frozen=True)
 class Score:
     """elpd (stretch,): log predictive density of each stretch without its gait [nats], up to a constant that all
     hypotheses share. misfit (stretch,): squares over how many there are, 1 where noise and floor explain it. key
-    (stretch, cap, 3): predicted minus observed caps at its end [m]. sd (n,): of the fitted numbers, all gaits; without
+    (interval, cap, 3): predicted minus observed caps at its end [m]. sd (n,): of the fitted numbers, all gaits; without
     (group, n): the numbers without each group."""
 
     elpd: np.ndarray
@@ -39,7 +36,7 @@ class Score:
 
     @property
     def squared(self) -> np.ndarray:
-        """Mean squared 3-D distance of the caps at the end of each stretch, (stretch,) [m^2]."""
+        """Mean squared 3-D distance of the caps at the end of each interval, (interval,) [m^2]."""
         return np.asarray(np.sum(self.key**2, axis=-1).mean(axis=-1))
 
 
@@ -50,7 +47,8 @@ def groups_of(arena: Arena) -> np.ndarray:
     runs = list(dict.fromkeys(one.run for one in arena.many))
     if len(runs) > 1:
         return np.array([runs.index(one.run) for one in arena.many])
-    return np.arange(len(arena.many))
+    places = list(dict.fromkeys((one.run, one.interval) for one in arena.many))
+    return np.array([places.index((one.run, one.interval)) for one in arena.many])
 
 
 def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: bool = True) -> list[Score]:
@@ -60,20 +58,17 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: b
     points, precisions = [], []
     for fit in fits:
         H, gradient = solver.normal(fit)
-        w = weight(arena.squares(fit.residual[None])[0], arena.sizes)
+        own, pull = solver.products(fit)
         for name in names:
-            own, pull = np.zeros_like(H), np.zeros(len(H))
-            for k in np.flatnonzero(groups == name) if held_out else ():
-                J = fit.jacobian[arena.white[k].rows]
-                own += w[k] * J.T @ J
-                pull += w[k] * J.T @ fit.residual[arena.white[k].rows]
-            P = np.linalg.pinv(H - own, hermitian=True)
-            points.append(_placed(arena, fit, P @ (pull - gradient)))
-            precisions.append(H - own)
+            out = (groups == name) & held_out
+            P = np.linalg.pinv(H - own[out].sum(axis=0), hermitian=True)
+            points.append(_placed(arena, fit, P @ (pull[out].sum(axis=0) - gradient)))
+            precisions.append(H - own[out].sum(axis=0))
     values = np.concatenate([
         solver.values(fits[i // len(names)].hypothesis, z[None], x[None]) for i, (z, x) in enumerate(points)
     ])  # fmt: skip
-    white, key = arena.look(values, np.array([z for z, _ in points]))
+    nuisances = np.array([z for z, _ in points])
+    white, key = arena.residuals(values, nuisances), arena.keys(values, nuisances)
     return [
         _score(arena, fit, groups, names, points[rows], precisions[rows], white[rows], key[rows], solver)
         for fit, rows in ((fit, slice(i * len(names), (i + 1) * len(names))) for i, fit in enumerate(fits))
@@ -91,22 +86,22 @@ def _score(
     precisions: Sequence[np.ndarray], white: np.ndarray, key: np.ndarray, solver: Fits,
 ) -> Score:  # fmt: skip
     elpd, misfit = np.full(len(groups), -np.inf), np.full(len(groups), np.inf)
-    ends = np.full(key.shape[1:], np.nan)
     for k, own in enumerate(arena.white):
         g = int(np.searchsorted(names, groups[k]))
-        r, J, without = white[g, own.rows], fit.jacobian[own.rows], precisions[g]
-        ends[k] = key[g, k]
-        if not np.isfinite(r).all() or np.abs(key[g, k]).max() > LOST_M:
-            # The step left the robots that can be: what the derivatives say of it stands in.
-            by = np.concatenate(points[g]) - np.concatenate([fit.z, fit.x])
-            r, ends[k] = fit.residual[own.rows] + J @ by, np.nan
-        # Woodbury: r' (1 + J P J')^-1 r, in as many numbers as there are parameters.
-        inner = without + J.T @ J
-        along = J.T @ r
-        square = max(float(r @ r - along @ np.linalg.pinv(inner, hermitian=True) @ along), 0.0)
-        spread = float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(without)[1])
-        elpd[k] = -float(minus_log(np.array(square), np.array(own.size))) - 0.5 * spread - 0.5 * own.logdet
-        misfit[k] = square / own.size
+        squares = np.zeros(len(own.kinds))
+        logdet = own.logdet.copy()
+        for c, kind in enumerate(own.kinds):
+            r, J, without = white[g, kind.rows], fit.jacobian[kind.rows], precisions[g]
+            # Woodbury: r' (1 + J P J')^-1 r, in as many numbers as there are parameters.
+            inner = without + J.T @ J
+            along = J.T @ r
+            squares[c] = max(float(r @ r - along @ np.linalg.pinv(inner, hermitian=True) @ along), 0.0)
+            logdet[c] += float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(without)[1])
+        elpd[k] = -float(minus_log(squares, logdet, np.array(own.size)))
+        misfit[k] = squares[0] / own.size
+    place = {(one.run, one.interval): int(np.searchsorted(names, groups[k])) for k, one in enumerate(arena.many)}
+    ends = np.array([key[place[one.run, one.interval], k] for k, one in enumerate(arena.whole)])
+    ends[np.abs(ends).max(axis=(1, 2)) > LOST_M] = np.nan
     H, _ = solver.normal(fit)
     sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(H, hermitian=True)), 0.0))
     without = np.array([np.concatenate(point) for point in points])

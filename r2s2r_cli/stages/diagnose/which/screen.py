@@ -10,7 +10,7 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.candidates import Candidate
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
-from r2s2r_cli.stages.diagnose.which.robust import minus_log, weight
+from r2s2r_cli.stages.diagnose.which.mixture import minus_log
 
 LEAST_RESPONSE = 1.0
 """Whitened length below which a response is nothing: the effect cannot be seen in these gaits."""
@@ -42,21 +42,22 @@ class Response:
 
 
 class _Projection:
-    """The nuisances as a linear problem, without those (held) that a candidate sets itself."""
+    """The nuisances as a linear problem, without those (held) that a candidate sets itself. Q spans, weighted, what
+    they can move."""
 
     def __init__(self, J: np.ndarray, weights: np.ndarray, precision: np.ndarray, held: Sequence[int] = ()) -> None:
         self.J = J.copy()
         self.J[:, list(held)] = 0.0
         self.normal = (self.J * weights[:, None]).T @ self.J + precision
-        self.Q, _ = np.linalg.qr(np.delete(J, list(held), axis=1))
+        self.Q, _ = np.linalg.qr(np.sqrt(weights)[:, None] * np.delete(J, list(held), axis=1))
 
 
 def screen(arena: Arena, base: Fit, candidates: Sequence[Candidate]) -> tuple[Response, ...]:
     """Responses of all candidates at the sizes they are tried at, best gain first. base: the refit nominal model."""
     fits = Fits(arena)
     rows = [(i, size) for i, one in enumerate(candidates) for size in one.tries]
-    weights = weight(arena.squares(base.residual[None])[0], arena.sizes)
-    by_row = np.concatenate([np.full(w.rows.stop - w.rows.start, k) for w, k in zip(arena.white, weights, strict=True)])
+    likely = fits.likely(base)
+    by_row = likely**2
     Jn = base.jacobian[:, : len(base.z)]
     plain = _Projection(Jn, by_row, arena.precision)
     pull = arena.precision @ (base.z - arena.mean)
@@ -69,11 +70,9 @@ def screen(arena: Arena, base: Fit, candidates: Sequence[Candidate]) -> tuple[Re
         ])  # fmt: skip
         residuals = arena.residuals(values, np.repeat(base.z[None], len(some), axis=0))
         for (i, size), residual in zip(some, residuals, strict=True):
-            if not np.isfinite(residual).all():
-                continue
             held = fits.overruled(Hypothesis((candidates[i],)))
             own = plain if not held else _Projection(Jn, by_row, arena.precision, held)
-            response = residual - base.residual
+            response = likely * (residual - base.residual)
             length = float(np.linalg.norm(response))
             left = response - own.Q @ (own.Q.T @ response)
             kept = float(np.linalg.norm(left))
@@ -83,7 +82,7 @@ def screen(arena: Arena, base: Fit, candidates: Sequence[Candidate]) -> tuple[Re
             by = -np.linalg.solve(own.normal, own.J.T @ (by_row * residual) + pull)
             z = np.clip(base.z + by, arena.lower, arena.upper)
             after = residual + own.J @ (z - base.z)
-            data = float(minus_log(arena.squares(after[None]), arena.sizes).sum())
+            data = float(minus_log(arena.squares(after[None]), arena.logdets, arena.sizes).sum())
             away = z - arena.mean
             gain = base.cost - data - 0.5 * float(away @ arena.precision @ away)
             if i not in best or gain > best[i][0]:

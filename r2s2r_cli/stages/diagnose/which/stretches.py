@@ -1,4 +1,4 @@
-"""Target intervals as what hypotheses are scored on: end caps and cable lengths at about 10 frames a second."""
+"""Stretches that hypotheses are scored on: end caps and cable lengths at about 10 frames a second."""
 
 from __future__ import annotations
 
@@ -24,11 +24,13 @@ LENGTH_NOISE_M = 2e-3
 
 @dataclass(frozen=True)
 class Stretch:
-    """One target interval of a run, with a start state of its own.
+    """One target interval of a run, or a piece of one, with a start state of its own.
 
-    order: 0, 1, ... through the evidence. window: with the thinned frames (F,). caps: (F, cap, 3) [m]; noise: sd of
-    them, (F, cap, 3). length: of the sensors (F, sensor) [m], NaN where not read, or None; length_sd: (F, sensor).
-    sensors: cable of each sensor. t0: of the run's first command, from which drifts count [s].
+    order: 0, 1, ... through the evidence. window: with the thinned frames (F,). piece: 0 for what begins with its
+    interval, and the next ones after it. slack (actuated,): winched cables that hang loose where it starts, None at the
+    first piece. start_sd (offset,): of the start state, in the order of `offsets.StartSpread.sd`; None: not known.
+    caps: (F, cap, 3) [m]; noise: sd of them, (F, cap, 3). length: of the sensors (F, sensor) [m], NaN where not read,
+    or None; length_sd: (F, sensor). sensors: cable of each sensor.
     """
 
     run: str
@@ -41,6 +43,9 @@ class Stretch:
     length: np.ndarray | None
     length_sd: np.ndarray | None
     sensors: tuple[int, ...]
+    piece: int = 0
+    slack: np.ndarray | None = None
+    start_sd: np.ndarray | None = None
 
     @property
     def t(self) -> np.ndarray:
@@ -64,11 +69,12 @@ def stretches(
         for number in one.intervals:
             whole_window = window(run.caps, (number,), states[one.run, number], whole=whole)
             if len(whole_window.frames) >= 2:
-                found.append(_stretch(run, number, whole_window, len(found)))
+                found.append(stretch_of(run, number, whole_window, len(found)))
     return tuple(found)
 
 
-def _stretch(run: Run, number: int, own: Window, order: int) -> Stretch:
+def stretch_of(run: Run, number: int, own: Window, order: int) -> Stretch:
+    """The frames of a window of an interval, averaged where they lie close."""
     caps = run.caps
     groups = _groups(caps.t[own.frames])
     rows = [own.frames[group] for group in groups]

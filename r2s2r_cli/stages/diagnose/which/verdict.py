@@ -148,13 +148,14 @@ def _confusable(m: Material, rows: list[int]) -> tuple[tuple[str, str, float], .
     responses = {}
     for i in rows:
         fit = m.fits[i]
-        J = fit.jacobian
         p = len(fit.z)
-        Q, _ = np.linalg.qr(J[:, :p])
         solver = Fits(m.arena)
+        likely = solver.likely(fit)
+        J = likely[:, None] * fit.jacobian
+        Q, _ = np.linalg.qr(J[:, :p])
         off = fit.hypothesis.stack("off")[None]
         without = m.arena.residuals(solver.values(fit.hypothesis, fit.z[None], off), fit.z[None])[0]
-        response = fit.residual - without
+        response = likely * (fit.residual - without)
         responses[i] = (response - Q @ (Q.T @ response), J[:, p:] - Q @ (Q.T @ J[:, p:]))
     found = []
     for a, i in enumerate(rows):

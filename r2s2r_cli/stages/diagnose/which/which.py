@@ -148,10 +148,7 @@ def _fitted(arena: Arena, base: Fit, picked: Sequence[Response], told: Told, kep
 def _begun(arena: Arena, fits: Fits, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]]) -> list[Fit]:
     values = np.concatenate([fits.values(h, z[None], x[None]) for h, z, x in points])
     residuals = arena.residuals(values, np.array([z for _, z, _ in points]))
-    return [
-        fits.begin(h, z, x, residual)
-        for (h, z, x), residual in zip(points, residuals, strict=True) if np.isfinite(residual).all()
-    ]  # fmt: skip
+    return [fits.begin(h, z, x, residual) for (h, z, x), residual in zip(points, residuals, strict=True)]
 
 
 def _best_of(fits: Sequence[Fit]) -> list[Fit]:

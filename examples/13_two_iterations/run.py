@@ -44,15 +44,13 @@ class Profile:
     settings: of project.toml, by stage; draw: pictures and pages of every stage."""
 
     targets: int = 10
-    policies: tuple[tuple[str, ...], tuple[str, ...]] = (
-        ("straight", "turn-clockwise"), ("arching", "turn-counterclockwise"),
-    )  # fmt: skip
-    repeats: int = 2
+    policies: tuple[tuple[str, ...], tuple[str, ...]] = (("straight",), ("turn-clockwise",))
+    repeats: int = 3
     settings: Mapping[str, Mapping[str, int]] = field(default_factory=lambda: SHORT)
     draw: bool = False
 
 
-DEMO = Profile(targets=8, policies=(("straight",), ("arching",)), draw=True)
+DEMO = Profile(targets=8, draw=True)
 """Minutes instead of a quarter of an hour: `make demo`."""
 
 

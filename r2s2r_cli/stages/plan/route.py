@@ -283,9 +283,13 @@ def _cells(paths: Paths) -> list[tuple[int, ...]]:
 
 
 def without_rare(primitives: Sequence[Primitive], least: float = 0.95) -> list[Primitive]:
-    """Primitives fit for sequences: they come back to rest, on one and the same triangle, nearly always; each gait
-    once. Where none is, all."""
-    fit = [one for one in primitives if one.worked * one.same_element >= least] or list(primitives)
+    """Primitives fit for sequences: they come back to rest, where they mostly do, nearly always; each gait once.
+
+    Of a behaviour of which none is, all: a sequence pays for what may go wrong, but a robot that cannot turn so is worse.
+    """
+    steady = [one.worked * one.same_element >= least for one in primitives]
+    served = {one.behaviour for one, good in zip(primitives, steady, strict=True) if good}
+    fit = [one for one, good in zip(primitives, steady, strict=True) if good or one.behaviour not in served]
     once: dict[tuple[str, ...], Primitive] = {}
     for one in fit:
         once.setdefault(one.gait.key, one)

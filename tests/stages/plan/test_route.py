@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -153,11 +154,13 @@ def test_what_robots_walked_is_told_from_their_start() -> None:
 
 
 def test_gaits_that_may_end_elsewhere_are_left_out() -> None:
-    """Only gaits that come back, on one triangle, are put into sequences; where there is none, all are."""
+    """Only gaits that come back, on one triangle, are put into sequences; where a behaviour has none, all of it are."""
     good, stray = made("a", 0.1, 0, 0), made("b", 0.2, 0, 0, same_element=0.8)
     lost = made("c", 0.3, 0, 0, worked=0.85)
     assert [one.name for one in without_rare([good, stray, lost, good])] == ["a"]
     assert [one.name for one in without_rare([stray, lost])] == ["b", "c"]
+    other = replace(stray, behaviour="clockwise")
+    assert [one.name for one in without_rare([good, lost, other])] == ["a", "b"], "no steady one turns it"
 
 
 def test_a_sequence_stays_within_reach() -> None:

@@ -285,7 +285,7 @@ def _cells(paths: Paths) -> list[tuple[int, ...]]:
 def without_rare(primitives: Sequence[Primitive], least: float = 0.95) -> list[Primitive]:
     """Primitives fit for sequences: they come back to rest, where they mostly do, nearly always; each gait once.
 
-    Of a behaviour of which none is, all: a sequence pays for what may go wrong, but a robot that cannot turn so is worse.
+    Of a behaviour of which none is, all: a sequence pays for what may go wrong, but a robot that never turns is worse.
     """
     steady = [one.worked * one.same_element >= least for one in primitives]
     served = {one.behaviour for one, good in zip(primitives, steady, strict=True) if good}

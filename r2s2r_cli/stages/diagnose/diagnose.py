@@ -124,7 +124,7 @@ def diagnose(
         robot=evidence.robot.name, floor=fitted.floor, parity=said, where=found, which=compared.which, much=shrunk,
         next_gait=after,
         refit={name: (float(z), float(sd[k])) for k, (name, z) in enumerate(
-            zip(compared.arena.names, compared.base.z, strict=True))},
+            zip(compared.arena.names[: compared.arena.shared], compared.base.z, strict=False))},
         segments=_segments(compared), within_run=evidence.within_run, rollouts=replayer.rollouts,
         warnings=(*fitted.warnings, *compared.which.warnings),
     )  # fmt: skip

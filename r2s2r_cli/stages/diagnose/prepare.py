@@ -25,6 +25,8 @@ NUMERICS_M = 3e-3
 FLOORS = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.0, 4.0)
 """Factors on the floor that healthy runs are tried with."""
 NOISES = (1.0, 1.4, 2.0, 2.8)
+FLOOR_SPREAD = 0.5
+"""Of the logarithm of the floor, before healthy runs are looked at: noisy ones say little of it."""
 ROUNDS = 2
 """Times that start states are made anew with the refitted numbers."""
 KEPT = 0.9
@@ -88,7 +90,7 @@ def refit(
         simulator, noise = _calibrated(arena, base) if with_floor else (simulator, noise)
         arena.whiten(floor_m=simulator, noise=noise)
         prior = _posterior(arena, base)
-        begin = base.z
+        begin = base.z[: arena.shared]
         keep("healthy", base.z.tolist())
         if evidence.floor is None:
             sensor = float(np.sqrt(np.mean([np.sum(one.noise[-1] ** 2, axis=-1).mean() for one in arena.whole])))
@@ -196,7 +198,11 @@ def _frozen(arena: Arena, base: Fit, prior: tuple[np.ndarray, np.ndarray] | None
 
 def _begun(arena: Arena, z: np.ndarray | None) -> np.ndarray:
     """Nuisances to begin with: those of before, as far as they are the same ones; else the prior's."""
-    return np.clip(z if z is not None and len(z) == len(arena.mean) else arena.mean, arena.lower, arena.upper)
+    found = arena.mean.copy()
+    if z is not None:
+        count = len(z) if len(z) == len(found) else arena.shared
+        found[:count] = z[:count]
+    return np.clip(found, arena.lower, arena.upper)
 
 
 def _calibrated(arena: Arena, base: Fit) -> tuple[float, float]:
@@ -208,7 +214,8 @@ def _calibrated(arena: Arena, base: Fit) -> tuple[float, float]:
         found = {}
         for floor, noise in pairs:
             arena.whiten(floor_m=floor, noise=noise)
-            found[floor, noise] = arena.log_density(raw)
+            unusual = np.log(floor / NUMERICS_M) / FLOOR_SPREAD
+            found[floor, noise] = float(arena.log_densities(raw).sum()) - 0.5 * unusual**2
         return max(found, key=lambda one: found[one])
 
     floor, noise = best((factor * own, 1.0) for factor in FLOORS)
@@ -224,7 +231,8 @@ def _posterior(arena: Arena, base: Fit) -> tuple[np.ndarray, np.ndarray]:
     )  # fmt: skip
     H, _ = fits.normal(again)
     own = [arena.model.numbers[k].kind == "own" for k in arena.engine]
-    share = np.full(len(base.z), AGED)
+    n = arena.shared
+    share = np.full(n, AGED)
     share[: len(own)] = np.where(own, AGED_ENGINE, AGED)
-    aged = np.diag(share**2 / np.diag(arena.precision))
-    return base.z, np.linalg.inv(np.linalg.inv(H) + aged)
+    aged = np.diag(share**2 / np.diag(arena.precision)[:n])
+    return base.z[:n], np.linalg.inv(np.linalg.inv(H)[:n, :n] + aged)

@@ -24,6 +24,8 @@ SECANT = 0.3
 """Of a nuisance's prior sd, to both sides: over what its derivative is taken."""
 LOST_M = 0.25
 """A cap that is simulated so far from where it was is lost, and farther off is not worse."""
+FLOOR_SD = 1e-3
+"""[m] How well the height of the floor is known, run by run: each is levelled by its own lowest caps."""
 FARTHEST_M = 0.03
 """[m] An offset of a start moves a cap by at most so much within a piece."""
 START = StartSpread(position=3e-3, tilt=0.015, roll=0.08, rest=3e-3)
@@ -46,20 +48,25 @@ class Arena:
         self.floor_m, self.noise = floor_m, noise
         self.sensors = next((one.sensors for one in many if one.length is not None), ())
         self.engine = list(self.model.nuisances)
-        self.names = (
+        self.runs = tuple(dict.fromkeys(one.run for one in many))
+        shared = (
             *(self.model.names[k] for k in self.engine), *(name for name, _, _ in CAMERA),
             *(f"sensor_bias_{k}" for k in self.sensors), *(("sensor_lag",) if self.sensors else ()),
         )  # fmt: skip
+        self.shared = len(shared)
+        """How many nuisances are the same in every run; the others are the heights of the runs' floors."""
+        self.names = (*shared, *(f"floor_{run}" for run in self.runs))
         own = [self.model.numbers[k] for k in self.engine]
         sd = np.array([n.sd for n in own] + [sd for _, _, sd in CAMERA] + [SENSOR_SD] * len(self.sensors)
-                      + [SENSOR_LAG_SD] * bool(self.sensors))  # fmt: skip
+                      + [SENSOR_LAG_SD] * bool(self.sensors) + [FLOOR_SD] * len(self.runs))  # fmt: skip
         low, high = np.array([n.within for n in own]).T
         self.lower = np.concatenate([low, np.full(len(sd) - len(own), -np.inf)])
         self.upper = np.concatenate([high, np.full(len(sd) - len(own), np.inf)])
         own_mean = np.concatenate([self.model.values0[self.engine], np.zeros(len(sd) - len(own))])
         self.mean, self.precision = own_mean, np.diag(sd**-2.0)
         if prior is not None:
-            self.mean, self.precision = prior[0].copy(), prior[1].copy()
+            n = self.shared
+            self.mean[:n], self.precision[:n, :n] = prior
         self.gaits = tuple(dict.fromkeys(one.gait for one in many))
         self.gait = np.array([self.gaits.index(one.gait) for one in many])
         self.white: tuple[White, ...] = ()
@@ -143,9 +150,9 @@ class Arena:
         """Log determinants of every stretch under each kind of error, (stretch, kind)."""
         return np.array([white.logdet for white in self.white])
 
-    def log_density(self, raw: Sequence[np.ndarray]) -> float:
-        """Of one hypothesis's residuals under the covariance as it is [nats]."""
-        return -float(density(self.squares(whitened(self.white, raw)), self.logdets).sum())
+    def log_densities(self, raw: Sequence[np.ndarray]) -> np.ndarray:
+        """Of one hypothesis's residuals under the covariance as it is, (stretch,) [nats]."""
+        return -density(self.squares(whitened(self.white, raw))[0], self.logdets)
 
     def squares(self, residual: np.ndarray) -> np.ndarray:
         """Sums of squares (k, stretch, kind) of white residuals (k, M)."""
@@ -195,8 +202,9 @@ class Arena:
         found[: len(CAMERA), : 3 * caps] = self._camera_columns(one.caps).reshape(len(CAMERA), F, -1).transpose(0, 2, 1)
         for s in range(len(self.sensors)):
             found[len(CAMERA) + s, 3 * caps + s] = 1.0
+        found[self.shared - len(self.engine) + self.runs.index(one.run), 2 : 3 * caps : 3] = 1.0
         if self.sensors and self._ends and F > 1:
-            found[-1, 3 * caps :] = -np.gradient(self._lengths(k), one.t, axis=0).T
+            found[self.shared - len(self.engine) - 1, 3 * caps :] = -np.gradient(self._lengths(k), one.t, axis=0).T
         return found
 
     @staticmethod

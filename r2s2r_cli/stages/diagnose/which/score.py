@@ -15,6 +15,9 @@ from r2s2r_cli.stages.diagnose.which.arena import LOST_M, Arena
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
 
+ENOUGH = 12.0
+"""[nats]"""
+
 
 @dataclass(frozen=True)
 class Score:
@@ -30,14 +33,17 @@ class Score:
     without: np.ndarray
 
     @property
-    def total(self) -> float:
-        """Of all stretches [nats]."""
-        return float(self.elpd.sum())
-
-    @property
     def squared(self) -> np.ndarray:
         """Mean squared 3-D distance of the caps at the end of each interval, (interval,) [m^2]."""
         return np.asarray(np.sum(self.key**2, axis=-1).mean(axis=-1))
+
+
+def gains(refit: Score, others: Sequence[Score]) -> np.ndarray:
+    """Held-out log density of hypotheses over the refit nominal model, (hypothesis,) [nats]. At a piece none loses more
+    than ENOUGH against the best of them all: a robot that tips over, or not, is explained by anything."""
+    table = np.array([refit.elpd, *(score.elpd for score in others)])
+    total = np.logaddexp(table, table.max(axis=0) - ENOUGH).sum(axis=1)
+    return np.asarray(total[1:] - total[0])
 
 
 def groups_of(arena: Arena) -> np.ndarray:

@@ -12,7 +12,7 @@ from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked, Screened, Shift, Which
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap
-from r2s2r_cli.stages.diagnose.which.score import Score
+from r2s2r_cli.stages.diagnose.which.score import Score, gains as gains_of
 from r2s2r_cli.stages.diagnose.which.screen import Response
 
 PAIR = 15.0
@@ -46,9 +46,9 @@ class Material:
 
 def concluded(m: Material) -> Which:
     """The verdict."""
-    order = sorted(range(len(m.fits)), key=lambda i: -m.scores[i].total)
+    gains = dict(enumerate(gains_of(m.refit, m.scores).tolist()))
+    order = sorted(gains, key=lambda i: -gains[i])
     singles = [i for i in order if len(m.fits[i].hypothesis.parts) == 1]
-    gains = {i: m.scores[i].total - m.refit.total for i in order}
     best: dict[str, int] = {}
     for i in singles:
         best.setdefault(m.fits[i].hypothesis.effects[0], i)

@@ -14,7 +14,7 @@ from r2s2r_cli.stages.diagnose.which.candidates import candidates
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.found import Which
 from r2s2r_cli.stages.diagnose.which.rivals import WIDER, chance, no_gap
-from r2s2r_cli.stages.diagnose.which.score import Score, groups_of, scores
+from r2s2r_cli.stages.diagnose.which.score import ENOUGH, Score, gains, groups_of, scores
 from r2s2r_cli.stages.diagnose.which.screen import Response, screen
 from r2s2r_cli.stages.diagnose.which.verdict import Material, concluded
 
@@ -81,7 +81,7 @@ def compare_effects(
         base, *fits = _again(arena, [base, *fits])
     told("left out", 0, 1)
     refit, *own = scores(arena, [base, *fits], groups, held_out=ways.held_out)
-    pairs = _pairs(arena, base, fits, own, responses)
+    pairs = _pairs(arena, base, fits, refit, own)
     if pairs:
         fits, own = [*fits, *pairs], [*own, *scores(arena, pairs, groups, held_out=ways.held_out)]
     told("left out", 1, 1)
@@ -91,7 +91,7 @@ def compare_effects(
         unexplained=unexplained if ways.unknown else -np.inf, groups=groups, calibration=calibration,
     )  # fmt: skip
     which = concluded(material)
-    order = np.argsort([-score.total for score in own], kind="stable")
+    order = np.argsort(-gains(refit, own), kind="stable")
     return Compared(arena, base, tuple(fits[i] for i in order), refit, tuple(own[i] for i in order), which)
 
 
@@ -166,13 +166,14 @@ def _widened(arena: Arena, fits: Sequence[Fit]) -> tuple[float, float]:
     own = arena.floor_m
     solver = Fits(arena)
     raws = [arena.raw(solver.values(one.hypothesis, one.z[None], one.x[None]), one.z[None]) for one in fits]
-    found: dict[float, float] = {}
+    found: dict[float, np.ndarray] = {}
     for factor in (1.0, *WIDER):
         arena.whiten(floor_m=factor * own)
-        found[factor] = max(arena.log_density(raw) for raw in raws)
+        found[factor] = np.array([arena.log_densities(raw) for raw in raws]).max(axis=0)
     arena.whiten(floor_m=own)
-    factor = max(found, key=lambda one: found[one])
-    return factor, found[factor] - found[1.0]
+    more = {factor: float(np.minimum(one - found[1.0], ENOUGH).sum()) for factor, one in found.items()}
+    factor = max(more, key=lambda one: more[one])
+    return factor, more[factor]
 
 
 def _again(arena: Arena, old: Sequence[Fit]) -> list[Fit]:
@@ -185,13 +186,11 @@ def _again(arena: Arena, old: Sequence[Fit]) -> list[Fit]:
     return begun
 
 
-def _pairs(
-    arena: Arena, base: Fit, fits: Sequence[Fit], own: Sequence[Score], responses: Sequence[Response]
-) -> list[Fit]:
+def _pairs(arena: Arena, base: Fit, fits: Sequence[Fit], refit: Score, own: Sequence[Score]) -> list[Fit]:
     """The best single effect with each other one that was fitted: where one effect leaves something, two may not."""
     if len(fits) < 2:
         return []
-    order = np.argsort([-score.total for score in own], kind="stable")
+    order = np.argsort(-gains(refit, own), kind="stable")
     first = fits[order[0]]
     others = [fits[i] for i in order[1:] if fits[i].hypothesis.effects != first.hypothesis.effects]
     seen: set[str] = set()
@@ -204,7 +203,6 @@ def _pairs(
         z = np.clip(first.z + other.z - base.z, arena.lower, arena.upper)
         points.append((both, z, np.concatenate([first.x, other.x])))
         points.append((both, first.z, np.concatenate([first.x, 0.5 * (other.x + other.hypothesis.stack("off"))])))
-    del responses
     fits_of = Fits(arena)
     begun = _begun(arena, fits_of, points)
     fits_of.run(begun, iterations=SECOND + 1)

@@ -57,14 +57,15 @@ def fit(
         if checkpoint is not None and inner is None:
             checkpoint(number, values, None)
         make = training_windows if number == 0 else filtered_windows
-        windows = make(runs, train, predictor, values, recipe, known)
+        begun = near if number == 0 and inner is None else None
+        windows = begun.windows if begun else make(runs, train, predictor, values, recipe, known)
         if inner is not None:
             predictor.rollouts -= len(windows)  # the evaluation at the checkpoint is made again
         hear = None if progress is None else partial(progress, number, rounds)
         keep = None if checkpoint is None else partial(checkpoint, number, values)
         if number == 0:
             found = first_round(predictor, windows, values, recipe, seed=seed, progress=hear, checkpoint=keep,
-                                resume=inner, near=near)  # fmt: skip
+                                resume=inner, near=begun)  # fmt: skip
             if found.problem.exact or all(one.known for one in windows):
                 break  # the model explains the data, or there is nothing to make again
         else:

@@ -52,8 +52,9 @@ MOST_UNKNOWNS = 40
 @dataclass(frozen=True)
 class Near:
     """What derivatives reach over the intervals that they can be trusted with, with what they said on the way, and how
-    many windows that simulated."""
+    many simulations that took. windows: those of the first round."""
 
+    windows: Sequence[Window]
     solution: Solution
     said: tuple[Progress, ...]
     rollouts: int
@@ -130,7 +131,7 @@ def near_fit(predictor: Predictor, windows: Sequence[Window], values: np.ndarray
         list(zip(names, stages, strict=True))[:count], started(stages[-1], values), loss=LOSSES[recipe.loss],
         early=EARLY_HORIZONS, last=BEFORE_POPULATION, progress=said.append,
     )  # fmt: skip
-    return Near(solution, tuple(said), predictor.rollouts - before)
+    return Near(tuple(windows), solution, tuple(said), predictor.rollouts - before)
 
 
 def later_round(

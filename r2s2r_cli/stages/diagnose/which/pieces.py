@@ -64,19 +64,19 @@ def pieces(
     named = {run.name: run for run in runs}
     cuts = [cut for one in part for number in one.intervals for cut in _cuts(named[one.run], number)]
     begin: dict[tuple[str, int], State] = dict(states)
-    slack: dict[tuple[str, int], np.ndarray] = {}
+    taut: dict[tuple[str, int], np.ndarray] = {}
     made: dict[tuple[str, int, int], Stretch] = {}
     for depth in range(1 + max((cut.piece for cut in cuts), default=-1)):
         now = [cut for cut in cuts if cut.piece == depth]
-        found = [_piece(cut, begin[cut.place], slack.get(cut.place), replayer) for cut in now]
+        found = [_piece(cut, begin[cut.place], taut.get(cut.place), replayer) for cut in now]
         made.update({(*cut.place, depth): one for cut, one in zip(now, found, strict=True)})
         longer = {cut.place for cut in cuts if cut.piece == depth + 1}
         going = [k for k, cut in enumerate(now) if cut.place in longer]
         if going:
             after = replayer.finals([found[k] for k in going], values)
-            own, loose = _begun([now[k] for k in going], after, replayer, values)
+            own, rest = _begun([now[k] for k in going], after, replayer, values)
             begin.update({now[k].place: state for k, state in zip(going, own, strict=True)})
-            slack.update({now[k].place: row for k, row in zip(going, loose, strict=True)})
+            taut.update({now[k].place: row for k, row in zip(going, rest, strict=True)})
     ordered = [made[(*cut.place, cut.piece)] for cut in cuts]
     return tuple(replace(one, order=k) for k, one in enumerate(ordered))
 
@@ -100,7 +100,7 @@ def _cuts(run: Run, number: int) -> list[_Cut]:
     return [_Cut(run, number, k, a, np.arange(a + 1, b + 1)) for k, (a, b) in enumerate(pairwise(edges))]
 
 
-def _piece(cut: _Cut, state: State, slack: np.ndarray | None, replayer: Replayer) -> Stretch:
+def _piece(cut: _Cut, state: State, taut: np.ndarray | None, replayer: Replayer) -> Stretch:
     caps = cut.run.caps
     count = len(cut.frames)
     own = Window(
@@ -108,7 +108,9 @@ def _piece(cut: _Cut, state: State, slack: np.ndarray | None, replayer: Replayer
         place=np.zeros(count, dtype=int), state=state,
     )  # fmt: skip
     made = stretch_of(cut.run, cut.interval, own, 0)
-    return replace(made, piece=cut.piece, slack=slack, start_sd=_start_sd(caps, cut.first, replayer))
+    return replace(
+        made, piece=cut.piece, taut=taut, margin=loose(caps, cut.first), start_sd=_start_sd(caps, cut.first, replayer)
+    )
 
 
 def _start_sd(run: RunData, frame: int, replayer: Replayer) -> np.ndarray:
@@ -130,7 +132,7 @@ def _begun(
     cuts: Sequence[_Cut], after: State, replayer: Replayer, values: np.ndarray
 ) -> tuple[list[State], np.ndarray]:
     """Starts of the next pieces: smoothed poses, what they do not show from the pieces before (a batch of states); and
-    which winched cables hang loose, (piece, actuated)."""
+    the rest lengths of winched cables that are just taut there [m], (piece, actuated)."""
     import torch
 
     from r2s2r_cli.engine.reading import read
@@ -146,5 +148,7 @@ def _begun(
             v_WE=torch.as_tensor(np.array([run.v_WE[frame] for run, frame in frames])),
             loose=float(np.mean([loose(run, frame) for run, frame in frames])),
         )  # fmt: skip
-        tension = read(replayer.structure, theta, state).tension[:, list(replayer.structure.actuated)]
-    return [state.select(k) for k in range(len(cuts))], tension.numpy() <= 0.0
+        reading, winched = read(replayer.structure, theta, state), list(replayer.structure.actuated)
+        just = state.rest + (reading.length - reading.rest)[:, winched]  # effects may add to what the winches give
+        taut = torch.where(reading.tension[:, winched] > 0, state.rest, torch.minimum(just, state.rest))
+    return [state.select(k) for k in range(len(cuts))], taut.numpy()

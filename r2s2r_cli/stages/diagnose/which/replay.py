@@ -175,21 +175,23 @@ class Replayer(Predictor):
         return flat[:, low] * (1 - (at - low)) + flat[:, low + 1] * (at - low)
 
     def _carried(self, one: Stretch, start: Tensor, before: Tensor) -> Tensor:
-        """Starts (k, NS) with what no cap shows from the states (k, NS) before: rest lengths of slack cables, winding
-        rates, the memory of effects. What left the finite numbers hands nothing on."""
+        """Starts (k, NS) with what no cap shows from the states (k, NS) before: rest lengths of cables that hang, by
+        each hypothesis's own account, winding rates, the memory of effects. What left the finite numbers hands nothing
+        on."""
         import torch
 
         from r2s2r_cli.engine.flat import state_slots
 
         slots = state_slots(self.structure)
         own = torch.zeros(start.shape[1], dtype=torch.bool)
-        rest = slots["rest"]
-        own[rest.start : rest.start + rest.size] = torch.as_tensor(
-            np.zeros(rest.size, bool) if one.slack is None else one.slack
-        )
         for name, slot in slots.items():
-            own[slot.start : slot.start + slot.size] |= name == "winding" or "." in name
-        return torch.where(own & before.isfinite().all(dim=1, keepdim=True), before, start)
+            own[slot.start : slot.start + slot.size] = name == "winding" or "." in name
+        found = torch.where(own, before, start)
+        if one.taut is not None:
+            rest = slice(slots["rest"].start, slots["rest"].start + slots["rest"].size)
+            taut = torch.as_tensor(one.taut).expand(len(before), -1)
+            found[:, rest] = torch.where(before[:, rest] > taut + one.margin, before[:, rest], taut)
+        return torch.where(before.isfinite().all(dim=1, keepdim=True), found, start)
 
     def _commands_at(self, many: Sequence[Stretch], rows: int, delays: np.ndarray) -> Tensor:
         """Commands (k stretch, row, actuated), each hypothesis with its own delay [s]."""

@@ -27,10 +27,11 @@ class Stretch:
     """One target interval of a run, or a piece of one, with a start state of its own.
 
     order: 0, 1, ... through the evidence. window: with the thinned frames (F,). piece: 0 for what begins with its
-    interval, and the next ones after it. slack (actuated,): winched cables that hang loose where it starts, None at the
-    first piece. start_sd (offset,): of the start state, in the order of `offsets.StartSpread.sd`; None: not known.
-    caps: (F, cap, 3) [m]; noise: sd of them, (F, cap, 3). length: of the sensors (F, sensor) [m], NaN where not read,
-    or None; length_sd: (F, sensor). sensors: cable of each sensor.
+    interval, and the next ones after it. taut (actuated,): rest lengths of winched cables that are just taut where it
+    starts [m], None at a first piece; margin [m]: a cable that is longer by more than that hangs. start_sd (offset,):
+    of the start state, in the order of `offsets.StartSpread.sd`; None: not known. caps: (F, cap, 3) [m]; noise: sd of
+    them, (F, cap, 3). length: of the sensors (F, sensor) [m], NaN where not read, or None; length_sd: (F, sensor).
+    sensors: cable of each sensor.
     """
 
     run: str
@@ -44,7 +45,8 @@ class Stretch:
     length_sd: np.ndarray | None
     sensors: tuple[int, ...]
     piece: int = 0
-    slack: np.ndarray | None = None
+    taut: np.ndarray | None = None
+    margin: float = 0.0
     start_sd: np.ndarray | None = None
 
     @property

@@ -1,0 +1,155 @@
+"""Pieces of intervals: the engine's own run is predicted from where it was seen, and nothing that is unseen is lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import torch
+
+from r2s2r_cli.engine import end_caps
+from r2s2r_cli.engine.flat import pack_parameters, pack_state, unpack_state
+from r2s2r_cli.engine.state import State, cap_velocities
+from r2s2r_cli.stages.diagnose.evidence import Run
+from r2s2r_cli.stages.diagnose.which.numbers import Model
+from r2s2r_cli.stages.diagnose.which.pieces import pieces
+from r2s2r_cli.stages.diagnose.which.replay import Replayer
+from r2s2r_cli.stages.diagnose.which.stretches import Stretch
+from r2s2r_cli.stages.identified import nominal
+from r2s2r_cli.stages.identify.data import RunData, Selection
+from r2s2r_cli.stages.model import rest_state
+from r2s2r_cli.stages.segments import Intervals, Segments
+from tests.support.builders import robot
+
+STEP, FRAME_S, SECONDS, TICK_S = 2e-3, 0.1, 3.0, 0.02
+PLAY_M = 0.008
+SETTLE_S = 10.0
+
+pytestmark = pytest.mark.slow
+
+
+@dataclass(frozen=True)
+class Walked:
+    """A run of the engine with `values`, and what makes pieces of it."""
+
+    replayer: Replayer
+    model: Model
+    values: np.ndarray
+    run: Run
+    begin: State
+
+    @property
+    def pieces(self) -> tuple[Stretch, ...]:
+        """Of the one interval."""
+        part = (Selection("walk", (1,)),)
+        return pieces([self.run], part, {("walk", 1): self.begin}, self.replayer, self.values)
+
+    def errors(self, many: tuple[Stretch, ...]) -> list[float]:
+        """Largest error of a cap in each of the stretches [m]."""
+        seen = self.replayer.seen(many, self.values[None])
+        return [float(np.abs(s.caps[0] - one.caps).max()) for s, one in zip(seen, many, strict=True)]
+
+
+@pytest.fixture(scope="module")
+def walked() -> Walked:
+    """Two cables in and one out again, with play in the winches; a third pays out until it hangs."""
+    model = Model(nominal(robot()), effects=("backlash", "camera_delay"))
+    replayer = Replayer(model, step=STEP, threads=1)
+    values = model.values0.copy()
+    for place in model.off("backlash"):
+        values[place] = PLAY_M
+    ticks = np.arange(0.0, SECONDS, TICK_S)
+    control = np.zeros((len(ticks), 6))
+    going = ticks >= 0.2
+    control[:, 0] = going * np.where(ticks < 1.2, 1.0, np.where(ticks < 2.2, -1.0, 0.0))
+    control[:, 1] = going * np.where(ticks < 1.0, 1.0, 0.0)
+    control[:, 2] = going * np.where(ticks < 1.6, -1.0, 1.0)
+    theta, structure = model.theta(values), model.structure
+    base = rest_state(robot())
+    start = State(
+        base.p_WB, base.q_WR, base.v_WB, base.w_R, base.rest, base.winding,
+        {f"{e.name}.{key}": torch.zeros(1, n) for e in structure.effects
+         for key, n in e.state_sizes(structure).items()},
+    )  # fmt: skip
+    p = pack_parameters(structure, theta)
+    still = torch.zeros(1, round(SETTLE_S / STEP), 6, dtype=torch.float64)
+    settled = replayer.simulator.advance(pack_state(structure, start), still, p, h=STEP, hold=1, every=still.shape[1])
+    u = torch.as_tensor(np.repeat(control, round(TICK_S / STEP), axis=0))[None]
+    flat = replayer.simulator.advance(settled[:, -1], u, p, h=STEP, hold=1, every=round(FRAME_S / STEP))[0]
+    states = unpack_state(structure, flat)
+    caps, speed = end_caps(theta, states).numpy(), cap_velocities(theta, states).numpy()
+    t = FRAME_S * np.arange(len(caps))
+    last = len(t) - 1
+    small = np.full(caps.shape, 1e-4)
+    intervals = Intervals(
+        np.array([0]), np.array([last]), np.array([0.0]), np.array([t[-1]]), np.zeros((1, 6)), np.ones(1, bool)
+    )
+    segments = Segments(np.array([1]), np.array([0]), np.array([last]), np.array([0.0]), np.array([t[-1]]), None,
+                        np.ones(1, bool))  # fmt: skip
+    quality = np.zeros(caps.shape[:2], np.uint8)
+    data = RunData(
+        "walk", t, caps, np.full((6, 3), 1e-4), caps, small, speed, small, quality, ticks, control,
+        np.zeros_like(control), intervals, segments,
+    )  # fmt: skip
+    return Walked(replayer, model, values, Run(data, gait="walk"), unpack_state(structure, flat[:1]))
+
+
+def test_pieces_cover_the_interval_once(walked: Walked) -> None:
+    """They follow each other from frame to frame, none longer than half as much again as asked."""
+    made = walked.pieces
+    assert len(made) >= 3
+    assert [one.piece for one in made] == list(range(len(made)))
+    assert made[0].window.start == 0.0
+    for one, after in pairwise(made):
+        assert after.window.start == pytest.approx(one.t[-1])
+    assert made[-1].t[-1] == pytest.approx(walked.run.caps.t[-1])
+
+
+def test_the_engine_predicts_its_own_run(walked: Walked) -> None:
+    """Begun anew in its own poses, the simulation ends where the run was: within the 3 mm by which a cable may hang
+    before that is believed."""
+    assert max(walked.errors(walked.pieces)) < 3.5e-3
+
+
+def test_what_is_not_seen_goes_on(walked: Walked) -> None:
+    """A piece that does not hear of the one before has forgotten where the winches stand in their play."""
+    made = walked.pieces
+    forgetful = [walked.errors((one,))[0] for one in made]
+    forgetful[0] = 0.0
+    values = walked.model.values0.copy()
+    assert max(forgetful) <= max(walked.errors(made)) + 1e-9  # each start has the memory that `pieces` carried there
+    without = Walked(walked.replayer, walked.model, values, walked.run, walked.begin)
+    assert max(without.errors(without.pieces)) > 3e-3
+
+
+def test_hypotheses_carry_their_own_memory(walked: Walked) -> None:
+    """Pieces cut at the nominal numbers, replayed with the play that was planted: as good as pieces that were cut with
+    it, because every hypothesis hands its own memory on."""
+    cut = Walked(walked.replayer, walked.model, walked.model.values0, walked.run, walked.begin).pieces
+    chained = walked.errors(cut)
+    alone = [walked.errors((one,))[0] for one in cut]
+    assert max(chained) < 8e-3
+    assert max(alone) > 1.5 * max(chained)
+
+
+def test_a_hanging_cable_hangs_on(walked: Walked) -> None:
+    """A cable that paid out is longer than one that is just taut at the start of a later piece."""
+    hanging = [
+        float(one.window.state.rest[0, 2] - one.taut[2]) for one in walked.pieces[1:] if one.taut is not None
+    ]  # fmt: skip
+    assert len(hanging) >= 2
+    assert max(hanging) > 0.01
+
+
+def test_a_late_camera_shows_what_was(walked: Walked) -> None:
+    """Caps of `tau` ago, while the sensors read the present."""
+    tau = 0.1
+    whole = walked.pieces[:1]
+    values = np.repeat(walked.values[None], 2, axis=0)
+    values[1, walked.model.off("camera_delay")[0]] = tau
+    seen = walked.replayer.seen(whole, values)[0]
+    frames = round(tau / FRAME_S)
+    assert seen.caps[1, frames:] == pytest.approx(seen.caps[0, :-frames], abs=1e-3)
+    assert np.abs(seen.caps[1] - seen.caps[0]).max() > 3e-3

@@ -1,11 +1,13 @@
 """The pass over the images: predict every cap, look for it there, go on; what stays is small (sightings).
 
 It begins at the first frame in which all caps are told apart, goes on to the last one, and then from the beginning back
-to the first. Pictures are decoded once, those before the beginning twice.
+to the first. Where caps turn up at another place than they were taken to be, it goes back from there as far as that
+tells anything new. Pictures are decoded once, those that are gone through again twice.
 """
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
@@ -15,14 +17,17 @@ from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.estimate.motion.data import MotionSettings, Readings, Sighted
 from r2s2r_cli.stages.estimate.motion.forward import Forward
 from r2s2r_cli.stages.estimate.motion.labels import label
+from r2s2r_cli.stages.estimate.sweep_rows import Look, Rows
 from r2s2r_cli.stages.estimate.vision.frames import FrameSource, ImageFrame
 from r2s2r_cli.stages.estimate.vision.sight import Sighter
-from r2s2r_cli.stages.estimate.vision.sightings import HIDDEN, Candidate
+from r2s2r_cli.stages.estimate.vision.sightings import Candidate
 from r2s2r_cli.stages.estimate.vision.world import from_world, to_world
 from schemas.robot import Robot
 
 MOST = 0.6
 """Of the caps in view, below which a robot is on its way out of the picture."""
+AWAY_M = 0.04
+"""A cap that is found farther from where it was taken to be was not followed: the frames before may show it as well."""
 FRESH_S = 0.06
 """Readings of the sensors up to this old count as those of a frame: three samples of a board."""
 
@@ -82,9 +87,7 @@ class Sweep:
         # What was heard long before the first frame is of no use to it.
         self._since = np.concatenate([[np.searchsorted(self._stamps, source.t[0] - FRESH_S)], before])
         self._cable = np.zeros(0, dtype=int) if readings is None else readings.cable
-        self._p, self._cov = np.full((n, caps, 3), np.nan), np.full((n, caps, 3, 3), np.nan)
-        self._visible, self._code = np.zeros((n, caps)), np.full((n, caps), HIDDEN, dtype=np.uint8)
-        self._shift = np.full((n, 2), np.nan)
+        self._rows = Rows(n, caps)
         self._known, self._known_sd = np.zeros((n, caps, 3)), np.zeros((n, caps, 3))
         self._searched = np.zeros(n, dtype=bool)
         self._seen = np.zeros(len(robot.rods), dtype=int)
@@ -97,20 +100,34 @@ class Sweep:
                 found = self._begin(frame)
                 if found is not None:
                     forward, first, start = self._started(frame.t, found), frame.index, found
-            if forward is not None:
-                self._look(forward, frame)
+            if forward is not None and self._look(forward, frame):
+                self._again(forward, frame.index, first)
             self._advance(1)
         if forward is None:
             raise self._not_found()
         if first:
             self._backwards(first, start)
-        return Swept(Sighted(self._source.t, self._p, self._cov), self._visible, self._code, self._shift,
+        rows = self._rows
+        return Swept(Sighted(self._source.t, rows.p_WE, rows.cov), rows.visible, rows.code, rows.shift_px,
                      self._known, self._known_sd, first, self._searched)  # fmt: skip
 
     def _backwards(self, first: int, start: np.ndarray) -> None:
         back = self._started(float(self._source.t[first]), start, backwards=True)
-        for frame in _in_reverse(self._source, first):
-            self._look(back, frame)
+        for frame in _between(self._source, first, 0):
+            if self._look(back, frame):
+                self._again(back, frame.index, first)
+
+    def _again(self, forward: Forward, k: int, begun: int) -> None:
+        """From frame k, in which caps were found again, back to frame `begun`: until nothing new is seen."""
+        back = copy.deepcopy(forward)
+        back.start(float(self._source.t[k]), forward.p_WE, forward.cov_p, backwards=k > begun)
+        for frame in _between(self._source, k, begun):
+            back.predict(frame.t)
+            look = self._see(back, frame)
+            if back.doubt.whole or self._rows.agree(frame.index, look):
+                break
+            if self._rows.better(frame.index, look):
+                self._rows.keep(frame.index, look, look.used)
 
     def _started(self, t: float, p_WE: np.ndarray, *, backwards: bool = False) -> Forward:
         forward = Forward(self._robot, self._settings, self._cable)
@@ -127,28 +144,28 @@ class Sweep:
         found = label(blobs, self._robot, self._of_cables(frame.index))
         return found.p_WE if found is not None and found.sure else None
 
-    def _look(self, forward: Forward, frame: ImageFrame) -> None:
-        self._sighted(forward, frame)
-        p_WE, cov = forward.predict(frame.t)
-        self._known[frame.index] = p_WE
-        self._known_sd[frame.index] = np.sqrt(np.diagonal(cov, axis1=1, axis2=2))
-
-    def _sighted(self, forward: Forward, frame: ImageFrame) -> None:
+    def _look(self, forward: Forward, frame: ImageFrame) -> bool:
+        """Go on to a frame; whether caps were found in it far from where they were taken to be."""
         k = frame.index
         for row in range(self._since[k], self._since[k + 1]):
             forward.sense(float(self._stamps[row]), self._samples[row])
-        p_WE, cov = forward.predict(frame.t)
+        before, _ = forward.predict(frame.t)
         lost = forward.lost
-        if lost and self._find(forward, frame):
-            lost = False
-            p_WE, cov = forward.predict(frame.t)
-        seen = self._sighter.sight(frame, *from_world(self._X_WC, p_WE, cov))
-        self._visible[k], self._code[k], self._shift[k] = seen.visible, seen.code, seen.shift_px
-        p, cov_p = to_world(self._X_WC, seen.p_C, seen.cov_C)
-        used = forward.update(frame.t, p, cov_p)
+        found = (lost or forward.doubt.missing) and self._find(forward, frame)
+        away = found and bool(np.max(np.linalg.norm(forward.p_WE - before, axis=1)) > AWAY_M)
+        look = self._see(forward, frame)
         # Who is lost may look at the wrong cap: what contradicts the prediction is not even kept.
-        self._p[k] = np.where((used | ~np.array(lost))[:, None], p, np.nan)
-        self._cov[k] = cov_p
+        self._rows.keep(k, look, look.used | ~np.array(lost and not found))
+        p_WE, cov = forward.predict(frame.t)
+        self._known[k], self._known_sd[k] = p_WE, np.sqrt(np.diagonal(cov, axis1=1, axis2=2))
+        return away
+
+    def _see(self, forward: Forward, frame: ImageFrame) -> Look:
+        """Look for every cap where the filter, which is at the time of the frame, expects it, and tell it."""
+        seen = self._sighter.sight(frame, *from_world(self._X_WC, forward.p_WE, forward.cov_p))
+        p, cov = to_world(self._X_WC, seen.p_C, seen.cov_C)
+        used = forward.update(frame.t, p, cov)
+        return Look(p, cov, used, seen.visible, seen.code, seen.shift_px)
 
     def _find(self, forward: Forward, frame: ImageFrame) -> bool:
         if frame.color is None:
@@ -185,8 +202,10 @@ class Sweep:
         )  # fmt: skip
 
 
-def _in_reverse(source: FrameSource, first: int) -> Iterable[ImageFrame]:
-    for index in range(first - 1, -1, -1):
+def _between(source: FrameSource, start: int, stop: int) -> Iterable[ImageFrame]:
+    """The frames from beside `start` to `stop`, in either direction."""
+    step = 1 if stop > start else -1
+    for index in range(start + step, stop + step, step):
         yield source.frame(index)
 
 

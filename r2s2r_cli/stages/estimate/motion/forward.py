@@ -8,8 +8,9 @@ import numpy as np
 
 from r2s2r_cli.stages.estimate.motion.body import Body
 from r2s2r_cli.stages.estimate.motion.data import MotionSettings
+from r2s2r_cli.stages.estimate.motion.doubt import Doubt
 from r2s2r_cli.stages.estimate.motion.equations import START_SD, start_sd
-from r2s2r_cli.stages.estimate.motion.labels import label
+from r2s2r_cli.stages.estimate.motion.labels import Labelling, label
 from r2s2r_cli.stages.estimate.motion.measurements import (
     Stack,
     floor_rows,
@@ -24,12 +25,8 @@ GATE = 30.0
 """Squared distance over variance beyond which a sighting is refused (3 parts: 1e-6)."""
 BURST = 10.0
 """[m^2/s^3] Density of the acceleration where sightings leave the prediction: 0.6 m/s within 1/30 s."""
-REFUSED = 5
-"""Frames in a row that may refuse a cap, or contradict rods and sensors, before it counts as lost."""
-BLIND_S = 0.3
-"""[s] After so long without any cap, where they are is looked for afresh."""
-FRESH_S, STOPS_S = 0.1, 0.25
-"""[s] A cap not seen for the first goes on with a velocity that fades with the second as time constant."""
+STOPS_S = 0.25
+"""[s] A cap out of sight goes on with a velocity that fades with this time constant."""
 TWIN_M = 0.04
 """[m] Two caps of a rod whose distance is farther off than this are not both caps of it."""
 BENT_M, FAR_OFF_M, FAR_OFF = 0.005, 0.04, 2
@@ -64,13 +61,11 @@ class Forward:
         self._cov = np.eye(self.body.dim)
         self._t = float("nan")
         self._way = 1.0
-        self._refused = np.zeros(self.body.caps, dtype=int)
+        self.doubt = Doubt(self.body.caps)
         self._shown, self._heard = np.full((2, len(self.body.sensor)), np.nan)
         self._agreed = np.zeros(len(self.body.sensor), dtype=bool)
         self._count, self._sum, self._late = (np.zeros(len(self.body.sensor)) for _ in range(3))
         self._elapsed = 0.0
-        self._unseen = np.zeros(self.body.caps)
-        self._wrong = 0
 
     @property
     def t(self) -> float:
@@ -136,7 +131,7 @@ class Forward:
             else:
                 self._cov = calm
         self._elapsed = 0.0
-        self._refused = np.where(used, 0, np.where(seen, self._refused + 1, self._refused))
+        self.doubt.look(seen, used)
 
         def rows(stack: Stack, x: np.ndarray) -> None:
             sighting_rows(stack, x, body, np.where(used[:, None], p_WE, np.nan), cov)
@@ -146,8 +141,7 @@ class Forward:
                 standing_rows(stack, x, body)
 
         self._correct(rows)
-        self._unseen[used] = 0.0
-        self._wrong = 0 if self._consistent() else self._wrong + 1
+        self.doubt.judge(consistent=self._consistent(), used=used)
         return np.asarray(used)
 
     def _without_twins(self, p_WE: np.ndarray) -> np.ndarray:
@@ -199,17 +193,12 @@ class Forward:
 
     @property
     def lost(self) -> bool:
-        """Some cap is less certain than `MotionSettings.lost_sd_m`, or nothing was seen for long, or what is seen
-        contradicts prediction, rods or sensors for long: look everywhere (`reacquire`)."""
+        """Some cap is less certain than `MotionSettings.lost_sd_m`, or the robot as a whole is in doubt (`Doubt`): look
+        everywhere (`reacquire`)."""
         if np.isnan(self._t):
             return True
         worst = np.sqrt(np.linalg.eigvalsh(self.cov_p)[:, -1])
-        return bool(
-            np.any(worst > self.settings.lost_sd_m)
-            or np.any(self._refused >= REFUSED)
-            or np.all(self._unseen > BLIND_S)
-            or self._wrong >= REFUSED
-        )
+        return bool(np.any(worst > self.settings.lost_sd_m) or self.doubt.whole)
 
     def reacquire(self, t: float, candidates: Sequence[np.ndarray], cov: np.ndarray) -> bool:
         """Find the caps among blobs of each rod's colour, (blob, 3) in W with covariance (3, 3), by the labelling that
@@ -220,11 +209,14 @@ class Forward:
         self._go(t)
         length = np.full(len(self.body.cable), np.nan)
         length[self._cable] = self._shown - self._x[self.body.bias]
-        kept = self._unseen <= FRESH_S
+        kept = self.doubt.in_sight
+        self.doubt.searched()
         found = label(candidates, self.robot, length, predicted=(self.p_WE, self.cov_p), partly=True, kept=kept)
-        if found is None or not found.sure:
+        if found is None or not (found.sure or self._told(candidates, length, found)):
             return False
-        body, seen = self.body, np.all(np.isfinite(found.p_WE), axis=1)
+        if not (self.lost or self._elsewhere(found.p_WE)):
+            return False
+        body = self.body
         keep = slice(body.moving, body.dim)
         slow = self._cov[keep, keep].copy()
         sd = np.repeat(AGAIN_SD, 3 * body.caps)
@@ -232,8 +224,7 @@ class Forward:
         self._cov[keep, keep] = slow
         self._cov[np.arange(body.moving), np.arange(body.moving)] = sd**2
         self._x[3 * body.caps : body.moving] = 0.0
-        for cap in np.flatnonzero(seen):
-            self._x[body.p(int(cap))] = found.p_WE[cap]
+        self._x[: 3 * body.caps] = _carried(self.p_WE, found.p_WE).ravel()
         covs = np.broadcast_to(cov, (body.caps, 3, 3))
         now = np.zeros(len(body.sensor))
         noise = np.full(len(now), self.settings.sensor_noise_sd_m)
@@ -248,11 +239,21 @@ class Forward:
         self._believe()
         return True
 
+    def _told(self, candidates: Sequence[np.ndarray], length: np.ndarray, found: Labelling) -> bool:
+        """Whether the sensors alone, as at the start, say without doubt the same of all caps. A cap that went astray
+        on its own is far from its prediction, and might as well be taken for missing."""
+        if np.any(found.pick < 0) or not np.any(np.isfinite(length)):
+            return False
+        alone = label(candidates, self.robot, length)
+        return alone is not None and alone.sure and np.array_equal(alone.pick, found.pick)
+
+    def _elsewhere(self, p_WE: np.ndarray) -> bool:
+        """Whether caps that were found (cap, 3), NaN where not, are clearly not where they are expected."""
+        off = np.linalg.norm(p_WE - self.p_WE, axis=1)
+        return bool(np.any(off > TWIN_M))  # False where one is NaN
+
     def _believe(self) -> None:
-        """Nothing speaks against the states (any more)."""
-        self._refused[:] = 0
-        self._unseen[:] = 0.0
-        self._wrong = 0
+        self.doubt.believe()
         self._agreed[:] = False
 
     def _consistent(self) -> bool:
@@ -262,7 +263,7 @@ class Forward:
         rods = np.linalg.norm(p[self.body.rod[:, 1]] - p[self.body.rod[:, 0]], axis=-1) - self.body.rod_length
         seen = np.linalg.norm(p[self.body.sensor[:, 1]] - p[self.body.sensor[:, 0]], axis=-1)
         off = np.abs(self._shown - self._x[self.body.bias] - seen)
-        in_sight = np.all(self._unseen[self.body.sensor] <= FRESH_S, axis=1)
+        in_sight = np.all(self.doubt.in_sight[self.body.sensor], axis=1)
         self._agreed = in_sight & (self._agreed | (off <= FAR_OFF_M))
         return bool(np.all(np.abs(rods) < BENT_M) and np.sum((off > FAR_OFF_M) & ~self._agreed) < FAR_OFF)
 
@@ -280,8 +281,8 @@ class Forward:
         f = np.eye(body.dim)
         f[rows, half + rows] = dt
         # Robots of cables stop soon: a velocity that was seen long ago says nothing.
-        f[half + rows, half + rows] = np.repeat(np.where(self._unseen > FRESH_S, np.exp(-size / STOPS_S), 1.0), 3)
-        self._unseen += size
+        f[half + rows, half + rows] = np.repeat(np.where(self.doubt.in_sight, 1.0, np.exp(-size / STOPS_S)), 3)
+        self.doubt.wait(size)
         cov = self._spread_by(f @ self._cov @ f.T, dt, self.settings.acceleration)
         self._elapsed += dt
         bias = np.arange(body.bias.start, body.bias.stop)
@@ -326,3 +327,16 @@ class Forward:
         keep = np.eye(self.body.dim) - gain @ slope
         cov = keep @ self._cov @ keep.T + gain @ noise @ gain.T
         self._x, self._cov = x, 0.5 * (cov + cov.T)
+
+
+def _carried(before: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Caps that were found (cap, 3), and the others, NaN, where they go with these from `before`: as a rigid body by
+    least squares (Kabsch, Acta Cryst. A32 (1976) 922) where three or more were found, else by the mean shift."""
+    seen = np.all(np.isfinite(found), axis=1)
+    a, b = before[seen], found[seen]
+    turn = np.eye(3)
+    if len(a) >= 3:
+        u, _, vt = np.linalg.svd((a - a.mean(axis=0)).T @ (b - b.mean(axis=0)))
+        turn = vt.T @ np.diag([1.0, 1.0, np.sign(np.linalg.det(vt.T @ u.T))]) @ u.T
+    moved = (before - a.mean(axis=0)) @ turn.T + b.mean(axis=0)
+    return np.where(seen[:, None], found, moved)

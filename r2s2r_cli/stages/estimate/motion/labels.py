@@ -22,6 +22,9 @@ MISSING_COST = 12.0
 """Price of leaving out a cap, in half squared deviations: nearly 5 standard deviations of one of them."""
 FREEDOM = 4.0
 """Of Student's t of the distance from where a cap was expected: it may be far off after it was lost."""
+ELSEWHERE = 30.0
+"""Price of caps that are nowhere near where they were expected, for all of them together, in half squared deviations:
+either the prediction holds, or it tells nothing, and then rods and cables alone say which blob is which."""
 HERE_M = 0.02
 """[m] A blob no farther from where a cap in sight is expected is a cap of that rod."""
 MOST = 20_000
@@ -96,7 +99,8 @@ def label(
         off = p_WE - predicted[0]
         square = np.einsum("kci,cij,kcj->kc", off, np.linalg.inv(predicted[1] + SENSOR_SD**2 * np.eye(3)), off)
         fit = cost.copy()
-        cost = cost + 0.5 * (FREEDOM + 3) * np.nansum(np.log1p(square / FREEDOM), axis=1)
+        there = 0.5 * (FREEDOM + 3) * np.nansum(np.log1p(square / FREEDOM), axis=1)
+        cost = cost - np.logaddexp(-there, -ELSEWHERE)
     elif not len(known):
         cost += 0.5 * _from_rest(p_WE, np.array(robot.rest_caps_m))
         count += 2 * robot.n_caps

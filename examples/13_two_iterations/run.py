@@ -79,11 +79,12 @@ def iterate(project: Path, number: int, seed: int, profile: Profile, robot: Sequ
     r2s2r(project, "run", "--iteration", str(number), *robot, *words, quiet=False)
 
 
-def compared(project: Path, models: Mapping[str, Path]) -> None:
+def compared(project: Path, models: Mapping[str, Path], *, draw: bool) -> None:
     """The executed runs of both iterations beside these simulators and that of robot.toml; none named: those of both
     iterations. Kept as comparison.json."""
     words = [word for name, path in models.items() for word in ("--model", f"{name}={path}")]
     command = [*COMMAND, "compare", "--iteration", "2", "--of", "execute", *words, "--json"]
+    command += [] if draw else ["--no-draw"]
     done = subprocess.run(command, cwd=project, check=True, stdout=subprocess.PIPE, text=True)
     report: dict[str, object] = json.loads(done.stdout)["report"]
     (project / "comparison.json").write_text(json.dumps(report, indent=1), "utf-8")
@@ -106,11 +107,11 @@ def papers(project: Path) -> Path:
     return found
 
 
-def measured(project: Path, *, paper: bool) -> None:
+def measured(project: Path, *, paper: bool, draw: bool) -> None:
     """The comparison of one seed: runs of iteration 1, from which iteration 2 learned, and new ones of iteration 2."""
     found = {f"iteration {n}": project / "iterations" / f"{n:03d}" / "30-identify.h5" for n in (1, 2)}
     models = {**found, "the paper's preset": papers(project)} if paper else {}
-    compared(project, models)
+    compared(project, models, draw=draw)
 
 
 def rows_so_far(out: Path) -> list[Row]:
@@ -127,12 +128,13 @@ def main(out: Path, seeds: Sequence[int], profile: Profile, *, paper: bool, say:
         with rig(project) as robot:
             for number in (1, 2):
                 iterate(project, number, seed, profile, robot)
-        measured(project, paper=paper)
+        measured(project, paper=paper, draw=profile.draw)
         found = rows_so_far(out)
         say(f"\nafter seed {seed}: median (range) over {len({row.seed for row in found})} seeds")
         for line in summary(found):
             say(line)
-        say(f"look at: {project}/iterations/002/60-compare.html")
+        if profile.draw:
+            say(f"look at: {project}/iterations/002/60-compare.html")
 
 
 if __name__ == "__main__":

@@ -36,10 +36,9 @@ FROZEN = 1e8
 """Times its prior's precision that a nuisance has which is not fitted."""
 JACOBIANS = 2
 """Times that derivatives are taken anew with the last start states."""
-AGED_ENGINE = 0.05
-"""The same of what stands for another engine's numerics, or how the robot was built: that does not age."""
-AGED = 0.2
-"""Of a nuisance's own prior: how far it may have moved since the healthy runs."""
+AGED = 0.35
+"""Of a nuisance's own prior: how far it may have moved since the healthy runs, and how wrong their fit may be: where
+robots fall over, two fits of the same runs differ by as much."""
 
 Told = Callable[[str, int, int], None]
 
@@ -230,9 +229,6 @@ def _posterior(arena: Arena, base: Fit) -> tuple[np.ndarray, np.ndarray]:
         base.hypothesis, base.z, base.x, arena.residuals(arena.values(base.z[None]), base.z[None])[0]
     )  # fmt: skip
     H, _ = fits.normal(again)
-    own = [arena.model.numbers[k].kind == "own" for k in arena.engine]
     n = arena.shared
-    share = np.full(n, AGED)
-    share[: len(own)] = np.where(own, AGED_ENGINE, AGED)
-    aged = np.diag(share**2 / np.diag(arena.precision)[:n])
+    aged = AGED**2 * np.diag(1.0 / np.diag(arena.precision)[:n])
     return base.z[:n], np.linalg.inv(np.linalg.inv(H)[:n, :n] + aged)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -141,6 +141,22 @@ def test_a_hanging_cable_hangs_on(walked: Walked) -> None:
     ]  # fmt: skip
     assert len(hanging) >= 2
     assert max(hanging) > 0.01
+
+
+def test_offsets_of_a_start_move_what_is_seen(walked: Walked) -> None:
+    """Without an offset the same as ever; a rod put 2 mm along x moves its own caps by that at first; one that moves
+    faster is farther off the later it is."""
+    one = walked.pieces[-1]
+    sd = np.zeros(42)
+    sd[0], sd[18] = 2e-3, 0.02  # place and velocity of rod 0 along x
+    (around,) = walked.replayer.around([one], walked.values, [sd])
+    (seen,) = walked.replayer.seen([replace(one, piece=0)], walked.values[None])
+    assert np.array_equal(around.caps[0], seen.caps[0]) and np.array_equal(around.length[0], seen.length[0])
+    still = [k for k in range(42) if k not in (0, 18)]
+    assert np.array_equal(around.caps[1:][still], np.broadcast_to(seen.caps, (40, *seen.caps.shape[1:])))
+    moved = np.abs(around.caps - around.caps[:1]).max(axis=(2, 3))
+    assert 1e-4 < moved[1, 0] < 4e-3
+    assert moved[19].max() > 1e-4
 
 
 def test_a_late_camera_shows_what_was(walked: Walked) -> None:

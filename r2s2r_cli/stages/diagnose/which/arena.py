@@ -26,10 +26,8 @@ LOST_M = 0.25
 """A cap that is simulated so far from where it was is lost, and farther off is not worse."""
 FLOOR_SD = 1e-3
 """[m] How well the height of the floor is known, run by run: each is levelled by its own lowest caps."""
-FARTHEST_M = 0.03
-"""[m] An offset of a start moves a cap by at most so much within a piece."""
 START = StartSpread(position=3e-3, tilt=0.015, roll=0.08, rest=3e-3)
-"""Of the offsets that are free (`Replayer.moved`)."""
+"""Of start states of which no spread is known."""
 
 
 class Arena:
@@ -71,7 +69,7 @@ class Arena:
         self.gait = np.array([self.gaits.index(one.gait) for one in many])
         self.white: tuple[White, ...] = ()
         self.by_nuisance = np.zeros((0, 0))
-        self._ends: list[np.ndarray] = []
+        self._length: list[np.ndarray] = []
         self._shifts = [self._shift_columns(k) for k in range(len(self.many))]
 
     def values(self, z: np.ndarray) -> np.ndarray:
@@ -81,13 +79,13 @@ class Arena:
         return found
 
     def prepare(self, z: np.ndarray, *, floor_m: float | None = None, noise: float | None = None) -> None:
-        """Derivatives at nuisances z (p + q,), and with them what makes residuals white: exact ones by the starts, and
-        secants by the nuisances, over a share of their prior: contacts make a derivative say little of a step."""
-        seen = self.replayer.derivatives(self.many, self.values(z[None])[0])
-        assert seen.by_offset is not None  # noqa: S101 - it was asked for
+        """Derivatives at nuisances z (p + q,), and with them what makes residuals white: differences over
+        the sd of the starts, secants over a share of the nuisances' prior: contacts make a derivative say little of a
+        step."""
         sd = [self._start_sd(one) for one in self.many]
-        self._by_offset = [_bounded(seen.by_offset[seen.window == k], sd[k]) for k in range(len(self.many))]
-        self._ends = [seen.p_WE[seen.window == k] for k in range(len(self.many))]
+        seen = self.replayer.around(self.many, self.values(z[None])[0], sd)
+        self._by_offset = [self._responses(one) for one in seen]
+        self._length = [one.length[0] for one in seen]
         self._shifts = [self._shift_columns(k) for k in range(len(self.many))]
         p = len(self.engine)
         by = SECANT * np.array([self.model.numbers[k].sd for k in self.engine])
@@ -104,16 +102,14 @@ class Arena:
         self.floor_m = self.floor_m if floor_m is None else floor_m
         self.noise = self.noise if noise is None else noise
         self.white = whites(
-            self.many, [self._channels(k, d) for k, d in enumerate(self._by_offset)],
-            [self._start_sd(one) for one in self.many], sensors=len(self.sensors), floor_m=self.floor_m,
-            noise=self.noise,
+            self.many, self._by_offset, sensors=len(self.sensors), floor_m=self.floor_m, noise=self.noise
         )  # fmt: skip
         own = [np.concatenate([e, s], axis=0) for e, s in zip(self._by_engine, self._shifts, strict=True)]
         self.by_nuisance = whitened(self.white, own).T  # (M, p + q)
 
     def _start_sd(self, one: Stretch) -> np.ndarray:
         sd = START.sd(self.replayer.structure) if one.start_sd is None else one.start_sd
-        return np.asarray(sd[self.replayer.moved])
+        return np.asarray(sd)
 
     @property
     def sizes(self) -> np.ndarray:
@@ -174,24 +170,13 @@ class Arena:
         shift = z[:, len(self.engine) :]
         return found + np.einsum("kq,qcf->kcf", shift, self._shifts[k])
 
-    def _channels(self, k: int, d: np.ndarray) -> np.ndarray:
-        """Derivatives of the caps (F, cap, 3, D) as those of all channels, (D, channel, F)."""
-        one = self.many[k]
-        caps = d.reshape(len(one.t), -1, d.shape[-1]).transpose(2, 1, 0)
-        if not self.sensors:
-            return caps
-        ends = np.array([self.replayer.cable_caps[cable] for cable in self.sensors])
-        way = self._ends[k][:, ends[:, 0]] - self._ends[k][:, ends[:, 1]]
-        way /= np.linalg.norm(way, axis=-1, keepdims=True)
-        length = np.einsum("fsi,fsid->dsf", way, d[:, ends[:, 0]] - d[:, ends[:, 1]])
-        if one.length is None:
-            length = np.zeros_like(length)
-        return np.concatenate([caps, length], axis=1)
-
-    def _lengths(self, k: int) -> np.ndarray:
-        """Simulated lengths of the sensed cables of a stretch where derivatives were taken, (F, sensor) [m]."""
-        ends = np.array([self.replayer.cable_caps[cable] for cable in self.sensors])
-        return np.asarray(np.linalg.norm(self._ends[k][:, ends[:, 0]] - self._ends[k][:, ends[:, 1]], axis=-1))
+    def _responses(self, seen: Seen) -> np.ndarray:
+        """What moving a start by one sd changes in all channels, (offset, channel, F), from what was seen without and
+        with each offset."""
+        caps = seen.caps.reshape(*seen.caps.shape[:2], -1)
+        both = np.concatenate([caps, seen.length], axis=-1).transpose(0, 2, 1)
+        by = both[1:] - both[:1]
+        return np.clip(np.nan_to_num(by, nan=LOST_M), -LOST_M, LOST_M)
 
     def _shift_columns(self, k: int) -> np.ndarray:
         """What camera and sensors add per unit, (q, channel, F). A reading that is late shows a length that was, as
@@ -203,8 +188,8 @@ class Arena:
         for s in range(len(self.sensors)):
             found[len(CAMERA) + s, 3 * caps + s] = 1.0
         found[self.shared - len(self.engine) + self.runs.index(one.run), 2 : 3 * caps : 3] = 1.0
-        if self.sensors and self._ends and F > 1:
-            found[self.shared - len(self.engine) - 1, 3 * caps :] = -np.gradient(self._lengths(k), one.t, axis=0).T
+        if self.sensors and self._length and F > 1:
+            found[self.shared - len(self.engine) - 1, 3 * caps :] = -np.gradient(self._length[k], one.t, axis=0).T
         return found
 
     @staticmethod
@@ -213,10 +198,3 @@ class Arena:
         found = np.zeros((len(CAMERA), *caps.shape))
         found[0, ..., 2], found[1, ..., 2], found[2, ..., 2] = 1.0, caps[..., 1], -caps[..., 0]
         return found
-
-
-def _bounded(d: np.ndarray, sd: np.ndarray) -> np.ndarray:
-    """Derivatives d (F, cap, 3, offset) of caps by offsets of sd (offset,), none larger than what such an offset does:
-    where caps slip and stick, a derivative at a point may be a thousand times the change over a millimetre."""
-    most = FARTHEST_M / sd
-    return np.asarray(np.clip(np.nan_to_num(d), -most, most))

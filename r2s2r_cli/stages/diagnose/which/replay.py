@@ -12,8 +12,8 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.identify.commands import CommandLog
-from r2s2r_cli.stages.identify.offsets import count, displacement_jacobian
-from r2s2r_cli.stages.identify.predict import Prediction, Predictor, alike
+from r2s2r_cli.stages.identify.offsets import displaced
+from r2s2r_cli.stages.identify.predict import Predictor, alike
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -37,13 +37,11 @@ class Seen:
 
 
 class Replayer(Predictor):
-    """Simulates stretches by command replay, many hypotheses at once; derivatives by where a stretch starts."""
+    """Simulates stretches by command replay, many hypotheses at once."""
 
     def __init__(self, model: Model, **how: object) -> None:
         super().__init__(model, **how)  # type: ignore[arg-type]
         self.model = model
-        self.moved = np.arange(count(self.structure))
-        """Offsets of a start that are free: all of them."""
 
     def seen(self, many: Sequence[Stretch], values: np.ndarray) -> list[Seen]:
         """Of every stretch at values (k, n). A piece that comes after another one of `many` goes on with what that left
@@ -79,56 +77,44 @@ class Replayer(Predictor):
                 found[k] = last
         return unpack_state(self.structure, _cat([found[k] for k in range(len(many))]))
 
-    def derivatives(self, many: Sequence[Stretch], values: np.ndarray) -> Prediction:
-        """Caps, and their exact derivatives by the free offsets of the starts, at values (n,)."""
-        offsets = np.zeros((len(many), 12 * self.structure.n_rods + self.structure.n_actuated))
-        return self.predict([one.window for one in many], values, offsets, jacobian=True)
-
-    def _directions(
-        self, x: Tensor, s0: Tensor, moved: Tensor | None, by_delay: np.ndarray
-    ) -> tuple[Tensor, Tensor | None, Tensor | None]:
+    def around(self, many: Sequence[Stretch], values: np.ndarray, sd: Sequence[np.ndarray]) -> list[Seen]:
+        """Of every stretch, at values (n,), from its own start and with each offset of the start (`offsets.displaced`)
+        moved by its sd (offset,): (1 + offset, ...). Finite steps, because where caps slip and stick a derivative at a
+        point may be a thousand times what a millimetre does."""
         import torch
 
-        assert moved is not None  # noqa: S101 - `derivatives` hands them in
-        del by_delay
-        none = torch.zeros(len(self.model.packed(x)), len(self.moved), dtype=x.dtype)
-        return none, None, displacement_jacobian(self.structure, s0, moved)[..., self.moved]
+        from r2s2r_cli.engine.flat import pack_state
 
-    def _seen(
-        self, windows: Sequence[object], x: Tensor, flat: Tensor, tangents: Tensor | None, with_offsets: bool
-    ) -> Prediction:
-        import torch
-        from torch.func import jacfwd, vmap
-
-        from r2s2r_cli.engine import end_caps
-        from r2s2r_cli.engine.flat import unpack_parameters, unpack_state
-        from r2s2r_cli.engine.hooks import effective
-        from r2s2r_cli.stages.identify.predict import STRIDE
-
-        if tangents is None:
-            return super()._seen(windows, x, flat, tangents, with_offsets)  # type: ignore[arg-type]
-        at = [(w.run.t[w.frames] - w.start) / (self.step * STRIDE) for w in windows]  # type: ignore[attr-defined]
-        index = torch.as_tensor(np.concatenate([np.full(len(a), k) for k, a in enumerate(at)]))
-        place = torch.as_tensor(np.concatenate(at))
-        low = place.floor().long()
-        share = (place - low)[:, None]
-        states = flat[index, low] * (1 - share) + flat[index, low + 1] * share
-        p = self.model.packed(x)
-        theta = effective(self.structure, unpack_parameters(self.structure, p[None]))
-
-        def caps(s: Tensor) -> Tensor:
-            return end_caps(theta, unpack_state(self.structure, s[None]))[0]
-
-        along = tangents[index, low] * (1 - share[..., None]) + tangents[index, low + 1] * share[..., None]
-        d = torch.einsum("fcis,fsd->fcid", vmap(jacfwd(caps))(states), along).numpy()
-        p_WE = vmap(caps)(states).numpy() + np.array([0.0, 0.0, self.model.observation().ground_height])
-        return Prediction(p_WE, index.numpy(), None, d)
+        parts: dict[int, Seen] = {}
+        for group in alike([one.window for one in many]):
+            own = [many[k] for k in group]
+            starts = [
+                displaced(
+                    self.structure, pack_state(self.structure, many[k].window.state).expand(1 + len(sd[k]), -1),
+                    torch.nn.functional.pad(torch.diag(torch.as_tensor(sd[k])), (0, 0, 1, 0)),
+                )
+                for k in group
+            ]  # fmt: skip
+            together = max(1, MOST // len(own))
+            chunks = [
+                self._batch(own, np.repeat(values[None], len(starts[0][first : first + together]), axis=0),
+                            starts=[one[first : first + together] for one in starts])
+                for first in range(0, len(starts[0]), together)
+            ]  # fmt: skip
+            for i, k in enumerate(group):
+                parts[k] = Seen(
+                    np.concatenate([chunk[i][0].caps for chunk in chunks]),
+                    np.concatenate([chunk[i][0].length for chunk in chunks]),
+                )
+        return [parts[k] for k in range(len(many))]
 
     def _batch(
-        self, many: Sequence[Stretch], values: np.ndarray, begin: Sequence[Tensor | None] = ()
-    ) -> list[tuple[Seen, Tensor]]:
+        self, many: Sequence[Stretch], values: np.ndarray, begin: Sequence[Tensor | None] = (), *,
+        starts: Sequence[Tensor] = (),
+    ) -> list[tuple[Seen, Tensor]]:  # fmt: skip
         """K hypotheses of some stretches of about the same length: what is seen, and states (k, NS) at the last frame.
-        begin: states (k, NS) that the piece before each ended in, None: its own start is all there is."""
+        begin: states (k, NS) that the piece before each ended in, None: its own start is all there is. starts: those of
+        each hypothesis (k, NS), by stretch, instead."""
         import torch
 
         from r2s2r_cli.engine import delay_of
@@ -137,7 +123,7 @@ class Replayer(Predictor):
         structure, step, k = self.structure, self.step, len(values)
         own, behind = self._undelayed(self.model.theta(values), k)
         theta = own.map(lambda x: x.expand(k, *x.shape[1:]).repeat_interleave(len(many), dim=0))
-        starts = [pack_state(structure, one.window.state).expand(k, -1) for one in many]
+        starts = list(starts) or [pack_state(structure, one.window.state).expand(k, -1) for one in many]
         for i, before in enumerate(begin):
             if before is not None:
                 starts[i] = self._carried(many[i], starts[i], before)

@@ -65,21 +65,19 @@ class White:
 
 
 def whites(
-    many: Sequence[Stretch], by_offset: Sequence[np.ndarray], sd: Sequence[np.ndarray], *, sensors: int, floor_m: float,
-    noise: float,
+    many: Sequence[Stretch], by_offset: Sequence[np.ndarray], *, sensors: int, floor_m: float, noise: float
 ) -> tuple[White, ...]:  # fmt: skip
-    """Of all stretches. by_offset: derivatives (offset, channel, F) by the offsets of their starts, of sd (offset,);
+    """Of all stretches. by_offset: what one sd of each offset of their starts changes, (offset, channel, F);
     sensors: channels after those of the caps; noise: factor on the stated noise. Rows: those of the first kind of all
     stretches come before those of the next kind."""
     total = sum(d.shape[1] * d.shape[2] for d in by_offset)
     begin, found = 0, []
-    for one, d, spread in zip(many, by_offset, sd, strict=True):
+    for one, d in zip(many, by_offset, strict=True):
         count = d.shape[1] * d.shape[2]
         kinds = []
         for c, factor in enumerate(FACTORS):
             roots, size = _roots(one, sensors, factor * floor_m, noise)
-            offsets = _rooted(roots, d) * spread[:, None]
-            U, s, _ = np.linalg.svd(np.nan_to_num(offsets, posinf=0.0, neginf=0.0).T, full_matrices=False)
+            U, s, _ = np.linalg.svd(_rooted(roots, d).T, full_matrices=False)
             logdet = float(np.log1p(s**2).sum() - 2.0 * np.log(np.diagonal(roots, axis1=1, axis2=2)).sum())
             first = c * total + begin
             kinds.append(Kind(roots, U, 1.0 - 1.0 / np.sqrt(1.0 + s**2), slice(first, first + count), logdet))

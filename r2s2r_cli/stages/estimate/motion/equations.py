@@ -19,9 +19,10 @@ SHARED_S = 1.0
 """[s] How long the errors that neighbouring sightings share stay alike."""
 BELOW_SD_M = 1e-3
 """[m] Of how far any cap may be below the floor, whether it is known to touch or not."""
-LIFTED_M, LIFTED_HIDDEN_M = 0.03, 0.1
+LIFTED_M, LIFTED_HIDDEN_M, LIFTED_BLIND_M = 0.03, 0.1, 1.0
 """[m] How high a cap may be that was taken to touch and does not: with the probability of that it widens the height
-(the variance of the mixture of both). While it is hidden, times the root of the frames that share the mistake."""
+(the variance of the mixture of both). While it is hidden, times the root of the frames that share the mistake; while
+all are, a roll that nobody saw makes all of them wrong together."""
 SLIP_S = 0.3
 """[s] How long a cap keeps sliding: the slip speeds of neighbouring frames are one piece of evidence, not many."""
 
@@ -89,12 +90,14 @@ def _floor(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body, settin
     """Caps that carry weight lie on the floor and slip slowly; no cap is below it."""
     one = np.ones(len(x))
     slip = slip_weight(evidence.t, settings)
+    blind = ~np.any(evidence.information[:, :, 2, 2] > 0, axis=1)
     for cap in range(body.caps):
         p = x[:, body.p(cap)]
         height = p[:, 2] - body.radius[cap]
         touching = evidence.touching[:, cap]
         below = (height < 0) / BELOW_SD_M**2
-        lifted = np.where(evidence.information[:, cap, 2, 2] > 0, LIFTED_M, LIFTED_HIDDEN_M)
+        hidden = np.where(blind, LIFTED_BLIND_M, LIFTED_HIDDEN_M)
+        lifted = np.where(evidence.information[:, cap, 2, 2] > 0, LIFTED_M, hidden)
         stands = touching / (settings.contact_sd_m**2 + (1 - touching) * lifted**2)
         frames.scalar(body.p(cap)[2:], one[:, None], height, stands + below)
         if np.any(touching):

@@ -19,6 +19,8 @@ BURSTS = 2.0
 """What is used over what is likeliest (as in `stages/estimate/smooth.py`): robots accelerate in bursts."""
 UNSEEN_BURSTS = 6.0
 """The same where a cap is hidden: how it moved there is only known on average, and averages have few bursts."""
+BLIND_BURSTS = 60.0
+"""The same where no cap is seen at all: then the robot may roll as one, which no cable and no rod tells."""
 FEW = 2
 """Gauss-Newton steps between two looks at the noise: it need not settle before the noise does."""
 SENSOR_BEND = 2.5
@@ -58,7 +60,8 @@ def smooth_window(
         state = learn(settle(state, body, settings, steps=FEW), prepared, body, settings)
         state = touch(state, prepared, body, hidden=left == 0)
     near = prepared.sighted[1:] & prepared.sighted[:-1]
-    density = np.where(near, BURSTS, UNSEEN_BURSTS) * state.evidence.density
+    blind = ~np.any(near, axis=1, keepdims=True)
+    density = np.where(near, BURSTS, np.where(blind, BLIND_BURSTS, UNSEEN_BURSTS)) * state.evidence.density
     state = settle(replace(state, evidence=replace(state.evidence, density=density)), body, settings)
     return tracked_run(state, prepared, clock, body, settings)
 

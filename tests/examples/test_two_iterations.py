@@ -87,3 +87,13 @@ def test_prior_and_truth_are_apart_by_so_many_floors() -> None:
     assert "median 45 mm, 5.0 floors (4.0 .. 6.0)" in whole
     blind = [shown.Apart("seed-0", 1, "straight", 0.06, 0.1, 0.2, dict.fromkeys(floors))]
     assert len(list(shown.lines(blind))) == 2
+
+
+def test_nothing_learns_from_the_new_policies() -> None:
+    """Iteration 2 executes none of those that it learned from; enough repeats for a floor where one begins elsewhere."""
+    run = loaded("run")
+    for profile in (run.Profile(), run.DEMO):
+        first, second = profile.policies
+        assert first and second and not set(first) & set(second) and profile.repeats >= 3
+    assert run.DEMO.draw and not run.Profile().draw
+    assert run.PAPER_STEPS > run.SHORT["identify"]["max_iterations"]

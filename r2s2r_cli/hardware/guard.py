@@ -199,7 +199,7 @@ class GuardedLink:
     def _hold(self, sample: Sample) -> Sample:
         """The sample, with what is in doubt; where something newly is, after all motors were told 0.
 
-        A command of zeros, not `stop`: the run is not over (the rig's hand would put the robot back in the midst of it).
+        A command of zeros, not `stop`: the run is not over (the rig's hand would put the robot back in its midst).
         """
         doubt = self._watch.doubt
         if doubt and not self._held:

@@ -19,15 +19,16 @@ _IDLE_S = 0.004
 """Between two looks for a frame: an eighth of the time between frames."""
 _PNG_LEVEL = 1
 LATE_S = 0.06
-"""A picture is stamped when it comes, this much after its exposure at most (tick, transfer): stamped earlier than that in
-a run it may show the robot where it lay before, and a tracker that begins there finds it nowhere."""
+"""A picture is stamped when it comes, this much after its exposure at most (tick, transfer): stamped earlier than that
+in a run it may show the robot where it lay before, and a tracker that begins there finds it nowhere."""
 
 
 class Pictures:
     """Frames of one run into its `camera` stream, until the context ends.
 
     feed: frames as they come. stamp: from a frame to its time in the run [s]. waits: a robot in lock-step, whose time
-    does not go on while the camera is slow. since: frames stamped before this are not of the run [s]. Counts: `written`, `lost` (gaps in the camera's own count), `repeated`.
+    does not go on while the camera is slow. since: frames stamped before this are not of the run [s]. Counts:
+    `written`, `lost` (gaps in the camera's own count), `repeated`.
     """
 
     def __init__(

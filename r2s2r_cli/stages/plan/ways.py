@@ -73,24 +73,35 @@ def ways(
         return walks(world.executor, world.reference, start, sequences, smooth=smooth,
                      progress=lambda done: progress(part, done, longest))  # fmt: skip
 
+    def astray(walk: Walk) -> float:
+        rested = world.reference.place(world.executor.caps(walk.rested)).error < settings.rest_error_m
+        return share_astray(walk, rested)
+
     score: dict[str, tuple[float, Paths]] = {}
+    whole: dict[str, Walk] = {}
     for (name, path), walk in zip(tried, walked_along(tried, world.pairs, smooth=False, part="sequences"), strict=True):
         came = walked(walk.way)
         away = (farthest(came) > request.reach) & (name not in request.goals)
         worth = np.where(walk.lost | away, LOST, values[name](came))
-        one = float(worth.mean() - settings.spread * worth.std()) - ASTRAY * share_astray(walk)
+        one = float(worth.mean() - settings.spread * worth.std()) - ASTRAY * astray(walk)
         if name not in score or one > score[name][0]:
-            score[name] = one, path
+            score[name], whole[name] = (one, path), walk
     chosen_paths = [(name, path) for name, (_, path) in score.items()]
     made = walked_along(chosen_paths, world.few, smooth=settings.smooth, part="long policies")
-    return [Way(name, path, walk) for (name, path), walk in zip(chosen_paths, made, strict=True)]
+    # Every shortcut led where the whole gait led, and yet what follows it may not: then the returns to rest stay.
+    kept = [
+        walk if astray(walk) <= astray(whole[name]) else whole[name]
+        for (name, _), walk in zip(chosen_paths, made, strict=True)
+    ]
+    return [Way(name, path, walk) for (name, path), walk in zip(chosen_paths, kept, strict=True)]
 
 
-def share_astray(walk: Walk) -> float:
-    """Share of the robots that gave a target up, or ended where most of the others did not."""
+def share_astray(walk: Walk, rested: np.ndarray) -> float:
+    """Share of the robots that gave a target up, are not in the rest pose (rested: which are, (B,)), or ended where
+    most of the others did not."""
     came = walked(walk.way)
     moves = np.column_stack([came.xy[:, -1], came.heading[:, -1]])
-    good = ~walk.lost
+    good = ~walk.lost & rested
     if not good.any():
         return 1.0
     good[good] = usual_ends(moves[good])

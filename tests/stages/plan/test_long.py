@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 
 from r2s2r_cli.stages.plan.gaits import Gait, run_gaits, seen
-from r2s2r_cli.stages.plan.long import walks
+from r2s2r_cli.stages.plan.long import Walk, walks
 from r2s2r_cli.stages.plan.robust import Primitive
 from r2s2r_cli.stages.plan.route import walked
 from r2s2r_cli.stages.plan.runs import played, policy_file, run_groups
+from r2s2r_cli.stages.plan.ways import share_astray
 from tests.stages.plan.planted import bench
 from tests.support.robots import subject
 
@@ -60,3 +64,18 @@ def test_long_policies_go_on_where_the_robot_is() -> None:
         assert np.allclose(p_WE[-1], executor.caps(walk.rested)[0], atol=1e-9)
         assert np.allclose(p_WE[0], seen(executor, at).caps[0])
         assert np.array_equal(groups[f"runs/{name}/intervals"]["target"], walk.policy)
+
+
+def test_robots_that_end_elsewhere_are_astray() -> None:
+    """Of eight robots one ends in another place, one turned otherwise, one not at rest, and one gave up: half of them.
+    Where all turned about the vertical at the start, nothing changes."""
+    end = np.tile([0.5, 0.0, 0.3], (8, 1)) + np.random.default_rng(0).normal(scale=0.01, size=(8, 3))
+    end[1, 1] += 0.2
+    end[2, 2] += 0.5
+    rested, lost = np.arange(8) != 3, np.arange(8) == 4
+    for yaw in (0.0, 3.0):
+        c, s = np.cos(yaw), np.sin(yaw)
+        way = [np.tile([0.0, 0.0, yaw], (8, 1)), np.column_stack([end[:, :2] @ [[c, s], [-s, c]], end[:, 2] + yaw])]
+        walk = cast(Walk, SimpleNamespace(way=way, lost=lost))
+        assert share_astray(walk, rested) == 0.5
+    assert share_astray(cast(Walk, SimpleNamespace(way=way, lost=~lost)), lost & ~lost) == 1.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -11,6 +12,7 @@ import torch
 
 from r2s2r_cli.engine import end_caps
 from r2s2r_cli.engine.flat import pack_parameters, pack_state, unpack_state
+from r2s2r_cli.engine.settle import window_state
 from r2s2r_cli.engine.state import State, cap_velocities
 from r2s2r_cli.stages.diagnose.evidence import Run
 from r2s2r_cli.stages.diagnose.which.numbers import Model
@@ -46,6 +48,18 @@ class Walked:
         part = (Selection("walk", (1,)),)
         return pieces([self.run], part, {("walk", 1): self.begin}, self.replayer, self.values)
 
+    def seen_by(
+        self, place: Callable[[np.ndarray], np.ndarray], way: Callable[[np.ndarray], np.ndarray], values: np.ndarray
+    ) -> Walked:
+        """The same run through a camera that shows points and velocities so; values (n,) that know of it. States begin
+        where the caps are seen, as those of `Starts` do."""
+        caps = self.run.caps
+        shown = replace(caps, observed=place(caps.observed), p_WE=place(caps.p_WE), v_WE=way(caps.v_WE))
+        begin = window_state(
+            self.replayer.simulator, self.model.theta(self.values), torch.as_tensor(shown.p_WE[:1]), self.begin
+        )
+        return replace(self, run=replace(self.run, caps=shown), values=values, begin=begin)
+
     def errors(self, many: tuple[Stretch, ...]) -> list[float]:
         """Largest error of a cap in each of the stretches [m]."""
         seen = self.replayer.seen(many, self.values[None])
@@ -55,7 +69,7 @@ class Walked:
 @pytest.fixture(scope="module")
 def walked() -> Walked:
     """Two cables in and one out again, with play in the winches; a third pays out until it hangs."""
-    model = Model(nominal(robot()), effects=("backlash", "camera_delay"))
+    model = Model(nominal(robot()), effects=("backlash", "camera_delay", "camera_pose", "camera_scale"))
     replayer = Replayer(model, step=STEP, threads=1)
     values = model.values0.copy()
     for place in model.off("backlash"):
@@ -141,6 +155,26 @@ def test_a_hanging_cable_hangs_on(walked: Walked) -> None:
     ]  # fmt: skip
     assert len(hanging) >= 2
     assert max(hanging) > 0.01
+
+
+def test_a_camera_that_shows_the_robot_elsewhere_is_told_from_a_robot_that_is_there(walked: Walked) -> None:
+    """Caps seen through a turned, shifted, wrongly scaled camera: with its numbers as good as without it."""
+    turn, shift, scale = 0.05, np.array([0.02, -0.01, 0.0]), 1.02
+    c, s = np.cos(turn), np.sin(turn)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    values = walked.values.copy()
+    numbers = {"camera_pose.turn_z_rad": turn, "camera_pose.shift_x_m": shift[0], "camera_pose.shift_y_m": shift[1]}
+    for name, value in numbers.items():
+        values[walked.model.place[name]] = value
+    turned = walked.seen_by(lambda p: p @ R.T + shift, lambda v: v @ R.T, values)
+    assert max(turned.errors(turned.pieces)) < 3.5e-3
+    values = walked.values.copy()
+    values[walked.model.place["camera_scale.factor"]] = scale
+    scaled = walked.seen_by(lambda p: scale * p, lambda v: scale * v, values)
+    cut = scaled.pieces
+    plain = replace(scaled, values=walked.values)
+    assert max(scaled.errors(cut)) < 6e-3
+    assert np.mean(scaled.errors(cut)) < 0.5 * np.mean(plain.errors(plain.pieces))
 
 
 def test_offsets_of_a_start_move_what_is_seen(walked: Walked) -> None:

@@ -20,6 +20,8 @@ LENGTHS = (1.0, 0.4, 0.1)
 """Shares of a step that are tried together."""
 SECANT = 0.25
 """Of a number's scale: length of a secant."""
+DAMPING = 1e-3
+"""To begin with, over the diagonal of the scaled normal matrix."""
 LEAST_GAIN = 0.3
 """[nats] A fit that gains less in a step has ended."""
 PRIOR_SCALES = 2.0
@@ -66,7 +68,7 @@ class Fit:
     jacobian: np.ndarray
     cost: float
     start: np.ndarray
-    damping: float = 1e-3
+    damping: float = DAMPING
     ended: bool = False
 
     @property

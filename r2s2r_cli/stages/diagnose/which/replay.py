@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +25,8 @@ EVERY = 10
 MOST = 256
 """Simulations in one batch."""
 TINY = 1e-6
+MOVED_M = 1e-7
+"""A camera that shows the robot so near to where it is changes no start."""
 
 
 @dataclass(frozen=True)
@@ -127,10 +129,11 @@ class Replayer(Predictor):
         for i, before in enumerate(begin):
             if before is not None:
                 starts[i] = self._carried(many[i], starts[i], before)
+        late = self.model.observation()
+        starts = [self._placed(own, one, late.ground_height) for one in starts]
         s0 = torch.stack(starts, dim=1).flatten(0, 1)
         lasting = max(one.window.duration for one in many) + max(0.0, float(behind.max()))
         rows = EVERY * (math.ceil(lasting / step / EVERY - TINY) + 1)
-        late = self.model.observation()
         own_delay = delay_of(structure, own)
         delays = np.zeros(k) if own_delay is None else own_delay.expand(k, 1)[:, 0].numpy()
         u = self._commands_at(many, rows, delays + behind + late.command_delay + late.camera_delay)
@@ -153,6 +156,33 @@ class Replayer(Predictor):
             return own, np.zeros(k)
         behind = own.extra[name].expand(k, 1)[:, 0].numpy().copy()
         return own.with_values({name: torch.zeros_like(own.extra[name])}), behind
+
+    def _placed(self, own: Parameters, start: Tensor, up: float) -> Tensor:
+        """Starts (k, NS) where each hypothesis's camera says that the robot is: they stand where it was seen."""
+        import roma
+        import torch
+
+        from r2s2r_cli.engine import end_caps
+        from r2s2r_cli.engine.flat import pack_state, unpack_state
+        from r2s2r_cli.engine.hooks import effective
+        from r2s2r_cli.engine.late import unseen
+        from r2s2r_cli.engine.roll import along
+        from r2s2r_cli.engine.settle import lowered
+
+        k, structure = len(start), self.structure
+        with torch.no_grad():
+            state = unpack_state(structure, start)
+            one_robot = effective(structure, own.map(lambda x: x[:1]))
+            shown = end_caps(one_robot, state)
+            lift = torch.tensor([0.0, 0.0, up], dtype=start.dtype)
+            real = unseen(structure, own.map(lambda x: x.expand(k, *x.shape[1:])), shown + lift) - lift
+            by = (real - shown).unflatten(1, (-1, 2)).mean(dim=2)
+            if not bool(((real - shown).abs() > MOVED_M).any()):
+                return start
+            turned = roma.rotmat_to_unitquat(along(real, roma.unitquat_to_rotmat(state.q_WR)))
+            moved = lowered(one_robot, replace(state, p_WB=state.p_WB + by, q_WR=turned), only_up=True)
+            far = (real - shown).abs().amax(dim=(1, 2)) > MOVED_M
+            return torch.where(far[:, None], pack_state(structure, moved), start)
 
     def _last(self, flat: Tensor, one: Stretch) -> Tensor:
         """States (k, NS) at the last frame, from those stored (k, stored, NS)."""

@@ -11,7 +11,7 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.candidates import candidates
-from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
+from r2s2r_cli.stages.diagnose.which.fit import DAMPING, Fit, Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.found import Which
 from r2s2r_cli.stages.diagnose.which.rivals import WIDER, chance, no_gap
 from r2s2r_cli.stages.diagnose.which.score import ENOUGH, Score, gains, groups_of, scores
@@ -28,6 +28,8 @@ LOOKED_AT = 4
 """Fits that the size of an error without a name is learned from."""
 FIRST = 2
 """Iterations of all starts of a hypothesis; the best one goes on."""
+POLISHED = 3
+"""Fits that go on when all have ended."""
 SECOND = 3
 """Iterations after the floor was widened."""
 
@@ -142,7 +144,11 @@ def _fitted(arena: Arena, base: Fit, picked: Sequence[Response], told: Told, kep
     fits.run(begun, iterations=FIRST)
     begun = _best_of(begun)
     fits.run(begun, told=lambda done, total: told("fits", done, total))
-    return _best_of(begun)
+    best = _best_of(begun)
+    for fit in best[:POLISHED]:  # from derivatives taken where it is now
+        fit.ended, fit.damping = False, DAMPING
+    fits.run(best[:POLISHED])
+    return _best_of(best)
 
 
 def _begun(arena: Arena, fits: Fits, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]]) -> list[Fit]:

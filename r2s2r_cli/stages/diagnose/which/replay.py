@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from r2s2r_cli.stages.diagnose.which.begins import carried, last_of, placed
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.identify.commands import CommandLog
@@ -25,8 +26,6 @@ EVERY = 10
 MOST = 256
 """Simulations in one batch."""
 TINY = 1e-6
-MOVED_M = 1e-7
-"""A camera that shows the robot so near to where it is changes no start."""
 
 
 @dataclass(frozen=True)
@@ -128,9 +127,9 @@ class Replayer(Predictor):
         starts = list(starts) or [pack_state(structure, one.window.state).expand(k, -1) for one in many]
         for i, before in enumerate(begin):
             if before is not None:
-                starts[i] = self._carried(many[i], starts[i], before)
+                starts[i] = carried(structure, many[i], starts[i], before)
         late = self.model.observation()
-        starts = [self._placed(own, one, late.ground_height) for one in starts]
+        starts = [placed(structure, own, one, late.ground_height) for one in starts]
         s0 = torch.stack(starts, dim=1).flatten(0, 1)
         lasting = max(one.window.duration for one in many) + max(0.0, float(behind.max()))
         rows = EVERY * (math.ceil(lasting / step / EVERY - TINY) + 1)
@@ -144,7 +143,7 @@ class Replayer(Predictor):
                 s0, u, pack_parameters(structure, theta), h=step / n, hold=n, every=EVERY * n
             )  # fmt: skip
             seen = self._looked(own, behind, flat, many, late.ground_height)
-        return [(one, self._last(flat[i :: len(many)], many[i])) for i, one in enumerate(seen)]
+        return [(one, last_of(flat[i :: len(many)], many[i], EVERY * step)) for i, one in enumerate(seen)]
 
     def _undelayed(self, own: Parameters, k: int) -> tuple[Parameters, np.ndarray]:
         """The parameters without the camera's delay, and that delay (k,) [s]. A stretch starts where the camera saw the
@@ -156,58 +155,6 @@ class Replayer(Predictor):
             return own, np.zeros(k)
         behind = own.extra[name].expand(k, 1)[:, 0].numpy().copy()
         return own.with_values({name: torch.zeros_like(own.extra[name])}), behind
-
-    def _placed(self, own: Parameters, start: Tensor, up: float) -> Tensor:
-        """Starts (k, NS) where each hypothesis's camera says that the robot is: they stand where it was seen."""
-        import roma
-        import torch
-
-        from r2s2r_cli.engine import end_caps
-        from r2s2r_cli.engine.flat import pack_state, unpack_state
-        from r2s2r_cli.engine.hooks import effective
-        from r2s2r_cli.engine.late import unseen
-        from r2s2r_cli.engine.roll import along
-        from r2s2r_cli.engine.settle import lowered
-
-        k, structure = len(start), self.structure
-        with torch.no_grad():
-            state = unpack_state(structure, start)
-            one_robot = effective(structure, own.map(lambda x: x[:1]))
-            shown = end_caps(one_robot, state)
-            lift = torch.tensor([0.0, 0.0, up], dtype=start.dtype)
-            real = unseen(structure, own.map(lambda x: x.expand(k, *x.shape[1:])), shown + lift) - lift
-            by = (real - shown).unflatten(1, (-1, 2)).mean(dim=2)
-            if not bool(((real - shown).abs() > MOVED_M).any()):
-                return start
-            turned = roma.rotmat_to_unitquat(along(real, roma.unitquat_to_rotmat(state.q_WR)))
-            moved = lowered(one_robot, replace(state, p_WB=state.p_WB + by, q_WR=turned), only_up=True)
-            far = (real - shown).abs().amax(dim=(1, 2)) > MOVED_M
-            return torch.where(far[:, None], pack_state(structure, moved), start)
-
-    def _last(self, flat: Tensor, one: Stretch) -> Tensor:
-        """States (k, NS) at the last frame, from those stored (k, stored, NS)."""
-        at = one.window.duration / (EVERY * self.step)
-        low = int(at + TINY)
-        return flat[:, low] * (1 - (at - low)) + flat[:, low + 1] * (at - low)
-
-    def _carried(self, one: Stretch, start: Tensor, before: Tensor) -> Tensor:
-        """Starts (k, NS) with what no cap shows from the states (k, NS) before: rest lengths of cables that hang, by
-        each hypothesis's own account, winding rates, the memory of effects. What left the finite numbers hands nothing
-        on."""
-        import torch
-
-        from r2s2r_cli.engine.flat import state_slots
-
-        slots = state_slots(self.structure)
-        own = torch.zeros(start.shape[1], dtype=torch.bool)
-        for name, slot in slots.items():
-            own[slot.start : slot.start + slot.size] = name == "winding" or "." in name
-        found = torch.where(own, before, start)
-        if one.taut is not None:
-            rest = slice(slots["rest"].start, slots["rest"].start + slots["rest"].size)
-            taut = torch.as_tensor(one.taut).expand(len(before), -1)
-            found[:, rest] = torch.where(before[:, rest] > taut + one.margin, before[:, rest], taut)
-        return torch.where(before.isfinite().all(dim=1, keepdim=True), found, start)
 
     def _commands_at(self, many: Sequence[Stretch], rows: int, delays: np.ndarray) -> Tensor:
         """Commands (k stretch, row, actuated), each hypothesis with its own delay [s]."""

@@ -1,0 +1,73 @@
+"""Where pieces begin and end: by each hypothesis's own camera, and with what no cap shows of the piece before."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from r2s2r_cli.stages.diagnose.which.stretches import Stretch
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from r2s2r_cli.engine import Parameters, Structure
+
+TINY = 1e-6
+MOVED_M = 1e-7
+"""A camera that shows the robot so near to where it is changes no start."""
+
+
+def placed(structure: Structure, own: Parameters, start: Tensor, up: float) -> Tensor:
+    """Starts (k, NS) where each hypothesis's camera says that the robot is: they stand where it was
+    seen. own: parameters of each, batch 1 or k; up: height of the ground in the world [m]."""
+    import roma
+    import torch
+
+    from r2s2r_cli.engine import end_caps
+    from r2s2r_cli.engine.flat import pack_state, unpack_state
+    from r2s2r_cli.engine.hooks import effective
+    from r2s2r_cli.engine.late import unseen
+    from r2s2r_cli.engine.roll import along
+    from r2s2r_cli.engine.settle import lowered
+
+    k = len(start)
+    with torch.no_grad():
+        state = unpack_state(structure, start)
+        one_robot = effective(structure, own.map(lambda x: x[:1]))
+        shown = end_caps(one_robot, state)
+        lift = torch.tensor([0.0, 0.0, up], dtype=start.dtype)
+        real = unseen(structure, own.map(lambda x: x.expand(k, *x.shape[1:])), shown + lift) - lift
+        by = (real - shown).unflatten(1, (-1, 2)).mean(dim=2)
+        if not bool(((real - shown).abs() > MOVED_M).any()):
+            return start
+        turned = roma.rotmat_to_unitquat(along(real, roma.unitquat_to_rotmat(state.q_WR)))
+        moved = lowered(one_robot, replace(state, p_WB=state.p_WB + by, q_WR=turned), only_up=True)
+        far = (real - shown).abs().amax(dim=(1, 2)) > MOVED_M
+        return torch.where(far[:, None], pack_state(structure, moved), start)
+
+
+def carried(structure: Structure, one: Stretch, start: Tensor, before: Tensor) -> Tensor:
+    """Starts (k, NS) with what no cap shows from the states (k, NS) before: rest lengths of cables that hang, by
+    each hypothesis's own account, winding rates, the memory of effects. What left the finite numbers hands nothing
+    on."""
+    import torch
+
+    from r2s2r_cli.engine.flat import state_slots
+
+    slots = state_slots(structure)
+    own = torch.zeros(start.shape[1], dtype=torch.bool)
+    for name, slot in slots.items():
+        own[slot.start : slot.start + slot.size] = name == "winding" or "." in name
+    found = torch.where(own, before, start)
+    if one.taut is not None:
+        rest = slice(slots["rest"].start, slots["rest"].start + slots["rest"].size)
+        taut = torch.as_tensor(one.taut).expand(len(before), -1)
+        found[:, rest] = torch.where(before[:, rest] > taut + one.margin, before[:, rest], taut)
+    return torch.where(before.isfinite().all(dim=1, keepdim=True), found, start)
+
+
+def last_of(flat: Tensor, one: Stretch, stored_s: float) -> Tensor:
+    """States (k, NS) at the last frame, from those stored every stored_s seconds (k, stored, NS)."""
+    at = one.window.duration / stored_s
+    low = int(at + TINY)
+    return flat[:, low] * (1 - (at - low)) + flat[:, low + 1] * (at - low)

@@ -24,6 +24,7 @@ from r2s2r_cli.stages.estimate.groups import run_groups
 from r2s2r_cli.stages.estimate.report import run_report
 from r2s2r_cli.stages.estimate.run import RunState
 from r2s2r_cli.stages.estimate.sweep import Sweep
+from r2s2r_cli.stages.estimate.vision.frames import ImageFrame
 from r2s2r_cli.store.frames import PictureFile
 from r2s2r_cli.store.layout import check_layout
 from r2s2r_cli.store.write import write_artifact
@@ -203,6 +204,26 @@ def test_tracking_begins_where_the_caps_are_seen_and_goes_back(case: Case) -> No
     assert late.t[late.camera.swept.first] >= 1.0
     assert marked(late, 4)[late.t < 0.9].all()
     assert score(case, late).lost == 0.0
+
+
+@pytest.mark.slow
+def test_a_first_picture_of_another_place_costs_that_frame_alone(case: Case) -> None:
+    """The robot is put 0.27 m away after the first picture: it is found again, and all later frames are as they should
+    be (the first one is where its picture shows it, which is not where the robot was)."""
+
+    def elsewhere(frame: ImageFrame) -> ImageFrame:
+        assert frame.color is not None
+        assert frame.depth is not None
+        color, depth = (np.roll(picture, (60, 120), axis=(0, 1)) for picture in (frame.color, frame.depth))
+        return dataclasses.replace(frame, color=color, depth=depth)
+
+    state = tracked(case, change=during(-1.0, float(case.frames.t[1]), elsewhere))
+    assert not marked(state, 4).any()
+    assert state.camera is not None
+    assert 1 <= state.camera.swept.searched.sum() <= 3
+    found = score(case, state)
+    assert found.lost == pytest.approx(1 / len(case.frames))
+    assert found.cap_p95_mm < 6.0
 
 
 REFUSED: dict[str, tuple[dict[str, Any], str]] = {

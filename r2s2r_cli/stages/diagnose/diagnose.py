@@ -99,7 +99,7 @@ def diagnose(
     )  # fmt: skip
     compared = compare_effects(
         fitted.arena, fitted.base, floor_m=fitted.floor.rmse, calibration=settings.calibration or calibration(),
-        sizes={} if said is None else said.starts(), suspected=() if said is None else tuple(said.suspected()),
+        sizes={} if said is None else said.starts(), suspected=None if said is None else said.suspected(),
         effects=settings.effects, seed=settings.seed, told=progress,
         ways=Ways(settings.held_out, settings.with_unknown), kept=kept, keep=_keeper(checkpoint, kept),
     )  # fmt: skip

@@ -75,6 +75,8 @@ def _chosen(compared: Compared) -> tuple[Fit | None, Score | None]:
     for fit, score in zip(compared.fits, compared.scores, strict=True):
         if set(fit.hypothesis.effects) == wanted or (not wanted and len(fit.hypothesis.parts) == 1):
             return fit, score
+    if wanted:
+        return None, None  # what the logs alone show changes no prediction
     return (compared.fits[0], compared.scores[0]) if compared.fits else (None, None)
 
 

@@ -21,7 +21,7 @@ class Calibration:
     conformal: names whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many
     it rests on, 0 for the defaults."""
 
-    temperature: float = 8.0
+    temperature: float = 10.0
     equivalent: float = 6.0
     unknown: float = 25.0
     commit: float = 0.5

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from r2s2r_cli.stages.diagnose.which.screen import Response
 
 PAIR = 15.0
 """[nats] beyond chance that a second effect must add: one law is never quite right, and a second mends its faults."""
-PAIR_SHARE = 0.3
+PAIR_SHARE = 1.0
 """Of the first effect's gain, which it must add at least as well."""
 NINETY = 1.645
 INDISTINCT = 3.0
@@ -42,6 +43,8 @@ class Material:
     unexplained: float
     groups: np.ndarray
     calibration: Calibration
+    logged: Mapping[str, float] = field(default_factory=dict)
+    """Gains [nats] of effects that change no prediction, from the logs alone."""
 
 
 def concluded(m: Material) -> Which:
@@ -55,10 +58,11 @@ def concluded(m: Material) -> Which:
     names = {name: gains[i] for name, i in best.items()}
     calibration = m.calibration
     none = m.chance + (calibration.equivalent if m.no_gap.equivalent else 0.0)
-    table = {**names, NONE: none, UNKNOWN: m.unexplained - calibration.unknown}
+    table = {**names, **m.logged, NONE: none, UNKNOWN: m.unexplained - calibration.unknown}
     probability = calibration.probabilities(table)
     pair = _pair(m, order, gains, best)
     ranking = [_ranked(m, best[name], gains[best[name]], probability[name], singles, gains) for name in names]
+    ranking += [Ranked(name, gain, probability[name], channel=_channel(name)) for name, gain in m.logged.items()]
     ranking += [
         Ranked(NONE, 0.0, probability[NONE], rmse=m.no_gap.rmse, misfit=_misfit(m.refit)),
         Ranked(UNKNOWN, m.unexplained, probability[UNKNOWN]),
@@ -76,6 +80,12 @@ def concluded(m: Material) -> Which:
         not_testable=_not_testable(m.responses), shifts=() if top is None else _shifts(m, m.fits[top]),
         within=_left_out(m), calibrated=calibration.words, warnings=_warnings(m, [best[name] for name in names]),
     )  # fmt: skip
+
+
+def _channel(name: str) -> str:
+    from r2s2r_cli.effects import CATALOGUE
+
+    return next(str(effect.channel) for effect in CATALOGUE if effect.name == name)
 
 
 def _verdict(

@@ -10,7 +10,7 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
-from r2s2r_cli.stages.diagnose.which.candidates import candidates
+from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY, candidates
 from r2s2r_cli.stages.diagnose.which.fit import DAMPING, Fit, Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.found import Which
 from r2s2r_cli.stages.diagnose.which.rivals import WIDER, chance, no_gap
@@ -30,6 +30,8 @@ FIRST = 2
 """Iterations of all starts of a hypothesis; the best one goes on."""
 POLISHED = 3
 """Fits that go on when all have ended."""
+MOST_LOGGED = 60.0
+"""[nats] A finding of the parity stage says no more than this."""
 SECOND = 3
 """Iterations after the floor was widened."""
 
@@ -59,14 +61,14 @@ class Compared:
 
 def compare_effects(
     arena: Arena, base: Fit, *, floor_m: float, calibration: Calibration, sizes: Mapping[str, Mapping[str, float]],
-    suspected: Sequence[str] = (), effects: Sequence[str] | None = None, seed: int = 0, told: Told,
+    suspected: Mapping[str, float] | None = None, effects: Sequence[str] | None = None, seed: int = 0, told: Told,
     ways: Ways | None = None, kept: Mapping[str, Any] | None = None,
     keep: Callable[[str, Any], None] = lambda name, value: None,
 ) -> Compared:  # fmt: skip
     """All effects against the refit nominal model `base` of this arena. floor_m: key-frame RMSE with nothing wrong.
 
-    sizes, suspected: of the parity stage: sizes to begin with, and effects that are fitted whatever the screening
-    says. effects: only these. Raises NumericalError where nothing can be simulated.
+    sizes, suspected: of the parity stage: sizes to begin with, and how surely (in sd) it suspects an effect: the first
+    are fitted whatever the screening says. effects: only these. Raises NumericalError where nothing can be simulated.
     """
     ways = ways or Ways()
     known = [one for one in candidates(arena.model, sizes, touched(arena)) if effects is None or one.effect in effects]
@@ -74,7 +76,8 @@ def compare_effects(
     responses = screen(arena, base, known)
     told("screening", 1, 1)
     groups = groups_of(arena)
-    picked = _picked(responses, suspected)
+    suspected = {name: sd for name, sd in (suspected or {}).items() if effects is None or name in effects}
+    picked = _picked(responses, tuple(suspected))
     fits = _fitted(arena, base, picked, told, kept or {})
     keep("fits", {fit.hypothesis.label: [fit.z.tolist(), fit.x.tolist()] for fit in fits})
     wider, unexplained = _widened(arena, [base, *fits[:LOOKED_AT]]) if ways.unknown else (1.0, 0.0)
@@ -91,6 +94,7 @@ def compare_effects(
         arena=arena, base=base, refit=refit, fits=tuple(fits), scores=tuple(own), responses=responses,
         chance=chance(arena, responses, groups, seed=seed), no_gap=no_gap(refit, floor_m), wider=wider,
         unexplained=unexplained if ways.unknown else -np.inf, groups=groups, calibration=calibration,
+        logged={name: min(0.5 * suspected[name] ** 2, MOST_LOGGED) for name in NO_REPLAY if name in suspected},
     )  # fmt: skip
     which = concluded(material)
     order = np.argsort(-gains(refit, own), kind="stable")

@@ -10,6 +10,9 @@ from r2s2r_cli.blind.make.drive import Driven
 from r2s2r_cli.blind.make.worlds import OFFSET_SHARE, Hidden
 from r2s2r_cli.rig.camera.pinhole import knocked, pose
 from r2s2r_cli.rig.camera.settings import CameraSettings
+from r2s2r_cli.rig.model.mjcf_text import ground_rotation
+
+LEVEL = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -21,7 +24,8 @@ class Seen:
 
 
 def through(camera: CameraSettings, t: np.ndarray, p_WE: np.ndarray) -> np.ndarray:
-    """Points as the host places them that trusts the camera's description: knock, scale of depth and of width.
+    """Points as the host places them that trusts the camera's description: knock, scale of depth and of width. Trackers
+    are levelled on the floor, as frame W is after `estimate`: of a slope the robot's weight tells, not its height.
 
     t: exposures [s], (frame,); p_WE: (frame, cap, 3) [m].
     """
@@ -33,7 +37,7 @@ def through(camera: CameraSettings, t: np.ndarray, p_WE: np.ndarray) -> np.ndarr
         deep = 1.0 + camera.depth_error
         p_C = p_C * np.array([deep * (1.0 + camera.focal_error)] * 2 + [deep])
         found[rows] = p_C @ X_WC[:3, :3].T + X_WC[:3, 3]
-    return found
+    return found if camera.floor_normal == LEVEL else found @ ground_rotation(camera.floor_normal)
 
 
 def seen(run: Driven, camera: CameraSettings, hidden: Hidden, rng: np.random.Generator) -> Seen:

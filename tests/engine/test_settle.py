@@ -316,7 +316,7 @@ def test_winches_that_paid_out_stay_paid_out() -> None:
 
 
 def test_noise_does_not_pull_a_hanging_cable_taut() -> None:
-    """Cables that hang 30 mm loose stay so under 2 mm of noise, though a little tension would balance the noisy pose."""
+    """Cables that hang 30 mm loose stay so under 2 mm of noise, though some tension would balance the noisy pose."""
     robot, (carried, p_WE) = subject(), midway()
     length = read(robot.structure, robot.theta, carried).length[:, robot.winched]
     hanging = torch.tensor([[True, False, False, True, False, False]])

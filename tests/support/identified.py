@@ -18,7 +18,7 @@ def text(*words: str) -> np.ndarray:
     return np.char.encode(np.array(words, dtype=str), "utf-8")
 
 
-def identification(robot: Robot, frames: int = 24) -> ArtifactData:
+def identification(robot: Robot, frames: int = 24, *, repeating: bool = False) -> ArtifactData:
     """Numbers that fit together: intervals are value -+ 1.96 sd, covariances have the correlations, costs fall."""
     facts: dict[str, Scalar] = {
         "method": "default", "drive": "command replay", "loss": "key frames, robust beyond 3 sd", "robot": robot.name,
@@ -28,7 +28,7 @@ def identification(robot: Robot, frames: int = 24) -> ArtifactData:
     groups = {
         "fit": Group({}, facts), "parameters": parameters(), "covariance": _covariance(),
         "identifiability": _identifiability(), "trace": _trace(), "starts": _starts(), "profiles": _profiles(),
-        "measures": _measures(), "history": _history(), **_of_motion(robot, frames),
+        "measures": _measures(), "history": _history(), **_of_motion(robot, frames, repeating),
     }  # fmt: skip
     return ArtifactData("identification", groups)
 
@@ -110,7 +110,7 @@ def _history() -> Group:
     )
 
 
-def _of_motion(robot: Robot, frames: int) -> dict[str, Group]:
+def _of_motion(robot: Robot, frames: int, repeating: bool) -> dict[str, Group]:
     """What has end caps in it: two segments, observed with a ripple of 2 mm; the second is simulated 6 mm too far."""
     m = motion(robot, frames)
     half = frames // 2
@@ -126,7 +126,7 @@ def _of_motion(robot: Robot, frames: int) -> dict[str, Group]:
     cables = len(robot.cables)
     stop = m.t[[half - 1, -1]]
     start = m.t[[0, half]]
-    return {
+    found = {
         "segments": Group({
             "run": text("walk", "walk"), "interval": np.array([1, 2]), "role": np.array([1, 2], np.uint8),
             "t_first": start, "t_last": stop, "keyframe_error": error, "keyframe_cap_rmse": rmse,
@@ -134,13 +134,6 @@ def _of_motion(robot: Robot, frames: int) -> dict[str, Group]:
             "baseline_cap_rmse": np.array([[0.05, _NAN, 0.02, 0.009], [0.048, 0.011, 0.02, 0.012]]),
             "lag1": np.tile([0.1, 0.2, 0.1, 0.0, -0.1, 0.7], (2, 1)), "white": np.tile([True] * 5 + [False], (2, 1)),
         }),
-        "repeating": Group(
-            {
-                "run": text("walk"), "interval": np.array([2]), "repeats": np.array([2]), "weight": np.array([0.5]),
-                "keyframe_error": 0.5 * error[1:], "keyframe_cap_rmse": 0.5 * rmse[1:],
-            },
-            {"used": False, "gap": 0.004, "floor": 0.005, "contrasts": 1, "dof": 5.0},
-        ),
         "windows": Group({
             "run": text("walk"), "interval": np.array([1]), "t_first": m.t[:1], "t_last": m.t[half - 1 : half],
             "p_WE": m.p_WE[:1], "v_WE": np.zeros((1, 6, 3)), "shift": np.full((1, 6, 3), 0.001),
@@ -150,6 +143,18 @@ def _of_motion(robot: Robot, frames: int) -> dict[str, Group]:
         "runs/walk/fit": Group(fit),
         "runs/walk/free_run": Group({
             "t": m.t[half:], "chain": np.zeros(frames - half, np.int64), "observed": observed[half:],
-            "simulated": simulated[half:], "predicted": 0.5 * (simulated + observed)[half:],
+            "simulated": simulated[half:],
         }),
     }  # fmt: skip
+    if repeating:
+        free = found["runs/walk/free_run"]
+        together = 0.5 * (simulated + observed)[half:]
+        found["runs/walk/free_run"] = Group({**free.datasets, "predicted": together}, free.attributes)
+        found["repeating"] = Group(
+            {
+                "run": text("walk"), "interval": np.array([2]), "repeats": np.array([2]), "weight": np.array([0.5]),
+                "keyframe_error": 0.5 * error[1:], "keyframe_cap_rmse": 0.5 * rmse[1:],
+            },
+            {"used": False, "gap": 0.004, "floor": 0.005, "contrasts": 1, "dof": 5.0},
+        )  # fmt: skip
+    return found

@@ -27,19 +27,19 @@ OPTIONAL = ("covariance", "identifiability", "trace", "starts", "profiles", "win
 @pytest.fixture(scope="module")
 def pictures() -> dict[str, tuple[str, bytes]]:
     """Every picture by name, with its title."""
-    drawn = draw_identification(builders.identification())
+    drawn = draw_identification(builders.identification(repeating=True))
     return {name: (title, png) for name, title, png in drawn}
 
 
 def without(*groups: str) -> ArtifactData:
     """The identification without some of its groups."""
-    data = builders.identification()
+    data = builders.identification(repeating=True)
     return replace(data, groups={path: group for path, group in data.groups.items() if path not in groups})
 
 
 def changed(path: str, name: str, value: np.ndarray) -> ArtifactData:
     """The identification with another dataset."""
-    data = builders.identification()
+    data = builders.identification(repeating=True)
     group = data.groups[path]
     return replace(data, groups={**data.groups, path: Group({**group.datasets, name: value}, group.attributes)})
 
@@ -52,7 +52,7 @@ def test_every_part_is_drawn(pictures: dict[str, tuple[str, bytes]]) -> None:
 
 def test_what_repeats_stands_at_its_own_segment() -> None:
     """Training segments have none; without that part there is no line at all."""
-    groups = builders.identification().groups
+    groups = builders.identification(repeating=True).groups
     off = errors_with_repeats(groups["segments"], groups["repeating"])
     assert off is not None
     assert off == pytest.approx([np.nan, 0.5 * groups["segments"]["keyframe_cap_rmse"][1]], nan_ok=True)
@@ -74,7 +74,7 @@ def test_a_trace_without_values_and_without_profiles_is_drawn() -> None:
 
 def test_the_page_is_self_contained_and_complete(pictures: dict[str, tuple[str, bytes]]) -> None:
     """No address and no file beside it; verdict, warnings (escaped), every table and every picture are on it."""
-    data = builders.identification()
+    data = builders.identification(repeating=True)
     said = report(data)
     page = identify_page(said, data, list(pictures.values())).decode()
     assert not re.search(r"https?://|<link|<script|@import", page)
@@ -89,7 +89,7 @@ def test_the_page_is_self_contained_and_complete(pictures: dict[str, tuple[str, 
 
 def test_a_parameter_that_is_not_identifiable_has_no_interval() -> None:
     """A dash instead of a narrow interval, the reason beside it."""
-    table = next(iter(report_tables(report(builders.identification()))))
+    table = next(iter(report_tables(report(builders.identification(repeating=True)))))
     row = dict(zip(table.columns, next(row for row in table.rows if row[0] == "restitution"), strict=True))
     assert (row["sd"], row["95 % interval"], row["range"]) == ("-", "-", "-")
     assert row["trust"] == "not identifiable" and row["why"] == "zero sensitivity: no cap bounced"
@@ -99,7 +99,7 @@ def test_a_parameter_that_is_not_identifiable_has_no_interval() -> None:
 
 def test_errors_stand_beside_floor_and_baselines() -> None:
     """Train, held out, every baseline and the floor in one table, in mm; what a baseline cannot say is a dash."""
-    said = report(builders.identification())
+    said = report(builders.identification(repeating=True))
     table = next(table for table in report_tables(said) if table.title.startswith("errors"))
     assert [row[0] for row in table.rows] == [
         "identified, train", "identified, held out", "nothing moves, held out", "repeat the same phase, held out",
@@ -112,7 +112,7 @@ def test_errors_stand_beside_floor_and_baselines() -> None:
 
 def test_the_verdict_is_about_what_was_not_fitted() -> None:
     """How many parameters the runs determine, the held-out error with its interval, floor and baselines."""
-    said = report(builders.identification())
+    said = report(builders.identification(repeating=True))
     text = verdict(said)
     assert "determine 2 of 4 free parameters (1 weak, 1 not identifiable)" in text
     assert "8.0 mm (6.4 .. 10.4)" in text and "floor 5.0 mm" in text and "nothing moves 48.0" in text
@@ -121,7 +121,7 @@ def test_the_verdict_is_about_what_was_not_fitted() -> None:
 
 def test_an_interval_that_holds_zero_is_undecided() -> None:
     """Better in every segment and still undecided: the row says both, and the verdict names the rival."""
-    said = report(builders.identification())
+    said = report(builders.identification(repeating=True))
     held = said.heldout
     assert held is not None
     rival = held.baselines["nominal"].model_copy(update={"difference": Intervals(keyframe_cap_rmse_m=(-0.0028, 2e-4))})
@@ -133,7 +133,7 @@ def test_an_interval_that_holds_zero_is_undecided() -> None:
 
 def test_a_rival_of_fewer_segments_says_so() -> None:
     """A rival that one of two held-out segments knows: with its count in the table and in the verdict."""
-    said = report(builders.identification())
+    said = report(builders.identification(repeating=True))
     test = next(one for one in said.segments if one.role == "test")
     other = test.model_copy(update={"interval": test.interval + 1, "baselines": {}})
     said = said.model_copy(update={"segments": (*said.segments, other)})
@@ -144,7 +144,7 @@ def test_a_rival_of_fewer_segments_says_so() -> None:
 
 def test_the_paper_method_speaks_of_no_determination() -> None:
     """It is the method that gives no uncertainty; the runs say nothing either way."""
-    said = report(builders.identification()).model_copy(update={"method": "paper"})
+    said = report(builders.identification(repeating=True)).model_copy(update={"method": "paper"})
     assert verdict(said).startswith("The method gives no uncertainty")
 
 
@@ -158,7 +158,7 @@ def test_an_endless_interval_does_not_hide_the_others() -> None:
 def test_nothing_known_of_the_information_is_drawn() -> None:
     """A spectrum of zeros (no run says anything) has no logarithm, and is drawn."""
     data = changed("identifiability", "eigenvalue", np.zeros(4))
-    assert draw_information(data) != draw_information(builders.identification())
+    assert draw_information(data) != draw_information(builders.identification(repeating=True))
 
 
 def test_long_words_do_not_run_into_each_other() -> None:
@@ -180,7 +180,7 @@ def test_the_error_of_a_frame_is_over_the_caps_that_are_seen() -> None:
 
 def test_the_floor_is_that_of_the_key_frames() -> None:
     """The last one that is known; NaN where none is."""
-    measures = builders.identification().groups["measures"]
+    measures = builders.identification(repeating=True).groups["measures"]
     assert floor_of(measures) == 0.005
     unknown = changed("measures", "floor", np.full(3, np.nan)).groups["measures"]
     assert np.isnan(floor_of(unknown))

@@ -67,23 +67,31 @@ def as_smoothed(
 ) -> dict[tuple[str, int], State]:
     """The states with the poses and velocities that the estimate smoothed: these know later frames, so they are for
     intervals that are fitted, never for judged ones. Roll is the filter's; rest lengths balance the pose."""
+    named = {run.name: run.caps for run in runs}
+    at = [(named[name], int(named[name].intervals.first[number - 1])) for name, number in states]
+    if not at:
+        return {}
+    found = smoothed_at(at, batched(list(states.values())), predictor, values)
+    return {place: found.select(k) for k, place in enumerate(states)}
+
+
+def smoothed_at(
+    at: Sequence[tuple[RunData, int]], carried: State, predictor: Predictor, values: np.ndarray
+) -> State:  # fmt: skip
+    """States (a batch) in the smoothed poses and velocities of frames of runs; what these do not show is that of
+    `carried`, a batch as well."""
     import torch
 
     from r2s2r_cli.engine.settle import window_state
 
     theta = predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64))
     up = np.array([0.0, 0.0, predictor.mapping.observation(values).ground_height])
-    named = {run.name: run.caps for run in runs}
-    at = [(named[name], int(named[name].intervals.first[number - 1])) for name, number in states]
-    if not at:
-        return {}
     with torch.no_grad():
-        found = window_state(
-            predictor.simulator, theta, torch.as_tensor(np.array([run.p_WE[frame] - up for run, frame in at])),
-            batched(list(states.values())), loose=float(np.mean([loose(run, frame) for run, frame in at])),
+        return window_state(
+            predictor.simulator, theta, torch.as_tensor(np.array([run.p_WE[frame] - up for run, frame in at])), carried,
             v_WE=torch.as_tensor(np.array([run.v_WE[frame] for run, frame in at])),
+            loose=float(np.mean([loose(run, frame) for run, frame in at])),
         )  # fmt: skip
-    return {place: found.select(k) for k, place in enumerate(states)}
 
 
 def batched(states: Sequence[State]) -> State:

@@ -11,6 +11,8 @@ from schemas.robot import Robot
 
 KINDS = ("cable", "cap", "rod", "motor", "sensor", "place", "world", "camera")
 """Kinds of elements, as `diagnose --json` has them."""
+MOST_NATS = 60.0
+"""However far a finding stands out, it says no more than this for an effect or a channel."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Evidence
-from r2s2r_cli.stages.diagnose.parity.finding import Element, Parity, discoveries
+from r2s2r_cli.stages.diagnose.parity.finding import MOST_NATS, Element, Parity, discoveries
 from r2s2r_cli.stages.diagnose.where.channels import ENOUGH_NATS, explained, fitted, gains, held_out, sizes
 from r2s2r_cli.stages.diagnose.where.columns import Design, design
 from r2s2r_cli.stages.diagnose.where.found import PlaceMap, ProbeGain, SegmentGap, Where
@@ -23,8 +23,6 @@ ALL = "all"
 LEAST_GAIN = 20.0
 """[nats] over all intervals, of probe and parity together: sets of the rig without an effect reach 19 (development
 bank, 16 sets)."""
-MOST_PARITY = 60.0
-"""[nats] A finding says no more than this of its channel."""
 
 Told = Callable[[str, int, int], None]
 
@@ -160,7 +158,7 @@ def _said(found: Parity | None) -> dict[str, tuple[float, Element | None]]:
     for one in () if found is None else found.significant:
         for suspicion in one.suspicions:
             own = channel.get(suspicion.effect, "")
-            nats = suspicion.share * min(0.5 * one.z**2, MOST_PARITY)
+            nats = suspicion.share * min(0.5 * one.z**2, MOST_NATS)
             if nats > made.get(own, (0.0, None))[0]:
                 made[own] = (nats, one.element)
     return made

@@ -10,7 +10,6 @@ from r2s2r_cli.stages.diagnose.which.mixture import density
 from r2s2r_cli.stages.diagnose.which.replay import Replayer, Seen
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.diagnose.which.white import White, whitened, whites
-from r2s2r_cli.stages.identify.offsets import StartSpread
 
 CAMERA = (("camera_height", "m", 2e-3), ("camera_tilt_x", "rad", 5e-3), ("camera_tilt_y", "rad", 5e-3))
 """What is left of the rigid alignment of the camera after levelling: name, unit, prior sd. Over the plane it is part of
@@ -26,8 +25,6 @@ LOST_M = 0.25
 """A cap that is simulated so far from where it was is lost, and farther off is not worse."""
 FLOOR_SD = 1e-3
 """[m] How well the height of the floor is known, run by run: each is levelled by its own lowest caps."""
-START = StartSpread(position=3e-3, tilt=0.015, roll=0.08, rest=3e-3)
-"""Of start states of which no spread is known."""
 
 
 class Arena:
@@ -82,7 +79,8 @@ class Arena:
         """Derivatives at nuisances z (p + q,), and with them what makes residuals white: differences over
         the sd of the starts, secants over a share of the nuisances' prior: contacts make a derivative say little of a
         step."""
-        sd = [self._start_sd(one) for one in self.many]
+        sd = [one.start_sd for one in self.many if one.start_sd is not None]
+        assert len(sd) == len(self.many)  # noqa: S101 - whole intervals are never prepared, only pieces
         seen = self.replayer.around(self.many, self.values(z[None])[0], sd)
         self._by_offset = [self._responses(one) for one in seen]
         self._length = [one.length[0] for one in seen]
@@ -107,10 +105,6 @@ class Arena:
         own = [np.concatenate([e, s], axis=0) for e, s in zip(self._by_engine, self._shifts, strict=True)]
         self.by_nuisance = whitened(self.white, own).T  # (M, p + q)
 
-    def _start_sd(self, one: Stretch) -> np.ndarray:
-        sd = START.sd(self.replayer.structure) if one.start_sd is None else one.start_sd
-        return np.asarray(sd)
-
     @property
     def sizes(self) -> np.ndarray:
         """Data of every stretch, (stretch,)."""
@@ -127,14 +121,9 @@ class Arena:
         found = [self._residual(k, seen[k], z) for k in range(len(self.many))]
         return [np.clip(np.nan_to_num(one, nan=LOST_M), -LOST_M, LOST_M) for one in found]
 
-    def ends(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Simulated minus observed caps at the last frame of every stretch, (k, stretch, cap, 3) [m]."""
-        caps = self.many[0].caps.shape[1]
-        raw = self.raw(values, z)
-        return np.stack([r[:, : 3 * caps, -1].reshape(len(r), caps, 3) for r in raw], axis=1)
-
     def keys(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """The same of the target intervals as a whole: errors at key frames, (k, interval, cap, 3) [m]."""
+        """Simulated minus observed caps [m] at the ends of whole target intervals, the key frames, (k, interval, cap,
+        3)."""
         seen = self.replayer.seen(self.whole, values)
         caps = np.stack([s.caps[:, -1] - one.caps[-1] for s, one in zip(seen, self.whole, strict=True)], axis=1)
         columns = np.array([self._camera_columns(one.caps[-1]) for one in self.whole])

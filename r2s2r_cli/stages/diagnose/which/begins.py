@@ -66,8 +66,12 @@ def carried(structure: Structure, one: Stretch, start: Tensor, before: Tensor) -
     return torch.where(before.isfinite().all(dim=1, keepdim=True), found, start)
 
 
-def last_of(flat: Tensor, one: Stretch, stored_s: float) -> Tensor:
-    """States (k, NS) at the last frame, from those stored every stored_s seconds (k, stored, NS)."""
-    at = one.window.duration / stored_s
-    low = int(at + TINY)
-    return flat[:, low] * (1 - (at - low)) + flat[:, low + 1] * (at - low)
+def between(stored: Tensor, place: Tensor) -> Tensor:
+    """Values (k, F, ...) at places (k, F) among those stored (k, stored, ...), on straight lines between them; beyond
+    the ends those of the ends."""
+    import torch
+
+    low = (place + TINY).floor().long().clamp(0, stored.shape[1] - 2)
+    share = (place - low).clamp(0.0, 1.0).reshape(*place.shape, *[1] * (stored.ndim - 2))
+    row = torch.arange(len(stored))[:, None]
+    return stored[row, low] * (1 - share) + stored[row, low + 1] * share

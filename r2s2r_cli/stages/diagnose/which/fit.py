@@ -150,14 +150,11 @@ class Fits:
         A = H / np.outer(scale, scale) + fit.damping * np.eye(len(H))
         return np.asarray(-np.linalg.solve(A, g / scale) / scale)
 
-    def normal(self, fit: Fit, keep: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Re-weighted normal matrix and gradient, with priors; keep (stretch,) bool: of these stretches only."""
-        n = fit.jacobian.shape[1]
-        H, g = np.zeros((n, n)), np.zeros(n)
-        for k, (own, pull) in enumerate(zip(*self.products(fit), strict=True)):
-            if keep is None or keep[k]:
-                H += own
-                g += pull
+    def normal(
+        self, fit: Fit, products: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+        """Re-weighted normal matrix and gradient, with priors. products: of the fit, where they are known already."""
+        H, g = (part.sum(axis=0) for part in products or self.products(fit))
         p = len(fit.z)
         H[:p, :p] += self.arena.precision
         g[:p] += self.arena.precision @ (fit.z - self.arena.mean)
@@ -169,7 +166,7 @@ class Fits:
 
     def likely(self, fit: Fit) -> np.ndarray:
         """Square roots of the weights of all its residuals, (M,): of what fell, nothing can be told."""
-        w = weight(self.arena.squares(fit.residual[None])[0], self.arena.logdets, self.arena.sizes)
+        w = self._weights(fit)
         found = np.zeros(len(fit.residual))
         for white, own in zip(self.arena.white, w, strict=True):
             for kind, one in zip(white.kinds, own, strict=True):
@@ -178,7 +175,7 @@ class Fits:
 
     def products(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
         """What every stretch adds to the normal matrix, (stretch, n, n), and to the gradient, (stretch, n)."""
-        w = weight(self.arena.squares(fit.residual[None])[0], self.arena.logdets, self.arena.sizes)
+        w = self._weights(fit)
         n = fit.jacobian.shape[1]
         H, g = np.zeros((len(w), n, n)), np.zeros((len(w), n))
         for k, white in enumerate(self.arena.white):
@@ -187,6 +184,10 @@ class Fits:
                 H[k] += w[k, c] * J.T @ J
                 g[k] += w[k, c] * J.T @ fit.residual[kind.rows]
         return H, g
+
+    def _weights(self, fit: Fit) -> np.ndarray:
+        """Of each kind of error, (stretch, kind)."""
+        return weight(self.arena.squares(fit.residual[None])[0], self.arena.logdets, self.arena.sizes)
 
     def _moved(self, fit: Fit, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         p = len(fit.z)

@@ -1,4 +1,4 @@
-"""Target intervals cut into pieces of less than a second, each begun anew in the pose that was seen.
+"""Target intervals cut into pieces of about a second, each begun anew in the pose that was seen.
 
 Where a robot tips is decided by less than a millimetre: two good engines tip at other instants and are decimetres apart
 ever after. A piece forgives that at its end. What the caps do not show goes on from one piece to the next: roll, slack
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Run
-from r2s2r_cli.stages.diagnose.starts import loose
+from r2s2r_cli.stages.diagnose.starts import loose, smoothed_at
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch, stretch_of
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.offsets import StartSpread
@@ -136,18 +136,10 @@ def _begun(
     import torch
 
     from r2s2r_cli.engine.reading import read
-    from r2s2r_cli.engine.settle import window_state
 
     theta = replayer.mapping.theta(torch.as_tensor(values, dtype=torch.float64))
-    up = np.array([0.0, 0.0, replayer.mapping.observation(values).ground_height])
-    frames = [(cut.run.caps, int(cut.frames[-1])) for cut in cuts]
+    state = smoothed_at([(cut.run.caps, int(cut.frames[-1])) for cut in cuts], after, replayer, values)
     with torch.no_grad():
-        state = window_state(
-            replayer.simulator, theta,
-            torch.as_tensor(np.array([run.p_WE[frame] - up for run, frame in frames])), after,
-            v_WE=torch.as_tensor(np.array([run.v_WE[frame] for run, frame in frames])),
-            loose=float(np.mean([loose(run, frame) for run, frame in frames])),
-        )  # fmt: skip
         reading, winched = read(replayer.structure, theta, state), list(replayer.structure.actuated)
         just = state.rest + (reading.length - reading.rest)[:, winched]  # effects may add to what the winches give
         taut = torch.where(reading.tension[:, winched] > 0, state.rest, torch.minimum(just, state.rest))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from r2s2r_cli.stages.diagnose.which.begins import carried, last_of, placed
+from r2s2r_cli.stages.diagnose.which.begins import TINY, between, carried, placed
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.identify.commands import CommandLog
@@ -25,7 +25,6 @@ EVERY = 10
 """Engine steps between stored states."""
 MOST = 256
 """Simulations in one batch."""
-TINY = 1e-6
 
 
 @dataclass(frozen=True)
@@ -53,19 +52,11 @@ class Replayer(Predictor):
             rows = [k for k, one in enumerate(many) if one.piece == depth]
             for group in alike([many[k].window for k in rows]):
                 own = [rows[i] for i in group]
-                together = max(1, MOST // len(own))
                 begin = [after.get((many[k].run, many[k].interval, depth - 1)) for k in own]
-                chunks = [
-                    self._batch([many[k] for k in own], values[first : first + together],
-                                [None if one is None else one[first : first + together] for one in begin])
-                    for first in range(0, len(values), together)
-                ]  # fmt: skip
-                for i, k in enumerate(own):
-                    parts[k] = Seen(
-                        np.concatenate([chunk[i][0].caps for chunk in chunks]),
-                        np.concatenate([chunk[i][0].length for chunk in chunks]),
-                    )
-                    after[many[k].run, many[k].interval, depth] = _cat([chunk[i][1] for chunk in chunks])
+                found = self._chunked([many[k] for k in own], values, begin)
+                for k, (one, last) in zip(own, found, strict=True):
+                    parts[k] = one
+                    after[many[k].run, many[k].interval, depth] = last
         return [parts[k] for k in range(len(many))]
 
     def finals(self, many: Sequence[Stretch], values: np.ndarray) -> State:
@@ -96,18 +87,35 @@ class Replayer(Predictor):
                 )
                 for k in group
             ]  # fmt: skip
-            together = max(1, MOST // len(own))
-            chunks = [
-                self._batch(own, np.repeat(values[None], len(starts[0][first : first + together]), axis=0),
-                            starts=[one[first : first + together] for one in starts])
-                for first in range(0, len(starts[0]), together)
-            ]  # fmt: skip
-            for i, k in enumerate(group):
-                parts[k] = Seen(
-                    np.concatenate([chunk[i][0].caps for chunk in chunks]),
-                    np.concatenate([chunk[i][0].length for chunk in chunks]),
-                )
+            alone = np.repeat(values[None], len(starts[0]), axis=0)
+            for k, (one, _) in zip(group, self._chunked(own, alone, starts=starts), strict=True):
+                parts[k] = one
         return [parts[k] for k in range(len(many))]
+
+    def _chunked(
+        self, many: Sequence[Stretch], values: np.ndarray, begin: Sequence[Tensor | None] = (), *,
+        starts: Sequence[Tensor] = (),
+    ) -> list[tuple[Seen, Tensor]]:  # fmt: skip
+        """`_batch`, at most MOST simulations at a time."""
+        together = max(1, MOST // len(many))
+        chunks = []
+        for first in range(0, len(values), together):
+            rows = slice(first, first + together)
+            chunks.append(
+                self._batch(
+                    many, values[rows], [None if one is None else one[rows] for one in begin],
+                    starts=[one[rows] for one in starts],
+                )
+            )  # fmt: skip
+        return [
+            (
+                Seen(
+                    np.concatenate([seen.caps for seen, _ in parts]), np.concatenate([seen.length for seen, _ in parts])
+                ),
+                _cat([last for _, last in parts]),
+            )
+            for parts in zip(*chunks, strict=True)
+        ]
 
     def _batch(
         self, many: Sequence[Stretch], values: np.ndarray, begin: Sequence[Tensor | None] = (), *,
@@ -143,7 +151,8 @@ class Replayer(Predictor):
                 s0, u, pack_parameters(structure, theta), h=step / n, hold=n, every=EVERY * n
             )  # fmt: skip
             seen = self._looked(own, behind, flat, many, late.ground_height)
-        return [(one, last_of(flat[i :: len(many)], many[i], EVERY * step)) for i, one in enumerate(seen)]
+        ends = [torch.full((k, 1), one.window.duration / (EVERY * step), dtype=torch.float64) for one in many]
+        return [(one, between(flat[i :: len(many)], ends[i])[:, 0]) for i, one in enumerate(seen)]
 
     def _undelayed(self, own: Parameters, k: int) -> tuple[Parameters, np.ndarray]:
         """The parameters without the camera's delay, and that delay (k,) [s]. A stretch starts where the camera saw the
@@ -198,22 +207,11 @@ class Replayer(Predictor):
         found = []
         for i, one in enumerate(many):
             since = torch.as_tensor(one.t - one.window.start)
-            shown = _at(caps[:, i], (since / every).expand(k, -1))
+            shown = between(caps[:, i], (since / every).expand(k, -1))
             camera = observe(self.structure, wide, torch.as_tensor(one.t), shown + lift)
-            lengths = _at(length[:, i], (since + torch.as_tensor(behind)[:, None]) / every)
+            lengths = between(length[:, i], (since + torch.as_tensor(behind)[:, None]) / every)
             found.append(Seen(camera.numpy(), lengths.numpy()[..., list(one.sensors)]))
         return found
-
-
-def _at(stored: Tensor, place: Tensor) -> Tensor:
-    """Values (k, F, ...) at places (k, F) among those stored (k, stored, ...), on straight lines between them; beyond
-    the ends those of the ends."""
-    import torch
-
-    low = (place + TINY).floor().long().clamp(0, stored.shape[1] - 2)
-    share = (place - low).clamp(0.0, 1.0).reshape(*place.shape, *[1] * (stored.ndim - 2))
-    row = torch.arange(len(stored))[:, None]
-    return stored[row, low] * (1 - share) + stored[row, low + 1] * share
 
 
 def _cat(parts: Sequence[Tensor]) -> Tensor:

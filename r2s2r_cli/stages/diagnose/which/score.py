@@ -63,8 +63,8 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: b
     names = np.unique(groups)
     points, precisions = [], []
     for fit in fits:
-        H, gradient = solver.normal(fit)
         own, pull = solver.products(fit)
+        H, gradient = solver.normal(fit, (own, pull))
         for name in names:
             out = (groups == name) & held_out
             P = np.linalg.pinv(H - own[out].sum(axis=0), hermitian=True)

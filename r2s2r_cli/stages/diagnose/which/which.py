@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from r2s2r_cli.stages.diagnose.parity.finding import MOST_NATS
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY, candidates
@@ -30,8 +31,6 @@ FIRST = 2
 """Iterations of all starts of a hypothesis; the best one goes on."""
 POLISHED = 3
 """Fits that go on when all have ended."""
-MOST_LOGGED = 60.0
-"""[nats] A finding of the parity stage says no more than this."""
 SECOND = 3
 """Iterations after the floor was widened."""
 
@@ -94,7 +93,7 @@ def compare_effects(
         arena=arena, base=base, refit=refit, fits=tuple(fits), scores=tuple(own), responses=responses,
         chance=chance(arena, responses, groups, seed=seed), no_gap=no_gap(refit, floor_m), wider=wider,
         unexplained=unexplained if ways.unknown else -np.inf, groups=groups, calibration=calibration,
-        logged={name: min(0.5 * suspected[name] ** 2, MOST_LOGGED) for name in NO_REPLAY if name in suspected},
+        logged={name: min(0.5 * suspected[name] ** 2, MOST_NATS) for name in NO_REPLAY if name in suspected},
     )  # fmt: skip
     which = concluded(material)
     order = np.argsort(-gains(refit, own), kind="stable")

@@ -58,10 +58,11 @@ class Effect(Hooks):
         return f"{type(self).__name__}({inside})"
 
     def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and repr(other) == repr(self)
+        return other is self or (type(other) is type(self) and repr(other) == repr(self))
 
     def __hash__(self) -> int:
-        return hash(repr(self))
+        # Structures are keys of caches that are asked all the time: the name will do, and equality tells the rest.
+        return hash(self.name)
 
     def sizes(self, structure: Structure) -> Mapping[str, int]:
         """Own parameters and how many numbers each has."""

@@ -112,7 +112,7 @@ def overrides(structure: Structure, hook: str) -> tuple[Hooks, ...]:
 def effective(structure: Structure, theta: Parameters) -> Parameters:
     """The parameters that the step works with: those of the robot, changed by its effects. For whoever reads caps,
     forces or energy off a state; the step itself does the same and must be handed the parameters before."""
-    for effect in structure.effects:
+    for effect in overrides(structure, "parameters"):
         theta = effect.parameters(theta.of(effect.name), theta)
     return theta
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 
 import torch
 from torch import Tensor
@@ -76,8 +77,16 @@ class Parameters:
 
     def of(self, effect: str) -> dict[str, Tensor]:
         """The own parameters of one effect by their short names."""
-        prefix = effect + "."
-        return {name[len(prefix) :]: value for name, value in self.extra.items() if name.startswith(prefix)}
+        return dict(self._own.get(effect, {}))
+
+    @cached_property
+    def _own(self) -> dict[str, dict[str, Tensor]]:
+        """The parameters of effects by effect and short name: asked for by every hook of every effect."""
+        found: dict[str, dict[str, Tensor]] = {}
+        for name, tensor in self.extra.items():
+            effect, _, own = name.partition(".")
+            found.setdefault(effect, {})[own] = tensor
+        return found
 
     def map(self, function: Callable[[Tensor], Tensor]) -> Parameters:
         """The same with `function` applied to every tensor."""

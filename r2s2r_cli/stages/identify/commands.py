@@ -40,6 +40,12 @@ class CommandLog:
         edges = start + step * np.arange(count + 1) - delay
         return np.asarray(np.diff(self._integral(edges), axis=0) / step)
 
+    def all_means(self, start: float, count: int, *, step: float, delays: np.ndarray) -> np.ndarray:
+        """The same for several delays (d,) [s], (d, row, actuated)."""
+        edges = start + step * np.arange(count + 1) - delays[:, None]
+        wound = self._integral(edges.ravel()).reshape(*edges.shape, -1)
+        return np.asarray(np.diff(wound, axis=1) / step)
+
     def _integral(self, t: np.ndarray) -> np.ndarray:
         """Integral of the commands from the first row to t (n,) [s], (n, actuated)."""
         row = np.searchsorted(self._knots, t, side="right")

@@ -17,9 +17,28 @@ MOVED_M = 1e-7
 """A camera that shows the robot so near to where it is changes no start."""
 
 
-def placed(structure: Structure, own: Parameters, start: Tensor, up: float) -> Tensor:
+def acting(structure: Structure, theta: Parameters, hook: str) -> Tensor:
+    """Rows (k,) of the parameters in which an effect with this hook has a number that is not its off value."""
+    import torch
+
+    from r2s2r_cli.engine.hooks import overrides
+
+    found = torch.zeros(len(theta.mass), dtype=torch.bool)
+    for effect in overrides(structure, hook):
+        off = effect.off(structure)
+        for name, x in theta.of(effect.name).items():
+            found |= (x != off[name]).any(dim=1)
+    return found
+
+
+def rows_of(theta: Parameters, rows: Tensor) -> Parameters:
+    """Some rows of a batch of parameters; those of batch 1 as they are."""
+    return theta.map(lambda x: x[rows] if len(x) > 1 else x)
+
+
+def placed(structure: Structure, theta: Parameters, start: Tensor, up: float) -> Tensor:
     """Starts (k, NS) where each hypothesis's camera says that the robot is: they stand where it was
-    seen. own: parameters of each, batch 1 or k; up: height of the ground in the world [m]."""
+    seen. theta: parameters of each, batch k; up: height of the ground in the world [m]."""
     import roma
     import torch
 
@@ -30,20 +49,22 @@ def placed(structure: Structure, own: Parameters, start: Tensor, up: float) -> T
     from r2s2r_cli.engine.roll import along
     from r2s2r_cli.engine.settle import lowered
 
-    k = len(start)
+    rows = acting(structure, theta, "observation").nonzero()[:, 0]
+    if not len(rows):
+        return start
     with torch.no_grad():
-        state = unpack_state(structure, start)
-        one_robot = effective(structure, own.map(lambda x: x[:1]))
-        shown = end_caps(one_robot, state)
+        own, state = rows_of(theta, rows), unpack_state(structure, start[rows])
+        robot = effective(structure, own)
+        shown = end_caps(robot, state)
         lift = torch.tensor([0.0, 0.0, up], dtype=start.dtype)
-        real = unseen(structure, own.map(lambda x: x.expand(k, *x.shape[1:])), shown + lift) - lift
+        real = unseen(structure, own, shown + lift) - lift
         by = (real - shown).unflatten(1, (-1, 2)).mean(dim=2)
-        if not bool(((real - shown).abs() > MOVED_M).any()):
-            return start
         turned = roma.rotmat_to_unitquat(along(real, roma.unitquat_to_rotmat(state.q_WR)))
-        moved = lowered(one_robot, replace(state, p_WB=state.p_WB + by, q_WR=turned), only_up=True)
+        moved = lowered(robot, replace(state, p_WB=state.p_WB + by, q_WR=turned), only_up=True)
         far = (real - shown).abs().amax(dim=(1, 2)) > MOVED_M
-        return torch.where(far[:, None], pack_state(structure, moved), start)
+        found = start.clone()
+        found[rows] = torch.where(far[:, None], pack_state(structure, moved), start[rows])
+        return found
 
 
 def carried(structure: Structure, one: Stretch, start: Tensor, before: Tensor) -> Tensor:

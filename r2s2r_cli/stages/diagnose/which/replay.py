@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.begins import TINY, between, carried, placed
+from r2s2r_cli.stages.diagnose.which.looks import Seen, looked
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.identify.commands import CommandLog
+from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.offsets import displaced
 from r2s2r_cli.stages.identify.predict import Predictor, alike
 
@@ -27,21 +28,13 @@ MOST = 256
 """Simulations in one batch."""
 
 
-@dataclass(frozen=True)
-class Seen:
-    """Of one stretch, for k hypotheses: caps (k, F, cap, 3) [m], as the camera sees them, and length (k, F, sensor)
-    [m], as the sensors read them. What left the finite numbers is nan."""
-
-    caps: np.ndarray
-    length: np.ndarray
-
-
 class Replayer(Predictor):
     """Simulates stretches by command replay, many hypotheses at once."""
 
     def __init__(self, model: Model, **how: object) -> None:
         super().__init__(model, **how)  # type: ignore[arg-type]
         self.model = model
+        self._logs: dict[int, tuple[RunData, CommandLog]] = {}
 
     def seen(self, many: Sequence[Stretch], values: np.ndarray) -> list[Seen]:
         """Of every stretch at values (k, n). A piece that comes after another one of `many` goes on with what that left
@@ -137,8 +130,7 @@ class Replayer(Predictor):
             if before is not None:
                 starts[i] = carried(structure, many[i], starts[i], before)
         late = self.model.observation()
-        starts = [placed(structure, own, one, late.ground_height) for one in starts]
-        s0 = torch.stack(starts, dim=1).flatten(0, 1)
+        s0 = placed(structure, theta, torch.stack(starts, dim=1).flatten(0, 1), late.ground_height)
         lasting = max(one.window.duration for one in many) + max(0.0, float(behind.max()))
         rows = EVERY * (math.ceil(lasting / step / EVERY - TINY) + 1)
         own_delay = delay_of(structure, own)
@@ -150,9 +142,13 @@ class Replayer(Predictor):
             flat = self.simulator.advance(
                 s0, u, pack_parameters(structure, theta), h=step / n, hold=n, every=EVERY * n
             )  # fmt: skip
-            seen = self._looked(own, behind, flat, many, late.ground_height)
-        ends = [torch.full((k, 1), one.window.duration / (EVERY * step), dtype=torch.float64) for one in many]
-        return [(one, between(flat[i :: len(many)], ends[i])[:, 0]) for i, one in enumerate(seen)]
+            seen = looked(
+                structure, theta, flat, many, behind, every=EVERY * step, cable_caps=self.cable_caps,
+                up=late.ground_height,
+            )  # fmt: skip
+        lasted = torch.as_tensor([one.window.duration / (EVERY * step) for one in many], dtype=torch.float64)
+        last = between(flat, lasted.repeat(k)[:, None])[:, 0]
+        return [(one, last[i :: len(many)]) for i, one in enumerate(seen)]
 
     def _undelayed(self, own: Parameters, k: int) -> tuple[Parameters, np.ndarray]:
         """The parameters without the camera's delay, and that delay (k,) [s]. A stretch starts where the camera saw the
@@ -169,49 +165,16 @@ class Replayer(Predictor):
         """Commands (k stretch, row, actuated), each hypothesis with its own delay [s]."""
         import torch
 
-        logs = [CommandLog(one.window.run) for one in many]
-        made = {
-            (i, delay): log.means(one.window.start, rows, step=self.step, delay=delay)
-            for i, (log, one) in enumerate(zip(logs, many, strict=True))
-            for delay in set(delays.tolist())
-        }
-        return torch.as_tensor(np.stack([made[i, delay] for delay in delays.tolist() for i in range(len(many))]))
+        own, back = np.unique(delays, return_inverse=True)
+        made = np.stack([self._log(one.window.run).all_means(one.window.start, rows, step=self.step, delays=own)
+                         for one in many], axis=1)  # fmt: skip
+        return torch.as_tensor(made[back].reshape(-1, *made.shape[2:]))
 
-    def _looked(
-        self, own: Parameters, behind: np.ndarray, flat: Tensor, many: Sequence[Stretch], up: float
-    ) -> list[Seen]:
-        """What is seen of each stretch, from the states (k stretch, stored, NS). behind (k,) [s]: of the camera."""
-        import torch
-
-        from r2s2r_cli.engine import end_caps, observe, sense
-        from r2s2r_cli.engine.flat import unpack_state
-        from r2s2r_cli.engine.hooks import effective, overrides
-
-        k, stored, every = len(behind), flat.shape[1], EVERY * self.step
-        one_robot = own.map(lambda x: x[:1])  # no effect moves the caps on a rod
-        caps = end_caps(effective(self.structure, one_robot), unpack_state(self.structure, flat.flatten(0, 1)))
-        caps = caps.unflatten(0, (k, len(many), stored))
-        ends = torch.as_tensor(self.cable_caps)
-        length = torch.linalg.vector_norm(caps[..., ends[:, 0], :] - caps[..., ends[:, 1], :], dim=-1)
-        begin = torch.as_tensor([one.window.start for one in many])
-        t = begin[:, None] + every * torch.arange(stored)
-        sensing = {effect.name for effect in overrides(self.structure, "sensing")}
-        read = one_robot.with_values({
-            name: x.expand(k, *x.shape[1:]).repeat_interleave(len(many) * stored, dim=0)
-            for name, x in own.extra.items() if name.split(".")[0] in sensing
-        })  # fmt: skip
-        length = sense(self.structure, read, length.flatten(0, 2), t.repeat(k, 1, 1).reshape(-1, 1))
-        length = length.unflatten(0, (k, len(many), stored))
-        wide = own.map(lambda x: x.expand(k, *x.shape[1:]))
-        lift = torch.tensor([0.0, 0.0, up], dtype=caps.dtype)
-        found = []
-        for i, one in enumerate(many):
-            since = torch.as_tensor(one.t - one.window.start)
-            shown = between(caps[:, i], (since / every).expand(k, -1))
-            camera = observe(self.structure, wide, torch.as_tensor(one.t), shown + lift)
-            lengths = between(length[:, i], (since + torch.as_tensor(behind)[:, None]) / every)
-            found.append(Seen(camera.numpy(), lengths.numpy()[..., list(one.sensors)]))
-        return found
+    def _log(self, run: RunData) -> CommandLog:
+        """Of a run, made once."""
+        if id(run) not in self._logs:
+            self._logs[id(run)] = (run, CommandLog(run))  # the run is kept: no other one gets its id
+        return self._logs[id(run)][1]
 
 
 def _cat(parts: Sequence[Tensor]) -> Tensor:

@@ -28,11 +28,11 @@ class Seen:
 
 def looked(
     structure: Structure, theta: Parameters, flat: Tensor, many: Sequence[Stretch], behind: np.ndarray, *,
-    every: float, cable_caps: np.ndarray, up: float,
+    every: float, cable_caps: Sequence[tuple[int, int]], up: float,
 ) -> list[Seen]:  # fmt: skip
     """What is seen of each stretch, from the states (k stretch, stored, NS), which are `every` seconds apart.
 
-    theta: batch k stretch, without the camera's delay; behind (k,) [s]: that delay. cable_caps (cable, 2): end caps
+    theta: batch k stretch, without the camera's delay; behind (k,) [s]: that delay. cable_caps: end caps of each cable,
     between which the sensors measure; up: height of the ground in the world [m].
     """
     import torch
@@ -64,7 +64,7 @@ def looked(
 
 
 def _since(many: Sequence[Stretch]) -> np.ndarray:
-    """Times of the frames of each stretch from its begin [s], (stretch, F), the last one again where there are fewer."""
+    """Times of the frames of each stretch from its begin [s], (stretch, F); the last one again and again at the end."""
     most = max(len(one.t) for one in many)
     return np.array([np.pad(one.t - one.window.start, (0, most - len(one.t)), mode="edge") for one in many])
 

@@ -41,6 +41,12 @@ RUN = GroupSpec(
         AttributeSpec(name="policy", type="str", description="name of the policy"),
         AttributeSpec(name="iteration", type="int", required=False, description="in which it was run"),
         AttributeSpec(name="robot", type="str", description="name of the robot description"),
+        AttributeSpec(name="opening", type="float", unit="s", required=False,
+                      description="how long the rest shape was that the run opened with; the comparison begins at its end"),
+        AttributeSpec(name="opening_moved", type="float", unit="m", required=False,
+                      description="how far the caps moved in it, up to a move over the ground, root mean square"),
+        AttributeSpec(name="opening_travel", type="float", unit="m", required=False,
+                      description="how far the centre of mass came in it over the ground"),
     ),
 )  # fmt: skip
 
@@ -51,7 +57,7 @@ REAL = GroupSpec(
     datasets=(
         column("target", "float64", ("interval", "actuated"), "1", "target positions, 0 short .. 1 long"),
         column("duration", "float64", ("interval",), "s", "of each target interval"),
-        column("p_WE_start", "float64", ("cap", "xyz"), "m", "end caps at the first frame", frame="W"),
+        column("p_WE_start", "float64", ("cap", "xyz"), "m", "end caps where the comparison begins: at the end of the opening rest, else at the first frame", frame="W"),
         column("p_WE", "float64", ("interval", "point", "cap", "xyz"), "m", "end caps", frame="W"),
         column("com", "float64", ("interval", "point", "xyz"), "m", "centre of mass", frame="W"),
     ),
@@ -59,7 +65,7 @@ REAL = GroupSpec(
 
 SIMULATED = GroupSpec(
     path="runs/{run}/simulated",
-    description="the same policy in every simulator, controller in the loop, laid on the real run at the first frame",
+    description="the same policy in every simulator, controller in the loop, laid on the real run where the comparison begins",
     required=True,
     datasets=(
         column("compared", "int64", ("model",), "count", "target intervals that real run and simulation have in common; 0: it could not be simulated"),

@@ -46,8 +46,18 @@ class CompareEnd(Frozen):
     turn_rad: float | None
 
 
+class CompareOpening(Frozen):
+    """The rest shape in which a run opened, before the policy; the comparison begins at its end."""
+
+    duration_s: float
+    moved_m: float | None
+    """How far the caps moved in it, up to a move over the ground, root mean square; None: not seen."""
+    travel_m: float | None
+    """How far the centre of mass came over the ground."""
+
+
 class CompareRun(Frozen):
-    """One run under one simulator, laid on each other at the first frame."""
+    """One run under one simulator, laid on each other where the policy begins."""
 
     run: str
     policy: str
@@ -76,6 +86,8 @@ class CompareRun(Frozen):
     real_end: CompareEnd
     floor: CompareFloor
     repeatability: CompareRepeatability | None
+    opening: CompareOpening | None = None
+    """None: the run opened with the policy itself; its first frame is the start."""
 
 
 class CompareMeasure(Frozen):

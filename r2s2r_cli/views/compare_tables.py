@@ -175,7 +175,8 @@ def _measure(one: CompareMeasure | None, scale: float) -> str:
 
 def _runs(report: CompareReport) -> PageTable:
     columns = ["run", "simulator", "trained on it", "intervals", "end [mm]", "turn [deg]", "key frames [mm]",
-               "caps [mm]", "path [mm]", "real / simulated [s]"]  # fmt: skip
+               "caps [mm]", "path [mm]", "real / simulated [s]",
+               "rest before: caps moved [mm]"]  # fmt: skip
     return PageTable("every run", columns, [_row(run) for run in report.runs])
 
 
@@ -185,6 +186,7 @@ def _row(run: CompareRun) -> list[str]:
         run.run, run.model, "yes" if run.trained_on else "no", str(run.intervals), _scaled(run.com_end_error_m, 1e3),
         _scaled(run.heading_end_error_rad, math.degrees(1)), _scaled(run.keyframe_cap_rmse_m, 1e3),
         _scaled(run.cap_rmse_m, 1e3), _scaled(run.path_error_m, 1e3), lasts,
+        "-" if run.opening is None else _scaled(run.opening.moved_m, 1e3),
     ]  # fmt: skip
 
 

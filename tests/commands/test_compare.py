@@ -17,6 +17,9 @@ schema_version = 1
 robot = "threebar"
 name = "gait"
 [[steps]]
+target = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
+hold_s = 1.0
+[[steps]]
 target = [0.2, 1.0, 1.0, 1.0, 0.3, 1.0]
 [[steps]]
 target = [1.0, 0.4, 1.0, 0.2, 1.0, 1.0]
@@ -50,6 +53,9 @@ def test_a_wrong_motor_speed_is_seen_as_time_and_the_right_one_leaves_the_noise(
     robot.write_text(told.replace(f"speed = {0.6 * SPEED}", f"speed = {SPEED}"))
     true = compared(walked)
     robot.write_text(told)
+    assert slow["intervals"] == true["intervals"] == 3  # what follows the rest that the run opens with
+    assert true["opening"]["duration_s"] == pytest.approx(1.0, abs=0.2)
+    assert true["opening"]["moved_m"] < 0.005
     assert slow["duration_s"]["sim"] > 1.2 * slow["duration_s"]["real"]
     assert true["duration_s"]["sim"] == pytest.approx(true["duration_s"]["real"], abs=0.15)
     assert true["keyframe_cap_rmse_m"] < 0.4 * slow["keyframe_cap_rmse_m"]

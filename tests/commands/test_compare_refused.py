@@ -20,9 +20,11 @@ Spoil = Callable[[Groups], None]
 
 
 def walked() -> Groups:
-    """The builders' run, both of its intervals complete."""
+    """The builders' run, both of its intervals complete, opening with a gait."""
     groups = dict(builders.estimate().groups)
     groups["runs/walk/intervals"]["complete"][:] = True
+    groups["runs/walk/intervals"]["target"][0, 0] = 0.5
+    del groups["runs/walk/policy"]
     return groups
 
 
@@ -40,7 +42,7 @@ def empty(data: Groups) -> None:
 
 def without_targets(data: Groups) -> None:
     """A log of a robot that somebody moved by hand."""
-    for name in ("intervals", "segments", "policy"):
+    for name in ("intervals", "segments"):
         del data[f"runs/walk/{name}"]
 
 
@@ -48,6 +50,11 @@ def one_segment(data: Groups) -> None:
     """The robot was stopped in its first shape."""
     for name in ("intervals", "segments"):
         rows(data, name, 1)
+
+
+def one_segment_after_rest(data: Groups) -> None:
+    """The rest shape and one more: nothing follows that would make it a gait."""
+    data["runs/walk/intervals"]["target"][0] = 1.0
 
 
 def other_robot(data: Groups) -> None:
@@ -65,6 +72,7 @@ CASES = [
     (empty, "run walk has no gait to compare", "received: 0"),
     (without_targets, "run walk has no gait to compare", "received: 0"),
     (one_segment, "run walk has no gait to compare", "received: 1"),
+    (one_segment_after_rest, "run walk has no gait to compare", "received: 1"),
     (other_robot, "run walk is of another robot", "received: sixbar"),
     (nowhere, "run walk starts nowhere", "cap 2"),
 ]

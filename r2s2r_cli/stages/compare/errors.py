@@ -12,7 +12,7 @@ from r2s2r_cli.stages.compare.walk import Walk
 
 @dataclass(frozen=True)
 class RunErrors:
-    """What one simulator gets wrong of one run, both laid on each other at the first frame.
+    """What one simulator gets wrong of one run, both laid on each other where they begin.
 
     com_end: distance of the centres of mass over the ground at the end [m]; heading_end: absolute difference of how
     far both turned [rad], None where one has no heading; path: root mean square distance of the centres of mass over

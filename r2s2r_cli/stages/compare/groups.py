@@ -34,7 +34,10 @@ def comparison_groups(
         mine = [one for one in compared if one.real.name == run.name]
         root = f"runs/{run.name}"
         robot = mine[0].model.numbers.robot.name if mine else ""
-        groups[root] = Group(attributes={"policy": run.policy, "robot": robot, "iteration": run.iteration})
+        known = {"opening": run.opening.duration, "opening_moved": run.opening.moved,
+                 "opening_travel": run.opening.travel} if run.opening.intervals else {}  # fmt: skip
+        known = {name: value for name, value in known.items() if np.isfinite(value)}
+        groups[root] = Group(attributes={"policy": run.policy, "robot": robot, "iteration": run.iteration, **known})
         groups[f"{root}/real"] = _real(run)
         groups[f"{root}/simulated"] = _simulated(run, mine)
     return groups

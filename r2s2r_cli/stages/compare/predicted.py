@@ -62,8 +62,9 @@ def predicted(
 def _closed_loop(
     driver: Driver, run: RealRun, settings: SimulateSettings
 ) -> tuple[Walk | None, Walk | None, list[str]]:
-    """The policy with the controller in the loop, started from the first state of the run, at rest."""
-    start = Start(f"the first state of run {run.name}", run.walk.p_WE[0])
+    """The policy with the controller in the loop, started where the opening rest of the run ended, at rest."""
+    words = "the state at the end of the opening rest" if run.opening.intervals else "the first state"
+    start = Start(f"{words} of run {run.name}", run.walk.p_WE[0])
     try:
         simulated = driver.closed_loop(run.name, run.targets, start, lambda _: None)
     except NumericalError as error:
@@ -96,7 +97,8 @@ def _keyframes(
     predictor = Predictor(model.numbers.mapping, step=settings.step_s)
     if predictor.structure == driver.structure:
         predictor.simulator = driver.simulator  # its machine code
-    chosen = Selection(run.name, tuple(range(1, len(run.walk.intervals) + 1)))
+    before = run.opening.intervals
+    chosen = Selection(run.name, tuple(range(before + 1, before + len(run.walk.intervals) + 1)))
     recipe = replace(Recipe(), step=settings.step_s)
     try:
         both = replayed([run.data], [chosen], predictor, model.numbers.values, recipe, free_run=False)

@@ -43,8 +43,9 @@ class Floors:
 
 
 SAME_START_M = 0.03
-"""Runs whose first frames, laid on each other, differ by more than this (RMS of the caps) started on another side of
-the robot or in another shape: they repeat nothing. Rest shapes differ by 5 to 20 mm within the tolerance of the PID."""
+"""Runs whose first compared frames, laid on each other, differ by more than this (RMS of the caps) started on another
+side of the robot or in another shape: they repeat nothing. Rest shapes differ by 5 to 20 mm within the tolerance of the
+PID."""
 
 
 def grouped(walks: Mapping[str, Walk], policies: Mapping[str, str]) -> list[list[str]]:

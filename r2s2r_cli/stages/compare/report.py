@@ -9,9 +9,10 @@ import numpy as np
 
 from r2s2r_cli.stages.compare.errors import RunErrors
 from r2s2r_cli.stages.compare.figures import floor_of, measures
+from r2s2r_cli.stages.compare.opening import Opening
 from r2s2r_cli.stages.compare.predicted import Model, PredictedRun
 from r2s2r_cli.stages.compare.ranking import LEAST, ranking
-from r2s2r_cli.stages.compare.repeats import Repeatability, ended, repeatability, turned
+from r2s2r_cli.stages.compare.repeats import SAME_START_M, Repeatability, ended, repeatability, turned
 from r2s2r_cli.stages.compare.runs import RealRun, policies_of
 from r2s2r_cli.stages.compare.walk import Walk
 from schemas.results_compare import (
@@ -19,6 +20,7 @@ from schemas.results_compare import (
     CompareFloor,
     CompareHistory,
     CompareModel,
+    CompareOpening,
     ComparePolicy,
     CompareRepeatability,
     CompareReport,
@@ -52,7 +54,7 @@ def report_of(
     repeats = [_repeatability(one) for one in repeatability(walks, policies)]
     by_run = {run: one for one in repeats for run in one.runs}
     rows = [_run(one, floor[one.real.iteration], by_run.get(one.real.name)) for one in compared]
-    warnings = [text for one in compared for text in one.predicted.warnings]
+    warnings = [*_unsettled(runs), *(text for one in compared for text in one.predicted.warnings)]
     if floor[numbers[0]].com_end_m is None:
         warnings.append(
             "no policy was run twice from the same shape on the same side: where the floor of an end is unknown, "
@@ -105,8 +107,25 @@ def _run(one: Compared, floor: CompareFloor, repeats: CompareRepeatability | Non
         ),
         end=None if seen.walk is None else end_of(seen.walk),
         real_end=end_of(seen.real or one.real.walk),
-        floor=floor, repeatability=repeats,
+        floor=floor, repeatability=repeats, opening=_opening(one.real.opening),
     )  # fmt: skip
+
+
+def _opening(one: Opening) -> CompareOpening | None:
+    if not one.intervals:
+        return None
+    moved, travel = (value if np.isfinite(value) else None for value in (one.moved, one.travel))
+    return CompareOpening(duration_s=one.duration, moved_m=moved, travel_m=travel)
+
+
+def _unsettled(runs: Sequence[RealRun]) -> Iterator[str]:
+    """Runs that were put down in another shape than they came to rest in: nothing of the policy, but good to know."""
+    for run in runs:
+        if run.opening.moved >= SAME_START_M:
+            yield (
+                f"run {run.name}: its caps moved by {1e3 * run.opening.moved:.0f} mm in the rest before the policy "
+                "(put down in another shape, or tipped); the comparison begins after it"
+            )
 
 
 def _model(

@@ -10,6 +10,7 @@ import numpy as np
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.calibrate.masses import mass_properties
+from r2s2r_cli.stages.compare.opening import Opening, opening_of, policy_part, without_opening
 from r2s2r_cli.stages.compare.walk import Walk
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.load import run_data
@@ -20,9 +21,10 @@ from schemas.robot import Robot
 
 @dataclass(frozen=True)
 class RealRun:
-    """One executed policy. walk: smoothed, up to the first interval that is not complete; intervals: how many there are
-    in all. targets: what the controller was given, rest before and after included.
-    data: what a replay of its commands needs; None where the motor commands were not logged.
+    """One executed policy, from the end of its opening rest on. walk: smoothed, up to the first interval that is not
+    complete; intervals: how many there are in all. targets: what the controller was given then, the rest at the end
+    included. opening: what came before, `opening.intervals` of the recorded intervals.
+    data: what a replay of the commands of the whole run needs; None where the motor commands were not logged.
     iteration: in which it was run."""
 
     name: str
@@ -32,6 +34,7 @@ class RealRun:
     walk: Walk
     targets: Targets
     data: RunData | None
+    opening: Opening
 
 
 def real_runs(
@@ -78,31 +81,37 @@ def _run(
         raise InputError(f"run {run} is of another robot", where=f"runs/{run}", expected=robot.name, received=told,
                          hint="compare in the project of the robot that was recorded")  # fmt: skip
     frames = groups["frames"]
-    intervals = _intervals(groups, run, frames)
-    if not (known := np.isfinite(frames["p_WE"][0]).all(axis=-1)).all():
+    intervals = _intervals(groups)
+    whole = Walk(frames["t"], frames["p_WE"], cap_shares(robot), intervals)
+    opening = opening_of(whole)
+    if (count := len(intervals) - opening.intervals) < 2:
+        after = " after the opening rest" if opening.intervals else ", from the first on"
+        raise InputError(
+            f"run {run} has no gait to compare", where=f"runs/{run}/intervals",
+            expected=f"at least two complete target intervals{after}", received=f"{count}",
+            hint="r2s2r record gait.toml --port ...",
+        )  # fmt: skip
+    walk = without_opening(whole, opening)
+    if not (known := np.isfinite(walk.p_WE[0]).all(axis=-1)).all():
+        frame = "last frame of the opening rest" if opening.intervals else "first frame"
         raise InputError(f"run {run} starts nowhere: a simulation has no start", where=f"runs/{run}/frames/p_WE",
-                         expected="every end cap at the first frame", received=f"none of cap {int(np.argmin(known))}",
+                         expected=f"every end cap at the {frame}", received=f"none of cap {int(np.argmin(known))}",
                          hint="r2s2r validate")  # fmt: skip
     return RealRun(
         name=prefix + run, policy=prefix + _policy(groups[""], run), iteration=iteration,
-        intervals=len(groups["intervals"]["first"]),
-        walk=Walk(frames["t"], frames["p_WE"], cap_shares(robot), intervals),
-        targets=_targets(estimate, recording, run, intervals, robot),
-        data=_data(estimate, recording, run, prefix + run),
+        intervals=len(groups["intervals"]["first"]) - opening.intervals, walk=walk,
+        targets=policy_part(_targets(estimate, recording, run, intervals, robot), opening),
+        data=_data(estimate, recording, run, prefix + run), opening=opening,
     )  # fmt: skip
 
 
-def _intervals(groups: dict[str, Group], run: str, frames: Group) -> Intervals:
-    """The complete intervals from the first on. Raises InputError where there are fewer than two: no gait."""
+def _intervals(groups: dict[str, Group]) -> Intervals:
+    """The complete intervals from the first on; none where the run has no targets."""
     held = groups.get("intervals")
-    whole = Intervals.from_group(held) if held is not None else None
-    count = 0 if whole is None else int(np.argmin(np.append(whole.complete, False)))
-    if whole is None or count < 2:
-        raise InputError(
-            f"run {run} has no gait to compare", where=f"runs/{run}/intervals",
-            expected="at least two complete target intervals, from the first on", received=f"{count}",
-            hint="r2s2r record gait.toml --port ...",
-        )  # fmt: skip
+    if held is None:
+        return Intervals(*(np.zeros(0),) * 4, target=np.zeros((0, 1)), complete=np.zeros(0, dtype=bool))
+    whole = Intervals.from_group(held)
+    count = int(np.argmin(np.append(whole.complete, False)))
     return Intervals(**{name: value[:count] for name, value in vars(whole).items()})
 
 

@@ -17,8 +17,9 @@ POINTS = 20
 
 @dataclass(frozen=True)
 class Walk:
-    """One run, real or simulated. t: (frame,) [s]. p_WE: end caps (frame, cap, 3) [m], ground at z = 0. share: of the
-    robot's mass that each cap stands for, (cap,), sums to 1. intervals: target intervals, counting these frames."""
+    """A run, real or simulated, from where the comparison begins. t: (frame,) [s]. p_WE: end caps (frame, cap, 3) [m];
+    ground at z = 0. share: of the robot's mass that each cap stands for, (cap,), sums to 1. intervals: target
+    intervals, counting these frames."""
 
     t: np.ndarray
     p_WE: np.ndarray

@@ -108,18 +108,19 @@ class Asked:
         return {name: group["target"].tolist() for name, group in own.items() if "target" in group.datasets}
 
     def _runs(self) -> tuple[Run, ...]:
-        """All runs, named as `identify` names them."""
+        """All runs, named as `identify` names them; those of the same targets are repeats of one gait, which bears the
+        name of the first."""
         from r2s2r_cli.stages.diagnose.evidence import Run
         from r2s2r_cli.stages.floor.runs import sensed_run
         from r2s2r_cli.stages.identify.load import run_data
 
         robot = self.project.robot()
         found: list[Run] = []
+        gaits: dict[bytes, str] = {}
         for one in named_runs(self.sources):
             caps = run_data(one.recording, one.estimate, one.run, name=one.name)
-            commands = one.recording.group(one.run, "commands")
-            policy = "" if commands is None else str(commands.attributes.get("policy", ""))
-            found.append(Run(caps, sensed_run(one.name, one.recording, one.run, robot), gait=policy or one.run))
+            gait = gaits.setdefault(caps.intervals.target.round(6).tobytes(), one.name)
+            found.append(Run(caps, sensed_run(one.name, one.recording, one.run, robot), gait=gait))
         return tuple(found)
 
     def _split(self, runs: Sequence[Run], found: ArtifactData) -> tuple[tuple[Selection, ...], tuple[Selection, ...]]:

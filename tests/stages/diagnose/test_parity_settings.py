@@ -11,6 +11,7 @@ import pytest
 from r2s2r_cli.stages.diagnose.evidence import Run
 from r2s2r_cli.stages.diagnose.parity import parity
 from r2s2r_cli.stages.diagnose.parity.mismatch import mismatches
+from r2s2r_cli.stages.diagnose.which.stretches import noise_of
 from tests.support.engine import threebar
 from tests.support.parity_log import SPEED, evidence_of, swaying, with_caps, wound
 
@@ -73,3 +74,27 @@ def test_nothing_wrong_names_nothing() -> None:
     """No setting is doubted where all are right, for six logs."""
     for seed in range(6):
         assert mismatches([swaying("g", 20 + seed)], threebar(), SPEED)[0] == []
+
+
+def test_boards_that_take_turns_are_no_mismatch() -> None:
+    """Rows of the log with the sensors of one board each, as wireless robots send them: rates, signs and noise come
+    from the readings that are there, and wrong ones are seen as well."""
+
+    def turns(run: Run) -> Run:
+        assert run.lengths is not None
+        board = np.arange(9) % 3
+        row = np.arange(len(run.lengths.t))
+        length = np.where(row[:, None] % 3 == board, run.lengths.length, np.nan)
+        return replace(run, lengths=replace(run.lengths, length=length))
+
+    def reeled(u: np.ndarray, h: float) -> np.ndarray:
+        return np.asarray(np.cumsum(SPEED * h * u, axis=0))
+
+    runs = [turns(wound(f"g{k}", k, reeled)) for k in range(2)]
+    assert mismatches(runs, threebar(), SPEED) == ([], [])
+    assert [one.kind for one in mismatches(runs, threebar(), 2 * SPEED)[0]] == ["rate"]
+    assert [one.kind for one in mismatches([_control(lambda u: -u)(run) for run in runs], threebar(), SPEED)[0]] == [
+        "sign"
+    ]
+    assert runs[0].lengths is not None
+    assert noise_of(runs[0].lengths.length) == pytest.approx(np.r_[np.full(6, 5e-4), np.zeros(3)], rel=0.25)

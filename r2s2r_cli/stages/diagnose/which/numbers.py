@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from r2s2r_cli.stages.effects import all_effects
 from r2s2r_cli.stages.identified import Identified
 from r2s2r_cli.stages.identify.free.base import Coordinate, Free
 from r2s2r_cli.stages.identify.free.mapping import Mapping, Observation
@@ -83,13 +84,12 @@ class Model:
     """
 
     def __init__(self, nominal: Identified, effects: Sequence[str] | None = None) -> None:
-        """effects: those plugged in, by default the whole catalogue. Raises InputError as `Mapping`."""
-        from r2s2r_cli.effects import CATALOGUE
-
+        """effects: those plugged in, by default the whole catalogue and what installed packages bring. Raises
+        InputError as `Mapping`, and for a package whose effect is none."""
         own = nominal.mapping
-        names = tuple(effect.name for effect in CATALOGUE if effects is None or effect.name in effects)
         self.robot = nominal.robot
-        self.effects = tuple(effect for effect in CATALOGUE if effect.name in names)
+        self.effects = tuple(effect for effect in all_effects() if effects is None or effect.name in effects)
+        names = tuple(effect.name for effect in self.effects)
         self._nominal, self._values = own, nominal.values
         self._mapping = Mapping(own.robot, own.frees, names, fixed=own.fixed, structure=own.structure)
         self.structure = self._mapping.structure

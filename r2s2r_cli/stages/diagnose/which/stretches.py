@@ -130,8 +130,12 @@ def _lengths(run: Run, t: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, n
 
 
 def noise_of(length: np.ndarray) -> np.ndarray:
-    """Sd of a sensor's readings (sensor,) [m], from second differences: what moves smoothly drops out of them."""
+    """Sd of a sensor's readings (sensor,) [m], from second differences of its own rows: what moves smoothly drops out
+    of them. Boards of a wireless robot take turns, so that a row of the log need not have all sensors."""
+    return np.array([_noise_of(one[np.isfinite(one)]) for one in length.T])
+
+
+def _noise_of(length: np.ndarray) -> float:
     bend = length[2:] - 2 * length[1:-1] + length[:-2]
-    with np.errstate(all="ignore"):
-        size = np.nanmedian(np.abs(bend), axis=0) / 0.6745 / np.sqrt(6.0)
-    return np.where(np.isfinite(size), size, LENGTH_NOISE_M)
+    size = float(np.median(np.abs(bend))) / 0.6745 / np.sqrt(6.0) if len(bend) else np.nan
+    return size if np.isfinite(size) else LENGTH_NOISE_M

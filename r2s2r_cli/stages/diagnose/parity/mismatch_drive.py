@@ -1,0 +1,116 @@
+"""Commands that move another cable, the wrong way, or at a wrong speed: what the winches answer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from r2s2r_cli.stages.diagnose.parity.finding import Mismatch
+from r2s2r_cli.stages.diagnose.parity.mismatch_words import LEAST_ROWS, columns, listed
+from r2s2r_cli.stages.diagnose.parity.series import GAP_S, Series
+from r2s2r_cli.stages.identify.commands import CommandLog
+from schemas.robot import Robot
+
+SURE = 0.5
+"""Correlation of a command with the rate of its cable that leaves no doubt of its sign."""
+CLEARER = 0.35
+"""By how much commands must follow other cables better than their own, in correlation."""
+FAST, SLOW = 1.6, 0.6
+"""Winding rates over the nominal, all winches alike, that are a wrong number and no effect."""
+
+
+def order_of_motors(runs: Sequence[Series], robot: Robot, speed: float, missing: list[str]) -> list[Mismatch]:
+    """Exchanged motors: the command of one moves the cable of another."""
+    del speed
+    response = _responses(runs, robot)
+    if response is None:
+        missing.append("order and sign of the motors: too few commands")
+        return []
+    from scipy.optimize import linear_sum_assignment
+
+    size = np.abs(response)
+    row, column = linear_sum_assignment(-size)
+    moved = [k for k in range(len(row)) if column[k] != k]
+    if not moved or np.mean([size[k, column[k]] - size[k, k] for k in moved]) < CLEARER:
+        return []
+    order = {robot.actuated[k]: robot.actuated[int(column[k])] for k in moved}
+    return [columns("motors", order, "the rates of the cables")]
+
+
+def signs(runs: Sequence[Series], robot: Robot, speed: float, missing: list[str]) -> list[Mismatch]:
+    """Motors that lengthen their cable where the log says that they shorten it."""
+    del speed, missing
+    response = _responses(runs, robot)
+    if response is None:
+        return []
+    own = np.diag(response)
+    every = bool(np.median(own) < -SURE)
+    wrong = [robot.actuated[k] for k in range(len(own)) if every or own[k] < -SURE]
+    if not wrong:
+        return []
+    who = "all motors" if every else f"motor{'s' * (len(wrong) > 1)} {listed(wrong)}"
+    return [Mismatch(
+        "sign", f"{who} wind{'s' if len(wrong) == 1 else ''} the wrong way: +1 lengthens the cable", "+1 shortens it",
+        f"correlation {own.min():.2f}",
+        "r2s2r import run.csv   # with these control columns negated, or sign = -1 of the motors in robot.toml",
+    )]  # fmt: skip
+
+
+def rate(runs: Sequence[Series], robot: Robot, speed: float, missing: list[str]) -> list[Mismatch]:
+    """All winches much too fast or slow both ways: a wrong speed, radius or clock."""
+    rates: list[float] = []
+    for one in runs:
+        log = CommandLog(one.run.caps)
+        for k, cable in enumerate(robot.actuated):
+            t, length = _readings(one, cable)
+            u, past = log.at(t)[:, k], np.diff(t)
+            for way in (1.0, -1.0):
+                inside = way * u > 0.9
+                steady = inside[1:] & inside[:-1] & (past > 0) & (past < GAP_S)
+                if steady.sum() >= LEAST_ROWS:
+                    rates.append(float(-way * np.diff(length)[steady].sum() / past[steady].sum()))
+    if len(rates) < 4:
+        missing.append("rate of the winches: too few long commands at full speed")
+        return []
+    ratio = float(np.median(rates)) / speed
+    if SLOW < ratio < FAST:
+        return []
+    return [Mismatch(
+        "rate", f"all winches run at {ratio:.2g} times their nominal speed", f"{1e3 * speed:.0f} mm/s",
+        f"{1e3 * ratio * speed:.0f} mm/s",
+        "r2s2r identify   # or correct speed and winch_radius_m in robot.toml, or the stamps of the log",
+    )]  # fmt: skip
+
+
+def _readings(one: Series, cable: int) -> tuple[np.ndarray, np.ndarray]:
+    """Times of the readings of a cable and what they were [m], (row,): of its sensor, else of the caps. Each sensor has
+    times of its own: boards of wireless robots take turns, so a row of the log has the cables of one board."""
+    t, length = one.heard if one.has_sensors else (one.t, one.seen)
+    good = np.isfinite(length[:, cable])
+    return t[good], length[good, cable]
+
+
+def _responses(runs: Sequence[Series], robot: Robot) -> np.ndarray | None:
+    """Correlation about zero of every command with the shortening of every winched cable, (cable, command)."""
+    n = len(robot.actuated)
+    products, u2, v2 = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
+    rows = np.zeros(n, dtype=int)
+    for one in runs:
+        log = CommandLog(one.run.caps)
+        for i, cable in enumerate(robot.actuated):
+            t, length = _readings(one, cable)
+            span = max(1, round(0.1 / max(float(np.median(np.diff(t))), 1e-3))) if len(t) > 2 else 1
+            if len(t) <= span + LEAST_ROWS:
+                continue
+            past = t[span:] - t[:-span]
+            whole = past > 0
+            v = -(length[span:] - length[:-span])[whole] / past[whole]
+            u = log.at(((t[span:] + t[:-span]) / 2)[whole])
+            products[i] += v @ u
+            u2[i] += (u**2).sum(axis=0)
+            v2[i] += v @ v
+            rows[i] += len(v)
+    if rows.min() < LEAST_ROWS or not (u2 > 0).all():
+        return None
+    return np.asarray(products / np.sqrt(np.maximum(u2 * v2[:, None], 1e-30)))

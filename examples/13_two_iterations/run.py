@@ -135,12 +135,26 @@ def main(out: Path, seeds: Sequence[int], profile: Profile, *, paper: bool, say:
             for number in (1, 2):
                 iterate(project, number, seed, profile, robot)
         measured(project, paper=paper, draw=profile.draw)
-        found = rows_so_far(out)
-        say(f"\nafter seed {seed}: median (range) over {len({row.seed for row in found})} seeds")
-        for line in summary(found):
-            say(line)
+        told(out, seed, say)
         if profile.draw:
             say(f"look at: {project}/iterations/002/60-compare.html")
+
+
+def again(out: Path, seeds: Sequence[int], *, say: Callable[[str], None] = print) -> None:
+    """Only the comparisons of finished seeds, with what `compare` computes now; the paper's preset where it was run."""
+    for seed in seeds:
+        project = out / f"seed-{seed}"
+        preset = out / f"seed-{seed}-paper" / "iterations" / "002" / "30-identify.h5"
+        measured(project, paper=preset.exists(), draw=False)
+        told(out, seed, say)
+
+
+def told(out: Path, seed: int, say: Callable[[str], None]) -> None:
+    """The table over all seeds that are there."""
+    found = rows_so_far(out)
+    say(f"\nafter seed {seed}: median (range) over {len({row.seed for row in found})} seeds")
+    for line in summary(found):
+        say(line)
 
 
 if __name__ == "__main__":
@@ -150,5 +164,9 @@ if __name__ == "__main__":
     parser.add_argument(
         "--demo", action="store_true", help="the short profile of `make demo`, without the paper's preset"
     )
+    parser.add_argument("--again", action="store_true", help="only the comparisons of seeds that are finished")
     given = parser.parse_args()
-    main(given.out.resolve(), given.seeds, DEMO if given.demo else Profile(), paper=not given.demo)
+    if given.again:
+        again(given.out.resolve(), given.seeds)
+    else:
+        main(given.out.resolve(), given.seeds, DEMO if given.demo else Profile(), paper=not given.demo)

@@ -125,7 +125,7 @@ def execute(
 
 def _chosen(project: Project, place: Iteration, names: Sequence[str]) -> tuple[list[PolicyFile], list[InputRef]]:
     """The policies, each for this robot, and the plan where they are of it. Raises InputError, UsageError."""
-    from r2s2r_cli.commands.simulate_inputs import Asked, read_policies
+    from r2s2r_cli.commands.simulate_inputs import Asked, read_policies, split_name
     from r2s2r_cli.commands.stage import require_input
     from r2s2r_cli.stages.simulate.policies import sequence
 
@@ -134,11 +134,23 @@ def _chosen(project: Project, place: Iteration, names: Sequence[str]) -> tuple[l
     if not names or len(files) < len(names):
         require_input(plan, f"r2s2r plan --iteration {place.number}")
         _require_fresh(project, place, plan)
+    for path in dict.fromkeys(split_name(text)[0] for text in files):
+        _require_fresh_file(project, path)
     texts = [text if text in files else f"{plan}:{text}" for text in names or _long(plan)]
     found = [policy for text in texts for policy in read_policies(text)]
     for policy in found:
         sequence(policy, project.robot())
     return found, Asked(project, place, tuple(texts), None, 0, (), None).refs()
+
+
+def _require_fresh_file(project: Project, path: Path) -> None:
+    """The same for a policy that was named with its file, where that is a plan of this project; other files are taken
+    as they are. Raises as `_require_fresh`."""
+    from r2s2r_cli.store.header import whole_header
+
+    place = next((one for one in project.iterations() if one.artifact("plan").resolve() == path.resolve()), None)
+    if place is not None and path.exists() and whole_header(path).kind == "plan":
+        _require_fresh(project, place, path)
 
 
 def _long(plan: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""An identification as another command's input: read, and refused where robot.toml has changed since."""
+"""An identification as another command's input: read, and refused where robot.toml or `identify` changed since."""
 
 from __future__ import annotations
 
@@ -14,17 +14,26 @@ if TYPE_CHECKING:
 
 def read_numbers(project: Project, path: Path) -> ArtifactData:
     """The identification at `path`. Raises ArtifactError; InputError where robot.toml was changed since, in a part that
-    the numbers depend on: they would then be mixed with others."""
+    the numbers depend on: they would then be mixed with others; or where another version of `identify` made them."""
     from r2s2r_cli.commands.stage import robot_part
     from r2s2r_cli.store.read import read_artifact
+    from schemas.versions import STAGE_VERSIONS
 
     header, data = read_artifact(path, "identification")
     made = header.provenance
+    if made.stage != "identify":
+        return data
+    number = path.resolve().parent.name
+    again = f"r2s2r identify --iteration {int(number)}" if number.isdigit() else "r2s2r identify"
+    version = STAGE_VERSIONS["identify"]
+    if made.stage_version != version:
+        raise InputError(
+            "the parameters are of another version of identify", where=project.relative(path),
+            expected=f"version {version}", received=f"version {made.stage_version}", hint=again,
+        )  # fmt: skip
     now = robot_part("identify", project.robot())
-    changed = [name for name in now if made.robot.get(name) != now[name]] if made.stage == "identify" else []
+    changed = [name for name in now if made.robot.get(name) != now[name]]
     if changed:
-        number = path.resolve().parent.name
-        again = f"r2s2r identify --iteration {int(number)}" if number.isdigit() else "r2s2r identify"
         raise InputError(
             "the parameters were identified with another version of robot.toml", where=project.relative(path),
             expected="robot.toml as it is now", received=f"another {', '.join(changed)}", hint=again,

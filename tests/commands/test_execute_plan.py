@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.commands.execute import _long
 from r2s2r_cli.stages.plan.view import far
 from r2s2r_cli.store.write import write_artifact
+from schemas.header import InputRef
+from tests.commands.conftest import invoke
 from tests.support import builders
+
+GAIT = """\
+schema_version = 1
+robot = "{robot}"
+name = "gait"
+[[steps]]
+target = {target}
+"""
 
 
 def test_the_long_policies_are_the_default(tmp_path: Path) -> None:
@@ -29,3 +41,37 @@ def test_how_far_a_run_goes_is_its_farthest_place() -> None:
     p = np.zeros((3, 2, 3))
     p[1, :, 0] = [0.5, 0.7]
     assert far(ArtifactData("simulation", {"runs/a/frames": Group({"p_WE": p}), "runs/b": Group()})) == {"a": 0.6}
+
+
+@pytest.mark.parametrize("policy", ["straight", "iterations/001/40-plan.h5:straight"])
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"stage_version": 99}, "made by version 99"),
+        ({"inputs": (InputRef(path="iterations/001/30-identify.h5", kind="identification", sha256="1" * 64),)},
+         "iterations/001/30-identify.h5"),
+        ({"robot": {"name": "threebar", "contact": {"friction": 0.1}}}, "robot.toml: contact"),
+    ],
+)  # fmt: skip
+def test_a_plan_of_another_simulator_is_refused(project: Path, policy: str, changed: dict[str, Any], said: str) -> None:
+    """Of another version, of other identified numbers, of another robot.toml; named by itself or with its file: exit
+    code 4 with the reason, and nothing moves."""
+    place = project / "iterations" / "001"
+    place.mkdir(parents=True)
+    made = builders.provenance(**{"stage": "plan", "inputs": (), **changed})
+    write_artifact(place / "40-plan.h5", builders.plan(), made)
+    refused = invoke("execute", policy, "--dry-run")
+    assert refused.exit_code == 4
+    assert "the plan is stale" in refused.stderr and said in refused.stderr
+    assert "hint: r2s2r plan --iteration 1" in refused.stderr
+    assert not list(place.glob("50-*"))
+
+
+@pytest.mark.parametrize(("robot", "target"), [("sixbar", [0.5] * 6), ("threebar", [0.5] * 24)])
+def test_a_policy_of_another_robot_is_refused(project: Path, robot: str, target: list[float]) -> None:
+    """By its name, or by how many motors it moves: exit code 4, and nothing moves."""
+    (project / "iterations" / "001").mkdir(parents=True)
+    (project / "gait.toml").write_text(GAIT.format(robot=robot, target=target))
+    refused = invoke("execute", "gait.toml", "--iteration", "1", "--dry-run")
+    assert refused.exit_code == 4 and "policy gait is for another robot" in refused.stderr
+    assert not list(project.rglob("50-*"))

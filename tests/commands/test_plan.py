@@ -151,6 +151,16 @@ def test_numbers_of_another_robot_are_refused(project: Path) -> None:
     assert refused.exit_code == 4 and "another name" in refused.stderr
 
 
+def test_numbers_of_another_version_of_identify_are_refused(project: Path) -> None:
+    """What it computed then may mean something else: exit code 4, with the command that makes them anew."""
+    target = project / IDENTIFY
+    target.parent.mkdir(parents=True)
+    write_artifact(target, builders.identification(), builders.provenance(stage="identify", stage_version=99))
+    refused = invoke("plan", "--dry-run")
+    assert refused.exit_code == 4 and "another version of identify" in refused.stderr
+    assert "received: version 99" in refused.stderr and "hint: r2s2r identify --iteration 1" in refused.stderr
+
+
 @pytest.mark.slow
 def test_no_way_to_a_goal_is_said(planned: Path) -> None:
     """A place that the gaits cannot reach in the time that is searched: exit code 6, with the nearest place."""

@@ -73,7 +73,7 @@ def chain(
 
 
 STAGE_VERSIONS: dict[str, int] = {
-    "import": 1, "calibrate": 1, "record": 1, "estimate": 1, "identify": 1, "simulate": 1, "floor": 1,
+    "import": 1, "calibrate": 1, "record": 1, "estimate": 1, "identify": 1, "simulate": 1, "floor": 2,
     "plan": 1, "execute": 1,
     "compare": 2, "diagnose": 1,
 }  # fmt: skip

@@ -53,7 +53,7 @@ def floor(
     """Measure how far the robot repeats itself, in end caps and in cable lengths; no simulator can be better than that.
 
     From 3 or more repeats of a policy, from commissioning runs, or from steps of the same phase within a run. Judged on
-    the estimates and recordings that the iterations have.
+    the estimates and recordings that the iterations have, of recorded and of executed runs.
 
     Example: r2s2r floor --iteration 1
     """
@@ -79,19 +79,21 @@ def floor(
         _show(report, console)
 
 
-def _sources(place: Iteration) -> tuple[Path, Path]:
-    """Recording and estimate of an iteration, there or not."""
-    return place.artifact("recording"), place.artifact("estimate")
+def _sources(place: Iteration) -> Iterator[tuple[Path, Path, bool]]:
+    """Recording and estimate of an iteration, there or not; then those of its executed plan (True)."""
+    for executed in (False, True):
+        yield place.artifact("recording", executed=executed), place.artifact("estimate", executed=executed), executed
 
 
 def _refs(project: Project, places: Sequence[Iteration], numerics: int) -> list[InputRef]:
     from r2s2r_cli.store.header import whole_header
     from r2s2r_cli.store.staleness import artifact_ref
 
-    found = [path for place in places for path in _sources(place) if path.exists()]
+    pairs = [pair[:2] for place in places for pair in _sources(place)]
+    found = [path for pair in pairs for path in pair if path.exists()]
     if not found and not numerics:
         raise UsageError("there is nothing to measure a floor with", where="r2s2r floor", received="none",
-                         expected="an iteration with 10-record.h5 or 20-estimate.h5",
+                         expected="an iteration with 10-record.h5 or 20-estimate.h5, or executed runs",
                          hint="r2s2r record gait.toml --repeats 3 --port ...")  # fmt: skip
     return [artifact_ref(project, path, whole_header(path)) for path in found]
 
@@ -113,7 +115,8 @@ def _compute(
 
 
 def _runs(project: Project, places: Sequence[Iteration]) -> tuple[list[SeenRun], list[SensedRun], dict[str, str]]:
-    """Runs with caps, runs with sensors, and the policy of each by name."""
+    """Runs with caps, runs with sensors, and the policy of each by name. Recorded runs are called NUMBER:RUN, executed
+    ones too unless that is taken; the same name of a policy means another one in the plan of another iteration."""
     from r2s2r_cli.stages.floor import seen_run, sensed_run
     from r2s2r_cli.store.read import read_artifact
 
@@ -121,18 +124,22 @@ def _runs(project: Project, places: Sequence[Iteration]) -> tuple[list[SeenRun],
     seen: list[SeenRun] = []
     sensed: list[SensedRun] = []
     policies: dict[str, str] = {}
-    for place in places:
-        source, states = _sources(place)
+    for place, source, states, executed in ((one, *pair) for one in places for pair in _sources(one)):
         recording = read_artifact(source, "recording")[1] if source.exists() else None
         estimate = read_artifact(states, "estimate")[1] if states.exists() else None
+        taken = {*policies, *(one.name for one in seen)}
+
+        def called(run: str, number: int = place.number, taken: set[str] = taken) -> str:
+            return f"{number}:executed-{run}" if f"{number}:{run}" in taken else f"{number}:{run}"
+
         for run in estimate.runs() if estimate is not None else ():
-            one = seen_run(f"{place.number}:{run}", estimate, recording, run) if estimate is not None else None
+            one = seen_run(called(run), estimate, recording, run) if estimate is not None else None
             seen += [one] if one is not None else []
         for run in recording.runs() if recording is not None else ():
-            name = f"{place.number}:{run}"
             repeat = recording.groups[f"runs/{run}"].attributes.get("repeat") if recording is not None else None
-            policies[name] = run.removesuffix(f"-{repeat}") if repeat is not None else run
-            other = sensed_run(name, recording, run, robot) if recording is not None else None
+            policy = run.removesuffix(f"-{repeat}") if repeat is not None else run
+            policies[called(run)] = f"{place.number}:{policy}" if executed else policy
+            other = sensed_run(called(run), recording, run, robot) if recording is not None else None
             sensed += [other] if other is not None else []
     return seen, sensed, policies
 

@@ -42,3 +42,18 @@ def test_engine_and_rig_agree_to_what_the_engine_issue_measured(project: Path) -
     found = numerics(Project.find(project).robot(), 16)
     assert 0.001 < float(sorted(found.error)[8]) < 0.003 and found.error.max() < 0.012
     assert sorted(found.way)[8] > 0.02
+
+
+def test_executed_runs_are_looked_at_too(estimated: Path) -> None:
+    """Most repeats are there. A name that a recorded run has is told apart; without executed runs they are the same."""
+    place = estimated / "iterations" / "001"
+    alone = document("floor", "--no-draw")
+    for source, target in (("10-record.h5", "50-execute.h5"), ("20-estimate.h5", "51-estimate.h5")):
+        (place / target).write_bytes((place / source).read_bytes())
+    both = document("floor", "--no-draw")
+    assert alone["report"]["runs"] == ["1:sample"]
+    assert both["report"]["runs"] == ["1:sample", "1:executed-sample"]
+    assert {Path(name).name for name in both["inputs"]} == {
+        "10-record.h5", "20-estimate.h5", "50-execute.h5", "51-estimate.h5",
+    }  # fmt: skip
+    assert both["report"]["lengths"]["contrasts"] > alone["report"]["lengths"]["contrasts"]

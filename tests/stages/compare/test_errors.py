@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.stages.compare.errors import run_errors
+from r2s2r_cli.stages.compare.figures import floor_of
 from r2s2r_cli.stages.compare.ranking import LEAST, ranking
 from r2s2r_cli.stages.compare.repeats import ended, floors, repeatability, turned
 from r2s2r_cli.stages.compare.walk import Walk, same_targets
@@ -123,6 +124,15 @@ def test_floors_along_the_run_are_those_of_the_errors() -> None:
     for name in ("path", "cap"):
         assert getattr(known, name) == pytest.approx(getattr(errors, name) / np.sqrt(2))
     assert known.gait == pytest.approx(np.sqrt(np.mean(errors.gait**2) / 2))
+
+
+def test_key_frames_have_a_floor_where_anything_repeats() -> None:
+    """That of floor.h5; without it that of the repeats, whose key frames are laid on each other at their starts too."""
+    walks = {"run-1": walk(0.1), "run-2": walk(0.12)}
+    policies = dict.fromkeys(walks, "run")
+    assert floor_of(walks, policies, 0.004).keyframe_cap_m == 0.004
+    assert floor_of(walks, policies, None).keyframe_cap_m == floors(walks, policies).gait
+    assert floor_of({"run-1": walks["run-1"]}, policies, None).keyframe_cap_m is None
 
 
 def test_a_single_run_has_no_floor() -> None:

@@ -137,6 +137,8 @@ class DiagnoseReport(Frozen):
     missing: tuple[str, ...]
     refit: dict[str, tuple[float, float]]
     """Nuisances of the refit nominal model: value and sd."""
+    refit_units: dict[str, str] = Field(default_factory=dict)
+    """`log`: the logarithm of a factor on the identified value."""
     rollouts: int
     within_run: bool
     wall_s: float = 0.0

@@ -31,7 +31,7 @@ from r2s2r_cli.store.project import Project
 if TYPE_CHECKING:
     from r2s2r_cli.artifact import ArtifactData
     from r2s2r_cli.commands.diagnose_inputs import Asked
-    from r2s2r_cli.store.checkpoint import CheckpointFile
+    from r2s2r_cli.store.checkpoint_arrays import ArrayCheckpoint
     from schemas.config import DiagnoseSettings
     from schemas.results_diagnose import DiagnoseReport, DiagnoseResult
 
@@ -80,7 +80,8 @@ def diagnose(
     """
     from r2s2r_cli.commands.diagnose_inputs import Asked
     from r2s2r_cli.commands.stage import StageRun, print_config, show_outcome, wanted
-    from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_key, checkpoint_of
+    from r2s2r_cli.store.checkpoint import checkpoint_key, checkpoint_of
+    from r2s2r_cli.store.checkpoint_arrays import ArrayCheckpoint
     from schemas.results_diagnose import DiagnoseReport
 
     console = Console(json=json, quiet=quiet)
@@ -94,8 +95,7 @@ def diagnose(
         here, place, model=model, train=tuple(train or ()), test=tuple(test or ()), healthy=tuple(healthy or ()),
         effects=tuple(effect or ()), also=tuple(also or ()), seed=seed,
     )  # fmt: skip
-    if asked.effects:
-        _require_effects(asked.effects)
+    _require_effects(asked.effects)
     settings = here.config(place, overrides).diagnose
     unfinished = checkpoint_of(here.artifact("diagnosis", place))
     if resume and not unfinished.exists():
@@ -109,9 +109,9 @@ def diagnose(
         asked.evidence()
     digests = [ref.sha256 for ref in run.inputs]
     key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
-    checkpoint = CheckpointFile(unfinished, key, resume)
+    checkpoint = ArrayCheckpoint(unfinished, key, resume)
     again = [word for word in sys.argv[1:] if word != "--resume"]
-    with resumable(checkpoint, here.relative(unfinished), again):
+    with resumable(checkpoint, here.relative(unfinished), again, done="simulated"):
         result, report = run.run(
             lambda: _compute(asked, settings, checkpoint, console), _draw if draw else None,
             lambda said: checkpoint.clear(),
@@ -122,13 +122,15 @@ def diagnose(
 
 
 def _require_effects(names: tuple[str, ...]) -> None:
-    from r2s2r_cli.stages.identify.free.catalogue import require_effects
+    if names:
+        from r2s2r_cli.stages.effects import effect_of
 
-    require_effects(names)
+        for name in names:
+            effect_of(name, where="--effect", command="r2s2r diagnose --effect")
 
 
 def _compute(
-    asked: Asked, settings: DiagnoseSettings, checkpoint: CheckpointFile, console: Console
+    asked: Asked, settings: DiagnoseSettings, checkpoint: ArrayCheckpoint, console: Console
 ) -> tuple[ArtifactData, DiagnoseReport]:
     from r2s2r_cli.commands.interrupts import loaded
 

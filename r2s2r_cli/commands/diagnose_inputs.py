@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.commands.identify_inputs import Asked as IdentifyAsked, Source, named_runs
 from r2s2r_cli.commands.stage import require_input
-from r2s2r_cli.errors import UsageError
+from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
 
 if TYPE_CHECKING:
     from r2s2r_cli.artifact import ArtifactData, Group
     from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run
+    from r2s2r_cli.stages.identified import Identified
     from r2s2r_cli.stages.identify.data import Selection
 
 TRAIN, TEST = 1, 2
@@ -93,7 +94,9 @@ class Asked:
                              expected=", ".join(known), hint=f"--healthy {known[0]}")  # fmt: skip
         diagnosed = tuple(run for run in runs if run.name not in self.healthy)
         fit, judge = self._split(diagnosed, found)
-        made = Evidence(robot, model, diagnosed, fit, judge, self._floor(), healthy)
+        made = Evidence(
+            robot, model, diagnosed, fit, judge, self._floor(), healthy, _unsaid(model, self.identification)
+        )
         require_enough(made)
         return made
 
@@ -118,6 +121,7 @@ class Asked:
         found: list[Run] = []
         gaits: dict[bytes, str] = {}
         for one in named_runs(self.sources):
+            _require_robot(one.recording, one.run, robot.name)
             caps = run_data(one.recording, one.estimate, one.run, name=one.name)
             gait = gaits.setdefault(caps.intervals.target.round(6).tobytes(), one.name)
             found.append(Run(caps, sensed_run(one.name, one.recording, one.run, robot), gait=gait))
@@ -156,6 +160,28 @@ class Asked:
             return None
         told = group.attributes
         return FloorGiven(float(told["floor"]), float(told["sensor"]), f"floor.h5, {told['basis']}")
+
+
+def _require_robot(recording: ArtifactData | None, run: str, name: str) -> None:
+    """Raises InputError where a run says that it is of another robot."""
+    own = None if recording is None else recording.groups.get(f"runs/{run}")
+    told = name if own is None else str(own.attributes.get("robot", name))
+    if told != name:
+        raise InputError(
+            f"run {run} is of another robot", where=f"runs/{run}, robot", expected=f"{name}, as robot.toml says",
+            received=told, hint="r2s2r diagnose --iteration N   # with runs of this robot alone",
+        )  # fmt: skip
+
+
+def _unsaid(model: Identified, path: Path) -> tuple[str, ...]:
+    """What the identification does not say, in words."""
+    import numpy as np
+
+    unsure = np.isnan(np.diag(model.covariance)) if len(model.values) else np.zeros(0, dtype=bool)
+    names = [name for name, yes in zip(model.mapping.names, unsure, strict=True) if yes]
+    if not names:
+        return ()
+    return (f"uncertainty of {', '.join(names)}: {path.name} has none, so the refit takes its usual priors",)
 
 
 def _selected(table: Group, role: int, names: set[str]) -> list[Selection]:

@@ -8,14 +8,18 @@ import shlex
 import signal
 import threading
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from r2s2r_cli.errors import Interrupted
 
-if TYPE_CHECKING:
-    from r2s2r_cli.store.checkpoint import CheckpointFile
-
 Item = TypeVar("Item")
+
+
+class Kept(Protocol):
+    """A checkpoint."""
+
+    def kept(self) -> bool:
+        """Whether work of this very request lies there."""
 
 
 def whole_items(items: Iterable[Item]) -> Iterator[Item]:
@@ -46,9 +50,7 @@ def loaded(stage: str) -> Any:
 
 
 @contextlib.contextmanager
-def resumable(
-    checkpoint: CheckpointFile, where: str, command: Sequence[str], *, done: str = "fitted"
-) -> Iterator[None]:
+def resumable(checkpoint: Kept, where: str, command: Sequence[str], *, done: str = "fitted") -> Iterator[None]:
     """Work that leaves a checkpoint (`where`, for people) when it is interrupted: raises Interrupted with `command` and
     --resume as its hint; KeyboardInterrupt as it came where nothing was kept yet."""
     try:

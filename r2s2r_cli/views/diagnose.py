@@ -9,6 +9,7 @@ import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.diagnose_floor import floor_picture
+from r2s2r_cli.views.diagnose_page import element_words
 from r2s2r_cli.views.figure import new_figure, png_bytes, rod_color
 
 if TYPE_CHECKING:
@@ -57,8 +58,16 @@ def _gap(data: ArtifactData, report: DiagnoseReport) -> bytes:
         own.tick_params(labelsize=8)
         if k == 0:
             own.set_ylabel("cap error at the end\nof an interval [mm]")
+    from matplotlib.patches import Patch
+
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncol=3, fontsize=8, frameon=False)
+    if rows["gap"].any():
+        handles.append(Patch(color=GUILTY, alpha=0.14))
+        labels.append("stands out over the whole interval")
+    if not np.isfinite(np.concatenate([rows["refit"], rows["effect"]])).all() and np.isfinite(rows["effect"]).any():
+        handles.append(Patch(color="none"))
+        labels.append("no point: a cap ended more than 25 cm off")
+    figure.legend(handles, labels, loc="outside lower center", ncol=5, fontsize=8, frameon=False)
     return png_bytes(figure)
 
 
@@ -68,6 +77,8 @@ def _best(report: DiagnoseReport) -> str:
 
 def _robot(data: ArtifactData, report: DiagnoseReport) -> bytes:
     """From above and from the side: rods, cables, and the guilty part thick."""
+    from matplotlib.lines import Line2D
+
     group = data.groups["robot"]
     p = group["p_WE"] - np.array([*group["p_WE"][:, :2].mean(axis=0), 0.0])
     element = report.where.element
@@ -79,20 +90,27 @@ def _robot(data: ArtifactData, report: DiagnoseReport) -> bytes:
         axes.set(title=title, xlabel="x [m]", ylabel=f"{'xyz'[j]} [m]")
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.12)
-    words = "nothing is guilty: there is no element" if element is None else f"guilty: {_words(element)}"
-    if report.verdict not in ("effect", "pair") and element is not None:
-        words = f"most suspect: {_words(element)} (verdict: {report.verdict})"
-    figure.suptitle(words, color=GUILTY if element is not None else "#1c2430", fontsize=11)
+    figure.suptitle(_guilt(report), color=GUILTY if element is not None else "#1c2430", fontsize=11)
+    handles = [Line2D([], [], color=PLAIN, ls="-"), Line2D([], [], color=PLAIN, ls="--")]
+    figure.legend(handles, ["winched cable", "passive cable"], loc="outside lower center", ncol=2, fontsize=8,
+                  frameon=False)  # fmt: skip
     return png_bytes(figure)
 
 
-def _words(element: object) -> str:
-    kind, index, xy = (getattr(element, name) for name in ("kind", "index", "xy_m"))
-    if xy is not None:
-        return f"the place ({xy[0]:.2f}, {xy[1]:.2f}) m"
-    if kind in ("world", "camera", "place"):
-        return f"the {kind}"
-    return f"all {kind}s" if index is None else f"{kind} {index}"
+def _guilt(report: DiagnoseReport) -> str:
+    """What is guilty, as surely as the verdict says it."""
+    element, channel = report.where.element, report.where.channel
+    sure = report.verdict in ("effect", "pair")
+    if element is not None:
+        part = element_words(element)
+        return f"guilty: {part}" if sure else f"most suspect: {part} (verdict: {report.verdict})"
+    if report.verdict == "no_gap":
+        return "no part is guilty: there is no gap"
+    if channel is not None:
+        return (
+            f"no single part{'' if sure else ' stands out'}: it acts in channel {channel} (verdict: {report.verdict})"
+        )
+    return f"no part stands out (verdict: {report.verdict})"
 
 
 def _drawn(axes: Axes, group: Group, p: np.ndarray, element: object) -> None:
@@ -135,7 +153,7 @@ def _ranking(data: ArtifactData, report: DiagnoseReport) -> bytes:
         right.barh(y, one.probability, color=color, height=0.6)
         right.annotate(f"{one.probability:.2f}", (one.probability, y), xytext=(4, 0), textcoords="offset points",
                        va="center", fontsize=8)  # fmt: skip
-        where = "" if one.element is None else f", {_words(one.element)}"
+        where = "" if one.element is None else f", {element_words(one.element)}"
         names.append(f"{one.effect}{where}")
         y += 1
     left.axvline(report.chance_nats, color="#111111", lw=1, ls=":")

@@ -42,9 +42,11 @@ def floor_picture(data: ArtifactData, report: DiagnoseReport) -> bytes:
     element = report.where.element
     if element is not None and element.xy_m is not None:
         axes.plot(*element.xy_m, "x", ms=16, mew=3, color=GUILTY)
-        axes.annotate("guilty place", element.xy_m, xytext=(10, 10), textcoords="offset points", color=GUILTY)
+        what = "guilty place" if report.verdict in ("effect", "pair") else "most suspect place"
+        axes.annotate(what, element.xy_m, xytext=(10, 10), textcoords="offset points", color=GUILTY)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="x [m]", ylabel="y [m]",
-             title=f"arrows: what the robot did beyond the refit model, {ARROW:g} times")  # fmt: skip
+             title="dots: caps at the ends of intervals; arrows: how much farther\n"
+             f"the robot went than the refit model, {ARROW:g} times enlarged")  # fmt: skip
     axes.margins(0.1)
     return png_bytes(figure)

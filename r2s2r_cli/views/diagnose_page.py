@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,10 @@ if TYPE_CHECKING:
 
 INDISTINCT = 3.0
 """[nats] Below, two effects cannot be told apart."""
+_RIVALS = {
+    "none": "the refit nominal model; counts with what chance gains",
+    "unknown": "gain if errors may be larger than the floor; counts less, since that explains anything",
+}
 
 
 def diagnose_tables(report: DiagnoseReport) -> Iterator[PageTable]:
@@ -26,7 +31,7 @@ def diagnose_tables(report: DiagnoseReport) -> Iterator[PageTable]:
     yield PageTable("where", ["what", "found"], list(_where(report)))
     if report.confusable:
         yield PageTable(
-            "how well these runs tell effects apart", ["effect", "and", "nats", "meaning"],
+            "how well these runs tell effects of the fitted sizes apart", ["effect", "and", "nats", "meaning"],
             [[a, b, f"{nats:.1f}", "cannot be told apart by these runs" if nats < INDISTINCT else "can be told apart"]
              for a, b, nats in report.confusable],
         )  # fmt: skip
@@ -69,10 +74,11 @@ def _ranked(one: RankedName) -> list[str]:
         unit = "" if one.units.get(name, "1") == "1" else f" {one.units[name]}"
         sizes.append(f"{short} {value:.3g}{unit}")
         wide.append(f"{one.ci90[name][0]:.3g} .. {one.ci90[name][1]:.3g}")
-    remarks = [] if one.moved else ["never left its start"]
+    remarks = [_RIVALS[one.effect]] if one.effect in _RIVALS else []
+    remarks += [] if one.moved else ["never left its start"]
     remarks += [f"{name.split('.', 1)[1]} on a bound" for name in one.on_bound]
     rmse = "" if one.rmse_m is None else f"{1e3 * one.rmse_m:.1f}"
-    where = element_words(one.element) or (one.channel or "")
+    where = element_words(one.element) or (f"channel {one.channel}" if one.channel else "")
     return [one.effect, where, f"{one.elpd_gain:.1f}", f"{one.probability:.2f}", "; ".join(sizes), "; ".join(wide),
             rmse, "; ".join(remarks)]  # fmt: skip
 
@@ -100,7 +106,7 @@ def _where(report: DiagnoseReport) -> Iterator[list[str]]:
     yield ["intervals with a gap", ", ".join(where.segments) or "none stands out"]
     yield [
         "begins with",
-        "it does not begin anywhere" if where.onset_segment is None else f"fitted interval {where.onset_segment}",
+        "no beginning stands out" if where.onset_segment is None else f"fitted interval {where.onset_segment}",
     ]
     yield ["channel", where.channel or "-"]
     yield ["element", element_words(where.element) or "-"]
@@ -114,7 +120,7 @@ def _limits(report: DiagnoseReport) -> Iterator[list[str]]:
     yield ["90 % set", ", ".join(report.set90)]
     yield ["not testable with these runs", ", ".join(report.not_testable) or "none"]
     for text in report.missing:
-        yield ["not looked at", text]
+        yield ["missing", text]
     if report.next_gait is None:
         yield ["run next", "nothing: no gait of the library would decide more"]
     else:
@@ -135,9 +141,16 @@ def _how(report: DiagnoseReport) -> Iterator[list[str]]:
     yield ["chance", f"the best of the catalogue gains {report.chance_nats:.1f} nats by chance in one case of 20"]
     yield ["probabilities", report.calibrated]
     for name, (value, sd) in report.refit.items():
-        yield [f"refit: {name}", f"{value:+.4g} +- {sd:.2g}"]
+        yield [f"refit: {name}", _number(value, sd, report.refit_units.get(name, ""))]
     yield ["work", f"{report.rollouts} simulated intervals, {report.wall_s:.1f} s"
            + "".join(f"; {part} {seconds:.1f} s" for part, seconds in report.seconds.items())]  # fmt: skip
+
+
+def _number(value: float, sd: float, unit: str) -> str:
+    """Value and sd; of a factor by how much it differs from 1."""
+    if unit == "log":
+        return f"{100 * math.expm1(value):+.1f} % +- {100 * math.exp(value) * sd:.1f} % of the identified value"
+    return f"{value:+.4g} +- {sd:.2g}" + ("" if unit in ("", "1") else f" {unit}")
 
 
 def _mm(value: float | None) -> str:
@@ -147,5 +160,5 @@ def _mm(value: float | None) -> str:
 def _share(value: float | None, ends: tuple[float, float] | None) -> str:
     if value is None:
         return "at the floor"
-    wide = "" if ends is None else f" ({100 * ends[0]:.0f} .. {100 * ends[1]:.0f})"
-    return f"{100 * value:.0f} %{wide}"
+    wide = "" if ends is None else f" ({round(100 * ends[0])} .. {round(100 * ends[1])})"
+    return f"{round(100 * value)} %{wide}"

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from r2s2r_cli.stages.diagnose.where import Where
 from r2s2r_cli.stages.diagnose.where.where import where
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration, calibration
 from r2s2r_cli.stages.diagnose.which.numbers import Model
+from r2s2r_cli.stages.diagnose.which.remembered import Checkpoint, Remembered
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
 from r2s2r_cli.stages.diagnose.which.which import Compared, Ways, compare_effects
 from r2s2r_cli.stages.identify.start import Filter
@@ -57,16 +57,6 @@ class Settings:
     library: GaitLibrary = field(default_factory=GaitLibrary)
 
 
-class Checkpoint(Protocol):
-    """Where work is kept: a `store.checkpoint.CheckpointFile`."""
-
-    def load(self) -> dict[str, Any] | None:
-        """What was kept; None: nothing."""
-
-    def save(self, values: Mapping[str, Any]) -> None:
-        """Keep this instead."""
-
-
 def silent(part: str, done: int, total: int) -> None:
     """No progress."""
 
@@ -77,12 +67,13 @@ def diagnose(
 ) -> Diagnosis:  # fmt: skip
     """Where the gap lies, which effect causes it, how far it shrinks, and what to run next.
 
-    Nothing of the judged intervals is looked at before everything else is decided. Raises InputError where there is too
-    little to diagnose or a setting contradicts the data, NumericalError where nothing can be simulated.
+    Nothing of the judged intervals is looked at before everything else is decided. checkpoint: with what was
+    simulated before an interruption the result is that of an uninterrupted run, to the last bit. Raises InputError
+    where there is too little to diagnose or a setting contradicts the data, NumericalError where nothing can be
+    simulated.
     """
     settings = settings or Settings()
     require_enough(evidence)
-    kept = (checkpoint.load() if checkpoint is not None else None) or {}
     progress("parity", 0, 1)
     said: Parity | None = parity(evidence) if settings.with_parity else None
     if said is not None and said.mismatches:
@@ -93,15 +84,16 @@ def diagnose(
     progress("parity", 1, 1)
     starts = Starts(Filter(members=settings.members, seed=settings.seed))
     model = Model(evidence.model)
-    replayer = Replayer(model, step=settings.step, cache_dir=cache_dir, threads=threads)
-    fitted = refit(evidence, replayer, starts=starts, told=progress, kept=kept, keep=_keeper(checkpoint, kept),
+    how = {"step": settings.step, "cache_dir": cache_dir, "threads": threads}
+    replayer = Replayer(model, **how) if checkpoint is None else Remembered(model, checkpoint, **how)
+    fitted = refit(evidence, replayer, starts=starts, told=progress,
         again=settings.refit_baseline, with_floor=settings.with_floor,
     )  # fmt: skip
     compared = compare_effects(
         fitted.arena, fitted.base, floor_m=fitted.floor.rmse, calibration=settings.calibration or calibration(),
         sizes={} if said is None else said.starts(), suspected=None if said is None else said.suspected(),
         effects=settings.effects, seed=settings.seed, told=progress,
-        ways=Ways(settings.held_out, settings.with_unknown), kept=kept, keep=_keeper(checkpoint, kept),
+        ways=Ways(settings.held_out, settings.with_unknown),
     )  # fmt: skip
     found: Where | None = None
     if settings.with_where:
@@ -128,17 +120,6 @@ def diagnose(
         segments=_segments(compared), within_run=evidence.within_run, rollouts=replayer.rollouts,
         warnings=(*fitted.warnings, *compared.which.warnings),
     )  # fmt: skip
-
-
-def _keeper(checkpoint: Checkpoint | None, kept: dict[str, Any]) -> Callable[[str, Any], None]:
-    """Keeps a value under a name, beside all that was kept before."""
-
-    def keep(name: str, value: Any) -> None:
-        kept[name] = value
-        if checkpoint is not None:
-            checkpoint.save(kept)
-
-    return keep
 
 
 def _segments(compared: Compared) -> tuple[SegmentSeen, ...]:

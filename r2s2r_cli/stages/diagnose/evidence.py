@@ -51,7 +51,8 @@ class Evidence:
     """runs: what is diagnosed. fit, judge: target intervals (1-based) by run, disjoint; nothing of `judge` is looked at
     before everything of `fit` is decided. model: the simulator as identified, before any effect. healthy: runs of the
     robot from when nothing was wrong (commissioning); with them a diagnosis says what changed. within_run: `judge`
-    shares its runs with `fit`, so that what is constant over a run helps both.
+    shares its runs with `fit`, so that what is constant over a run helps both. missing: what would be of use and is not
+    there, in words.
     """
 
     robot: Robot
@@ -61,6 +62,7 @@ class Evidence:
     judge: tuple[Selection, ...]
     floor: FloorGiven | None = None
     healthy: tuple[Run, ...] = ()
+    missing: tuple[str, ...] = ()
 
     @property
     def within_run(self) -> bool:

@@ -10,8 +10,11 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.diagnosis import Diagnosis
 from r2s2r_cli.stages.diagnose.parity.finding import Element
+from r2s2r_cli.stages.diagnose.which.arena import CAMERA
 from r2s2r_cli.stages.diagnose.which.found import Ranked
+from r2s2r_cli.stages.diagnose.which.numbers import NUISANCES
 from r2s2r_cli.stages.diagnose.words import sentence
+from r2s2r_cli.stages.effects import all_effects
 from schemas.results_diagnose import (
     DiagnoseReport,
     ElementFound,
@@ -38,7 +41,8 @@ def diagnose_report(found: Diagnosis) -> DiagnoseReport:
         refit_rmse_m=which.no_gap.rmse, refit_upper_m=which.no_gap.upper, chance_nats=which.chance,
         calibrated=which.calibrated, left_out=which.within, segments=_segments(found),
         hidden=tuple(shift.words for shift in which.shifts), parity=_parity(found), missing=_missing(found),
-        refit=found.refit, rollouts=found.rollouts, within_run=found.within_run, warnings=found.warnings,
+        refit=found.refit, refit_units={name: _unit(name) for name in found.refit}, rollouts=found.rollouts,
+        within_run=found.within_run, warnings=found.warnings,
     )  # fmt: skip
 
 
@@ -126,6 +130,13 @@ def _missing(found: Diagnosis) -> tuple[str, ...]:
         () if found.much is None else found.much.missing,
     ]  # fmt: skip
     return tuple(dict.fromkeys(one for part in parts for one in part))
+
+
+def _unit(name: str) -> str:
+    """Of a number of the refit nominal model."""
+    known = {one.name: one.unit for one in NUISANCES} | {name: unit for name, unit, _ in CAMERA} | {"sensor_lag": "s"}
+    known |= {f"{effect.name}.{own.name}": own.unit for effect in all_effects() for own in effect.own}
+    return known.get(name, "m" if name.startswith("sensor_bias") else "")
 
 
 def _finite(value: float, instead: float) -> float:

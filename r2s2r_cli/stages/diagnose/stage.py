@@ -6,11 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from r2s2r_cli.artifact import ArtifactData
-from r2s2r_cli.stages.diagnose.diagnose import Checkpoint, Settings, diagnose
+from r2s2r_cli.stages.diagnose.diagnose import Settings, diagnose
 from r2s2r_cli.stages.diagnose.evidence import Evidence
 from r2s2r_cli.stages.diagnose.groups import diagnosis_groups
 from r2s2r_cli.stages.diagnose.next_gait import GaitLibrary
 from r2s2r_cli.stages.diagnose.report import diagnose_report
+from r2s2r_cli.stages.diagnose.which.remembered import Checkpoint
 from r2s2r_cli.stages.record.policies import EXCITATIONS, random_targets
 from schemas.config import DiagnoseSettings
 from schemas.results_diagnose import DiagnoseReport
@@ -35,6 +36,7 @@ def diagnosed(
     )
     found = diagnose(evidence, how, progress, cache_dir=cache_dir, checkpoint=checkpoint)
     report = diagnose_report(found)
+    report = report.model_copy(update={"missing": (*evidence.missing, *report.missing)})
     return ArtifactData("diagnosis", diagnosis_groups(found, evidence.robot)), report
 
 

@@ -27,6 +27,8 @@ class RankedName(Frozen):
     effect: str
     elpd_gain: float
     """Log predictive density over the refit nominal model on gaits that were left out [nats]."""
+    elpd_gain_sd: float | None = None
+    """Its sd, from how much the left-out parts differ in it; None: one part, or no fit."""
     probability: float
     size: dict[str, float] = Field(default_factory=dict)
     """Of its numbers, by name, in `units`."""

@@ -121,7 +121,7 @@ class Asked:
         found: list[Run] = []
         gaits: dict[bytes, str] = {}
         for one in named_runs(self.sources):
-            _require_robot(one.recording, one.run, robot.name)
+            require_robot(one.recording, one.run, robot.name)
             caps = run_data(one.recording, one.estimate, one.run, name=one.name)
             gait = gaits.setdefault(caps.intervals.target.round(6).tobytes(), one.name)
             found.append(Run(caps, sensed_run(one.name, one.recording, one.run, robot), gait=gait))
@@ -162,7 +162,7 @@ class Asked:
         return FloorGiven(float(told["floor"]), float(told["sensor"]), f"floor.h5, {told['basis']}")
 
 
-def _require_robot(recording: ArtifactData | None, run: str, name: str) -> None:
+def require_robot(recording: ArtifactData | None, run: str, name: str) -> None:
     """Raises InputError where a run says that it is of another robot."""
     own = None if recording is None else recording.groups.get(f"runs/{run}")
     told = name if own is None else str(own.attributes.get("robot", name))

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 GUILTY = "#d55e00"
 PLAIN = "#8792a2"
+NINETY = 1.645
+"""Sd to either side of a 90 % interval."""
 BEFORE, AFTER, STALE, BLACK_BOX = "#0072b2", "#009e73", "#b8bec8", "#cc79a7"
 
 
@@ -90,14 +92,14 @@ def _robot(data: ArtifactData, report: DiagnoseReport) -> bytes:
         axes.set(title=title, xlabel="x [m]", ylabel=f"{'xyz'[j]} [m]")
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.12)
-    figure.suptitle(_guilt(report), color=GUILTY if element is not None else "#1c2430", fontsize=11)
+    figure.suptitle(guilt(report), color=GUILTY if element is not None else "#1c2430", fontsize=11)
     handles = [Line2D([], [], color=PLAIN, ls="-"), Line2D([], [], color=PLAIN, ls="--")]
     figure.legend(handles, ["winched cable", "passive cable"], loc="outside lower center", ncol=2, fontsize=8,
                   frameon=False)  # fmt: skip
     return png_bytes(figure)
 
 
-def _guilt(report: DiagnoseReport) -> str:
+def guilt(report: DiagnoseReport) -> str:
     """What is guilty, as surely as the verdict says it."""
     element, channel = report.where.element, report.where.channel
     sure = report.verdict in ("effect", "pair")
@@ -145,24 +147,24 @@ def _ranking(data: ArtifactData, report: DiagnoseReport) -> bytes:
     others = [one for one in report.ranking if one.effect in ("none", "unknown")]
     figure = new_figure(10.5, 1.4 + 0.36 * (len(rows) + len(others)))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=[1.6, 1])
-    names, y = [], 0
-    for one in [*rows, *others]:
+    names = []
+    for y, one in enumerate([*rows, *others]):
         color = GUILTY if one.effect in report.effects else "#444f5e" if one in others else BEFORE
         if one not in others:
-            left.barh(y, one.elpd_gain, color=color, height=0.6)
+            wide = None if one.elpd_gain_sd is None else NINETY * one.elpd_gain_sd
+            left.barh(y, one.elpd_gain, xerr=wide, color=color, height=0.6, ecolor="#111111", capsize=3)
         right.barh(y, one.probability, color=color, height=0.6)
         right.annotate(f"{one.probability:.2f}", (one.probability, y), xytext=(4, 0), textcoords="offset points",
                        va="center", fontsize=8)  # fmt: skip
         where = "" if one.element is None else f", {element_words(one.element)}"
         names.append(f"{one.effect}{where}")
-        y += 1
-    left.axvline(report.chance_nats, color="#111111", lw=1, ls=":")
-    left.annotate("chance, 1 in 20", (report.chance_nats, y - 0.6), fontsize=7, va="top", xytext=(3, 0),
-                  textcoords="offset points")  # fmt: skip
+    left.axvline(report.chance_nats, color="#111111", lw=1, ls=":", label="reached by chance in 1 case of 20")
     left.axvline(0.0, color="#111111", lw=0.8)
     left.set_yticks(range(len(names)), names, fontsize=8)
     left.invert_yaxis()
-    left.set_xlabel("gain on what was left out [nats]", fontsize=8)
+    left.set_xlabel("gain on what was left out, with 90 % interval [nats]", fontsize=8)
+    handles, labels = left.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", fontsize=8, frameon=False)
     right.set(xlim=(0, 1.15))
     right.set_xlabel(f"probability ({report.calibrated.split(':')[0]})", fontsize=8)
     return png_bytes(figure)

@@ -23,7 +23,16 @@ def diagnose_tables(report: DiagnoseReport) -> Iterator[PageTable]:
     """What people read first comes first."""
     yield PageTable(
         "what explains the gap",
-        ["name", "where", "gain [nats]", "probability", "size", "90 % interval", "left-out error [mm]", "remarks"],
+        [
+            "name",
+            "where",
+            "gain +- sd [nats]",
+            "probability",
+            "size",
+            "90 % interval",
+            "left-out error [mm]",
+            "remarks",
+        ],
         [_ranked(one) for one in report.ranking],
     )
     if report.shrinkage is not None:
@@ -79,7 +88,8 @@ def _ranked(one: RankedName) -> list[str]:
     remarks += [f"{name.split('.', 1)[1]} on a bound" for name in one.on_bound]
     rmse = "" if one.rmse_m is None else f"{1e3 * one.rmse_m:.1f}"
     where = element_words(one.element) or (f"channel {one.channel}" if one.channel else "")
-    return [one.effect, where, f"{one.elpd_gain:.1f}", f"{one.probability:.2f}", "; ".join(sizes), "; ".join(wide),
+    gain = f"{one.elpd_gain:.1f}" + ("" if one.elpd_gain_sd is None else f" +- {one.elpd_gain_sd:.1f}")
+    return [one.effect, where, gain, f"{one.probability:.2f}", "; ".join(sizes), "; ".join(wide),
             rmse, "; ".join(remarks)]  # fmt: skip
 
 

@@ -5,7 +5,16 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
+from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.commands.diagnose_inputs import Asked, require_robot
+from r2s2r_cli.errors import InputError
+from r2s2r_cli.store.project import Project
+from r2s2r_cli.store.write import write_artifact
 from tests.commands.conftest import invoke
+from tests.support.builders import provenance
+from tests.support.identified import identification
 
 
 def artifacts(root: Path) -> set[str]:
@@ -35,3 +44,33 @@ def test_the_settings_are_shown_without_anything_to_diagnose(estimated: Path) ->
     result = invoke("diagnose", "--show-config")
     assert result.exit_code == 0 and "members = 16" in result.stdout
     assert not artifacts(estimated)
+
+
+def asked(root: Path) -> Asked:
+    """Of the estimated project with an identification that names its own run."""
+    here = Project.find(root)
+    write_artifact(root / "iterations/001/30-identify.h5", identification(here.robot()), provenance())
+    return Asked(here, here.iteration(1), train=("sample:1-3",), test=("sample:4",))
+
+
+def test_a_model_without_uncertainty_is_said(estimated: Path) -> None:
+    """The numbers whose sd the identification does not have are named among what is missing; one run is marked."""
+    evidence = asked(estimated).evidence()
+    assert evidence.missing == (
+        "uncertainty of restitution: 30-identify.h5 has none, so the refit takes its usual priors",
+    )
+    assert evidence.within_run and evidence.floor is None
+
+
+def test_another_robot_is_refused(estimated: Path) -> None:
+    """Numbers or a run of one are not taken for those of this one: it says whose they are."""
+    one = asked(estimated)
+    robot = estimated / "robot.toml"
+    robot.write_text(robot.read_text().replace('name = "threebar"', 'name = "sixbar"', 1))
+    with pytest.raises(InputError, match="identified for another robot"):
+        one.evidence()
+    recording = ArtifactData("recording", {"runs/walk": Group({}, {"robot": "sixbar"})})
+    with pytest.raises(InputError, match="run walk is of another robot") as caught:
+        require_robot(recording, "walk", "threebar")
+    assert caught.value.received == "sixbar" and caught.value.hint.startswith("r2s2r diagnose")
+    require_robot(recording, "walk", "sixbar")

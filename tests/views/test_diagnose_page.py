@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pytest
+
+from r2s2r_cli.views.diagnose import guilt
 from r2s2r_cli.views.diagnose_page import diagnose_page, diagnose_tables
 from schemas.results_diagnose import (
     DiagnoseReport,
@@ -52,3 +55,36 @@ def test_tables_hold_the_share_beside_its_prediction_and_its_doubts() -> None:
     assert "mass_kg 0.04 kg | 0.03 .. 0.05" in text
     assert "place_m.1 on a bound" in text
     assert "payload | com_offset | 2.1 | cannot be told apart" in text
+
+
+def test_rivals_and_numbers_say_what_they_are() -> None:
+    """Why `none` has a probability without a gain; a gain has its sd, a factor is a share, a number has its unit."""
+    first = report().ranking[0].model_copy(update={"elpd_gain_sd": 4.0})
+    units = {"friction": "log", "motor_lag.tau_s": "s"}
+    made = report().model_copy(update={
+        "ranking": (first, report().ranking[1]), "refit": {"friction": (0.1, 0.02), "motor_lag.tau_s": (0.03, 0.004)},
+        "refit_units": units,
+    })  # fmt: skip
+    text = "\n".join(" | ".join(row) for table in diagnose_tables(made) for row in table.rows)
+    assert "31.0 +- 4.0" in text and "none |  | 0.0 | 0.10" in text and "counts with what chance gains" in text
+    assert "refit: friction | +10.5 % +- 2.2 % of the identified value" in text
+    assert "refit: motor_lag.tau_s | +0.03 +- 0.004 s" in text
+
+
+@pytest.mark.parametrize(
+    ("verdict", "element", "channel", "words"),
+    [
+        ("effect", ElementFound(kind="rod", index=1), "mass", "guilty: rod 1"),
+        ("ambiguous", ElementFound(kind="cap", index=3), "contact", "most suspect: cap 3 (verdict: ambiguous)"),
+        ("effect", None, "motor", "no single part: it acts in channel motor (verdict: effect)"),
+        ("ambiguous", None, "cable", "no single part stands out: it acts in channel cable (verdict: ambiguous)"),
+        ("unknown", None, None, "no part stands out (verdict: unknown)"),
+        ("no_gap", None, None, "no part is guilty: there is no gap"),
+    ],
+)
+def test_the_robot_is_blamed_as_surely_as_the_verdict(
+    verdict: str, element: ElementFound | None, channel: str | None, words: str
+) -> None:
+    """A part is guilty only where the verdict commits to it; without one, what is known is said."""
+    where = WhereFound(segments=(), onset_segment=None, channel=channel, element=element)
+    assert guilt(report().model_copy(update={"verdict": verdict, "where": where})) == words

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.diagnose.evidence import Evidence, Run, require_enough
+from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run, require_enough
+from r2s2r_cli.stages.diagnose.prepare import floor_for
 from r2s2r_cli.stages.identified import nominal
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.segments import Intervals, Segments
@@ -60,6 +61,17 @@ def test_too_little_is_refused() -> None:
         require_enough(evidence(run_data(), fit=(Selection("walk", (1,)),)))
     with pytest.raises(InputError, match="another robot"):
         require_enough(evidence(run_data(caps=12), fit=(Selection("walk", (1, 2)),)))
+
+
+def test_without_a_floor_it_is_estimated_and_said() -> None:
+    """From the noise of the caps and what two engines differ by: sqrt(3 * 1 mm^2 + 3^2 mm^2) at 1 mm of noise; a floor
+    that was given is taken as it is."""
+    one = evidence(run_data(), fit=(Selection("walk", (1, 2)),))
+    floor, said = floor_for(one)
+    assert floor.rmse == pytest.approx(np.sqrt(12.0) * 1e-3) and not floor.given
+    assert said == ["no floor was given: taken from the noise of the caps and 3 mm for the numerics of engines, 3.5 mm"]
+    given = FloorGiven(0.008, 0.002, "floor.h5")
+    assert floor_for(replace(one, floor=given)) == (given, [])
 
 
 def test_shuffled_commands_belong_to_other_intervals() -> None:

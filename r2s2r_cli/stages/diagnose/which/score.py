@@ -41,9 +41,22 @@ class Score:
 def gains(refit: Score, others: Sequence[Score]) -> np.ndarray:
     """Held-out log density of hypotheses over the refit nominal model, (hypothesis,) [nats]. At a piece none loses more
     than ENOUGH against the best of them all: a robot that tips over, or not, is explained by anything."""
-    table = np.array([refit.elpd, *(score.elpd for score in others)])
-    total = np.logaddexp(table, table.max(axis=0) - ENOUGH).sum(axis=1)
+    total = _table(refit, others).sum(axis=1)
     return np.asarray(total[1:] - total[0])
+
+
+def gain_sds(refit: Score, others: Sequence[Score], groups: np.ndarray) -> np.ndarray:
+    """Sd of the gains, (hypothesis,) [nats], from how much the groups differ in what they gain; nan with one group."""
+    table = _table(refit, others)
+    own = np.stack([(table[1:] - table[0])[:, groups == name].sum(axis=1) for name in np.unique(groups)], axis=1)
+    count = own.shape[1]
+    return np.sqrt(count) * own.std(axis=1, ddof=1) if count > 1 else np.full(len(own), np.nan)
+
+
+def _table(refit: Score, others: Sequence[Score]) -> np.ndarray:
+    """Log densities (1 + hypothesis, stretch), the refit nominal model first."""
+    table = np.array([refit.elpd, *(score.elpd for score in others)])
+    return np.asarray(np.logaddexp(table, table.max(axis=0) - ENOUGH))
 
 
 def groups_of(arena: Arena) -> np.ndarray:

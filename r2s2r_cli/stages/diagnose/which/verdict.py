@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked, Screened, Shift, Which
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap
-from r2s2r_cli.stages.diagnose.which.score import Score, gains as gains_of
+from r2s2r_cli.stages.diagnose.which.score import Score, gain_sds, gains as gains_of
 from r2s2r_cli.stages.diagnose.which.screen import Response
 
 PAIR = 15.0
@@ -60,8 +60,11 @@ def concluded(m: Material) -> Which:
     none = m.chance + (calibration.equivalent if m.no_gap.equivalent else 0.0)
     table = {**names, **m.logged, NONE: none, UNKNOWN: m.unexplained - calibration.unknown}
     probability = calibration.probabilities(table)
+    sds = gain_sds(m.refit, m.scores, m.groups).tolist() if m.scores else []
     pair = _pair(m, order, gains, best)
-    ranking = [_ranked(m, best[name], gains[best[name]], probability[name], singles, gains) for name in names]
+    ranking = [
+        replace(_ranked(m, i, gains[i], probability[name], singles, gains), gain_sd=sds[i]) for name, i in best.items()
+    ]
     ranking += [Ranked(name, gain, probability[name], channel=_channel(name)) for name, gain in m.logged.items()]
     ranking += [
         Ranked(NONE, 0.0, probability[NONE], rmse=m.no_gap.rmse, misfit=_misfit(m.refit)),

@@ -1,0 +1,60 @@
+"""The verdict in one sentence: each verdict says what it is of, and nothing that contradicts it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from r2s2r_cli.stages.diagnose.parity.finding import Element
+from r2s2r_cli.stages.diagnose.words import sentence
+
+
+def found(verdict: str, **changes: object) -> SimpleNamespace:
+    """A diagnosis with a payload on rod 1 as its best effect, and 12 mm that become 6 at a floor of 5."""
+    best = SimpleNamespace(effect="payload", element=changes.pop("element", Element("rod", 1)))
+    much = SimpleNamespace(
+        effects=("payload",), names=("b:1", "b:2"), floor=0.005, within_run=False, share=0.7, ci90=(-0.004, 0.9),
+        predicted=0.65, rmse={"refit": 0.012, "effect": 0.006}.get,
+    )  # fmt: skip
+    values = {"verdict": verdict, "effects": ("payload",), "probability": 0.9, "set90": ("payload", "none", "unknown"),
+              "best": best, "no_gap": SimpleNamespace(rmse=0.012, upper=0.014, equivalent=False)}  # fmt: skip
+    return SimpleNamespace(
+        which=SimpleNamespace(**{**values, **changes}), much=much, channel="mass", floor=SimpleNamespace(rmse=0.005)
+    )
+
+
+SHRUNK = "key-frame error from 12.0 to 6.0 mm (floor 5.0), which closes 70 % (0 .. 90) of the gap above the floor"
+
+
+@pytest.mark.parametrize(
+    ("diagnosis", "begins", "holds"),
+    [
+        (found("effect"), "The gap is caused by payload at rod 1 (p = 0.90). On 2 held-out intervals payload", SHRUNK),
+        (found("effect", element=Element("world")), "The gap is caused by payload (p = 0.90).", SHRUNK),
+        (found("pair", effects=("payload", "backlash")), "The gap has two causes, payload and backlash", SHRUNK),
+        (found("ambiguous"), "These runs do not decide between payload, no gap and something unnamed (best p = 0.90).",
+         "the best of them, payload, takes"),
+        (found("ambiguous", set90=("payload",)), "These runs do not decide: payload is the likeliest (p = 0.90).",
+         "the best of them, payload, takes"),
+        (found("unknown"), "Something is wrong that none of the effects looked for explains (p = 0.90): 12.0 mm",
+         "It acts most like something in channel mass."),
+        (found("no_gap"), "No effect stands out from chance: 12.0 mm after refitting, upper 90 % bound 14.0 mm", "5.0"),
+        (found("no_gap", no_gap=SimpleNamespace(rmse=0.005, upper=0.006, equivalent=True)),
+         "There is no gap above the floor: 5.0 mm", "bound 6.0 mm"),
+    ],
+)  # fmt: skip
+def test_each_verdict_has_its_sentence(diagnosis: SimpleNamespace, begins: str, holds: str) -> None:
+    """What is committed to is a cause; what is not is the best of several; what is everywhere has no place."""
+    said = sentence(diagnosis)  # type: ignore[arg-type]
+    assert said.startswith(begins)
+    assert holds in said
+
+
+def test_at_the_floor_there_is_no_share() -> None:
+    """A refit error at the floor has nothing to close, and a run on both sides of the split is said."""
+    one = found("effect")
+    one.much.share, one.much.within_run = None, True
+    said = sentence(one)  # type: ignore[arg-type]
+    assert "of the same run payload takes" in said
+    assert said.endswith("the refit error is at the floor, so there is no share to speak of.")

@@ -106,6 +106,7 @@ def diagnose(
             cache_dir=cache_dir,
             threads=threads,
             told=progress,
+            compared=compared,
         )
     shrunk = None
     if settings.with_much and evidence.judge:

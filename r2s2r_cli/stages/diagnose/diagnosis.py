@@ -11,6 +11,7 @@ from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage
 from r2s2r_cli.stages.diagnose.next_gait import NextGait
 from r2s2r_cli.stages.diagnose.parity import Parity
 from r2s2r_cli.stages.diagnose.where import Where
+from r2s2r_cli.stages.diagnose.where.seat import Seat, seat
 from r2s2r_cli.stages.diagnose.which.found import Which
 
 
@@ -51,11 +52,11 @@ class Diagnosis:
     warnings: tuple[str, ...] = ()
 
     @property
+    def seat(self) -> Seat:
+        """Channel and element of the cause."""
+        return seat(self.which, self.where)
+
+    @property
     def channel(self) -> str | None:
-        """Where the cause acts: of the named effect, else of the probe that explains most."""
-        best = self.which.best
-        if self.which.verdict in ("effect", "pair", "ambiguous") and best is not None:
-            return best.channel
-        if self.which.verdict == "unknown" and self.where is not None:
-            return self.where.channel
-        return None
+        """Where the cause acts."""
+        return self.seat.channel

@@ -56,18 +56,8 @@ def document(found: Diagnosis) -> dict[str, Any]:
             "wider": found.which.wider}  # fmt: skip
 
 
-def element_of(found: Diagnosis) -> Element | None:
-    """The part the verdict points at: of the best effect, else of the probe that explains most."""
-    best = found.which.best
-    if found.which.verdict in ("effect", "pair", "ambiguous") and best is not None:
-        return best.element
-    if found.which.verdict == "unknown" and found.where is not None:
-        return found.where.element
-    return None
-
-
 def _where(found: Diagnosis) -> WhereFound:
-    element = element_of(found)
+    element = found.seat.element
     onset = None if found.where is None or found.where.onset is None else found.where.onset.order + 1
     return WhereFound(
         segments=tuple(f"{one.run}:{one.interval}" for one in found.segments if one.gap), onset_segment=onset,
@@ -81,7 +71,9 @@ def _element(one: Element) -> ElementFound:
 
 def _ranked(one: Ranked) -> RankedName:
     return RankedName(
-        effect=one.effect, elpd_gain=_finite(one.gain, -1e9), probability=one.probability, size=dict(one.size),
+        effect=one.effect, elpd_gain=_finite(one.gain, -1e9),
+        elpd_gain_sd=one.gain_sd if one.gain_sd is not None and math.isfinite(one.gain_sd) else None,
+        probability=one.probability, size=dict(one.size),
         ci90=dict(one.ci90), units=dict(one.units), channel=one.channel,
         element=None if one.element is None else _element(one.element),
         rmse_m=None if one.rmse is None or not math.isfinite(one.rmse) else one.rmse, moved=one.moved,

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.much.blackbox import corrected
-from r2s2r_cli.stages.diagnose.much.shrink import share_with_interval
+from r2s2r_cli.stages.diagnose.much.shrink import foretold, share_with_interval
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
+from r2s2r_cli.stages.measures.gap import own_share
 
 
 def test_a_share_is_of_the_gap_above_the_floor() -> None:
@@ -26,6 +27,42 @@ def test_at_the_floor_there_is_no_share() -> None:
     """A refit error at the floor leaves nothing to share."""
     share, ends = share_with_interval(np.full(10, 0.005**2), np.full(10, 0.004**2), 0.005)
     assert share is None and ends is None
+
+
+def test_a_forecast_holds_what_as_many_further_segments_have() -> None:
+    """Shares of 6 further segments of the same kind: 90 % intervals from 24 others hold 80 to 100 % of 50 of them. One
+    fall that the effect explains moves the ratio of all by more than 20 points, the forecast of 6 by less than 10."""
+    rng = np.random.default_rng(1)
+    groups = [f"g{k // 6}" for k in range(24)]
+
+    def drawn(count: int) -> tuple[np.ndarray, np.ndarray]:
+        return 4e-4 * rng.gamma(4.0, 0.25, count), 1.5e-4 * rng.gamma(4.0, 0.25, count)
+
+    held, widths = [], []
+    for seed in range(50):
+        told, ends = foretold(*drawn(24), 0.005, groups=groups, count=6, seed=seed)
+        share = own_share(*drawn(6), 0.005)
+        assert told is not None and ends is not None and share is not None
+        held.append(ends[0] <= share <= ends[1])
+        widths.append(ends[1] - ends[0])
+    assert np.mean(held) >= 0.80
+    assert np.mean(widths) < 0.5
+    before, after = np.full(24, 4e-4), np.full(24, 2.9e-4)
+    plain, _ = foretold(before, after, 0.005, groups=groups, count=6)
+    before[3], after[3] = 1e-2, 2.9e-4
+    told, _ = foretold(before, after, 0.005, groups=groups, count=6)
+    share, _ = share_with_interval(before, after, 0.005)
+    assert plain is not None and told is not None and share is not None
+    assert share - plain > 0.2
+    assert told - plain < 0.1
+
+
+def test_at_the_floor_nothing_is_foretold() -> None:
+    """Errors at the floor, no segments, nothing to be judged: no forecast."""
+    at = np.full(8, 0.005**2)
+    assert foretold(at, at / 2, 0.005, groups=["g"] * 8, count=4) == (None, None)
+    assert foretold(np.full(8, np.nan), at, 0.005, groups=["g"] * 8, count=4) == (None, None)
+    assert foretold(4 * at, at, 0.005, groups=["g"] * 8, count=0) == (None, None)
 
 
 def _stretches(count: int, rng: np.random.Generator) -> tuple[list[SimpleNamespace], np.ndarray]:

@@ -12,6 +12,7 @@ from r2s2r_cli.stages.diagnose.where.channels import fitted, gains, held_out, si
 from r2s2r_cli.stages.diagnose.where.columns import Column, Design
 from r2s2r_cli.stages.diagnose.where.found import SegmentGap
 from r2s2r_cli.stages.diagnose.where.onset import onset
+from r2s2r_cli.stages.diagnose.which.mixture import FACTORS
 
 STRETCHES, ROWS = 18, 120
 COLUMNS = (
@@ -25,15 +26,16 @@ GAIT = np.repeat(np.arange(3), STRETCHES // 3)
 def _design(seed: int, truth: np.ndarray, *, nuisance: float = 0.0) -> Design:
     """Innovations of white noise and of probes `truth` (stretch, 7) in their units, one nuisance that is off."""
     rng = np.random.default_rng(seed)
-    grams = []
+    grams, kinds = [], np.array(FACTORS)
     for one in truth:
         columns = rng.standard_normal((8, ROWS)) / np.sqrt(ROWS) * np.array([6.0, *[4.0] * 7])[:, None]
         scale = np.array([column.scale for column in COLUMNS])
         r = rng.standard_normal(ROWS) + nuisance * columns[0] + (one / scale) @ columns[1:]
         joined = np.concatenate([columns, r[None]])
-        grams.append(joined @ joined.T)
+        grams.append(joined @ joined.T / kinds[:, None, None] ** 2)
     size = np.full(STRETCHES, float(ROWS))
-    return Design(np.array(grams), COLUMNS, size, GAIT, np.eye(1), (), ())
+    logdet = np.tile(2.0 * ROWS * np.log(kinds), (STRETCHES, 1))
+    return Design(np.array(grams), logdet, COLUMNS, size, GAIT, np.eye(1), (), ())
 
 
 def test_a_constant_rate_error_comes_out() -> None:
@@ -89,10 +91,35 @@ def test_one_interval_does_not_decide() -> None:
     assert gains(made, MOTOR, GAIT, plain).max() <= 15.0
 
 
+def test_a_fall_is_no_evidence_for_a_channel() -> None:
+    """Two intervals that err 50 times as much as the floor says, in directions of no probe's own: no channel gains 10
+    nats by them."""
+    made = _design(3, np.zeros((STRETCHES, 7)))
+    gram = made.gram.copy()
+    gram[[4, 13], :, -1, :] *= 50.0
+    gram[[4, 13], :, :, -1] *= 50.0
+    fallen = Design(gram, made.logdet, COLUMNS, made.size, GAIT, made.known, (), ())
+    plain = held_out(fallen, np.zeros(0, int), GAIT)
+    assert max(gains(fallen, places, GAIT, plain).sum() for places in (MOTOR, CABLE)) < 10
+
+
 def _segments() -> tuple[SegmentGap, ...]:
     return tuple(
         SegmentGap("g", "g", k + 1, k, (k, k + 1.0), 1.0, 100.0, 0.5, False, 0.01, (0.0, 0.0)) for k in range(STRETCHES)
     )
+
+
+def test_pieces_of_an_interval_begin_together() -> None:
+    """Each interval in two pieces, the second of which says all: the beginning is that of the interval."""
+    whole = _segments()
+    pieces = tuple(one for one in whole for _ in range(2))
+    rng = np.random.default_rng(2)
+    gain = np.zeros(2 * STRETCHES)
+    gain[1::2] = rng.normal(-0.5, 0.5, STRETCHES)
+    gain[2 * 11 + 1 :: 2] += 6.0
+    found = onset(pieces, gain, 0)
+    assert found is not None
+    assert (found.order, found.interval) == (11, 12)
 
 
 def test_a_beginning_is_found_and_none_is_invented() -> None:

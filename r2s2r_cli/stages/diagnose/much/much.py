@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.diagnose.evidence import Evidence
 from r2s2r_cli.stages.diagnose.much.blackbox import corrected
-from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, share_with_interval
+from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, foretold, share_with_interval
 from r2s2r_cli.stages.diagnose.starts import Starts
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
-from r2s2r_cli.stages.diagnose.which.score import Score
+from r2s2r_cli.stages.diagnose.which.score import Score, groups_of
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch, stretches
 from r2s2r_cli.stages.diagnose.which.which import Compared
+from r2s2r_cli.stages.identify.data import Selection
 
 Told = Callable[[str, int, int], None]
 
@@ -23,7 +24,8 @@ Told = Callable[[str, int, int], None]
 def much(
     evidence: Evidence, compared: Compared, *, floor_m: float, starts: Starts, seed: int = 0, told: Told
 ) -> Shrinkage | None:
-    """Of the effect that was named, else of the best one; None where nothing was fitted.
+    """Of the effect that was named, else, where names remain, of the best one; without a gap, or a name for it, of the
+    refit model and the black box alone. None where no effect was fitted.
 
     Start states of the judged intervals are causal and each model's own: a filter over the run with its numbers.
     Raises NumericalError where the refit model cannot be simulated.
@@ -32,23 +34,28 @@ def much(
     refit = compared.refit
     if fit is None or score is None:
         return None
-    runs = [one.run for one in compared.arena.whole]
-    predicted, spread = share_with_interval(refit.squared, score.squared, floor_m, groups=runs, seed=seed)
+    named = compared.which.verdict not in ("no_gap", "unknown")
     arena = compared.arena
     solver = Fits(arena)
+    predicted, spread = (None, None)
+    if named:
+        told("left out", 0, 1)
+        predicted, spread = _predicted(evidence, compared, fit, score, floor_m=floor_m, starts=starts, seed=seed)
+        told("left out", 1, 1)
     none = np.concatenate([arena.model.values0[arena.engine], np.zeros(len(arena.names) - len(arena.engine))])
     models = {
         "nominal": (solver.values(compared.base.hypothesis, none[None], np.zeros((1, 0))), none),
         "refit": (solver.values(compared.base.hypothesis, compared.base.z[None], np.zeros((1, 0))), compared.base.z),
-        "effect": (solver.values(fit.hypothesis, fit.z[None], fit.x[None]), fit.z),
     }
+    if named:
+        models["effect"] = (solver.values(fit.hypothesis, fit.z[None], fit.x[None]), fit.z)
     squared: dict[str, np.ndarray] = {}
     missing: list[str] = []
     names: tuple[str, ...] = ()
     for done, (name, (values, z)) in enumerate(models.items()):
         told("judged", done, len(models))
         try:
-            errors, judged = _judged(evidence, arena, values[0], z, starts)
+            errors, judged = _errors(evidence, evidence.judge, arena, values[0], z, starts)
         except NumericalError as error:
             missing.append(f"{name}: {error.what}")
             continue
@@ -64,8 +71,8 @@ def much(
             squared["refit"], squared["effect"], floor_m, groups=[name.rpartition(":")[0] for name in names], seed=seed
         )
     return Shrinkage(
-        effects=fit.hypothesis.effects, names=names, squared=squared, floor=floor_m, share=share, ci90=ci90,
-        predicted=predicted, predicted_ci90=spread, within_run=evidence.within_run, missing=tuple(missing),
+        effects=fit.hypothesis.effects if named else (), names=names, squared=squared, floor=floor_m, share=share,
+        ci90=ci90, predicted=predicted, predicted_ci90=spread, within_run=evidence.within_run, missing=tuple(missing),
     )  # fmt: skip
 
 
@@ -80,14 +87,51 @@ def _chosen(compared: Compared) -> tuple[Fit | None, Score | None]:
     return (compared.fits[0], compared.scores[0]) if compared.fits else (None, None)
 
 
-def _judged(
-    evidence: Evidence, arena: Arena, values: np.ndarray, z: np.ndarray, starts: Starts
+def _predicted(
+    evidence: Evidence, compared: Compared, fit: Fit, score: Score, *, floor_m: float, starts: Starts, seed: int
+) -> tuple[float | None, tuple[float, float] | None]:
+    """Own share that the judged intervals will have, and its interval: fitted ones are measured as those will be, from
+    causal starts, with numbers that were fitted without their gait."""
+    arena = compared.arena
+    solver = Fits(arena)
+    groups = groups_of(arena)
+    p = len(fit.z)
+    models = ((compared.base, compared.refit), (fit, score))
+    squared: list[list[np.ndarray]] = [[], []]
+    runs: list[str] = []
+    for number, group in enumerate(np.unique(groups)):
+        own = {(one.run, one.interval) for one, g in zip(arena.many, groups, strict=True) if g == group}
+        part = tuple(
+            Selection(name, tuple(sorted(k for run, k in own if run == name)))
+            for name in dict.fromkeys(one.run for one in arena.many) if any(run == name for run, _ in own)
+        )  # fmt: skip
+        try:
+            found = []
+            for model, scored in models:
+                at = scored.without[number]
+                values = solver.values(model.hypothesis, at[None, :p], at[None, p:])[0]
+                found.append(_errors(evidence, part, arena, values, at[:p], starts))
+        except NumericalError:
+            continue  # one model fell to pieces there: nothing to compare
+        for kept, (errors, _) in zip(squared, found, strict=True):
+            kept.append(np.sum(errors**2, axis=-1).mean(axis=-1))
+        runs += [one.run for one in found[0][1]]
+    if not runs:
+        return None, None
+    count = sum(len(one.intervals) for one in evidence.judge)
+    before, after = (np.concatenate(own) for own in squared)
+    return foretold(before, after, floor_m, groups=runs, count=count, seed=seed)
+
+
+def _errors(
+    evidence: Evidence, part: Sequence[Selection], arena: Arena, values: np.ndarray, z: np.ndarray, starts: Starts
 ) -> tuple[np.ndarray, tuple[Stretch, ...]]:
-    """Errors (segment, cap, 3) [m] at the key frames of the judged intervals, and the intervals."""
-    runs = evidence.only(evidence.judge)
-    last = {one.run: max(one.intervals) for one in evidence.judge}
+    """Errors (segment, cap, 3) [m] at the key frames of the intervals of a part of the split, from causal starts, and
+    the intervals. Raises NumericalError where none can be simulated."""
+    runs = evidence.only(tuple(part))
+    last = {one.run: max(one.intervals) for one in part}
     states = starts.at(runs, arena.replayer, values, last)
-    many = stretches(runs, evidence.judge, states, whole=True)
+    many = stretches(runs, part, states, whole=True)
     if not many:
         raise NumericalError("no judged interval can be simulated", where="judge", expected="an interval",
                              received="none", hint="r2s2r identify --test RUN:8-11")  # fmt: skip

@@ -19,9 +19,10 @@ class Shrinkage:
 
     names: of the judged segments, `RUN:3`; squared: by model (nominal, refit, effect, ceiling), mean squared 3-D
     distance of the caps (segment,) [m^2]. effects: whose effect it is, best guess where nothing was committed to.
-    share: own share of the effect, None at the floor; ci90 by bootstrap over segments; predicted: the same from
-    intervals that were left out of the fit, before the judged ones were looked at, with its interval. within_run:
-    judged segments share their run with fitted ones.
+    share: own share of the effect, None at the floor; ci90 by bootstrap over segments; predicted: what it will be, from
+    the same measure on fitted intervals, each with numbers fitted without its gait, before the judged ones were looked
+    at; predicted_ci90: where as many intervals as are judged will have it. within_run: judged segments share their run
+    with fitted ones.
     """
 
     effects: tuple[str, ...]
@@ -81,6 +82,34 @@ def share_with_interval(
         return value, None
     low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     return value, (float(low), float(high))
+
+
+def foretold(
+    before: np.ndarray, after: np.ndarray, floor: float, *, groups: Sequence[str], count: int, seed: int = 0
+) -> tuple[float | None, tuple[float, float] | None]:
+    """Own share that `count` further segments will have, from squared errors (segment,) of others that were left out:
+    median and 90 % interval over draws of so many, runs (`groups`) first. A fall makes a share of few segments whatever
+    it likes, so the ratio of all that were seen is no forecast. None where most draws are at the floor."""
+    known = np.isfinite(before) & np.isfinite(after)
+    if not known.any() or count < 1:
+        return None, None
+    names = [g for g, keep in zip(groups, known, strict=True) if keep]
+    order = np.argsort([names.index(name) for name in names], kind="stable")
+    before, after = before[known][order], after[known][order]
+    _, first, own, size = np.unique(
+        [names.index(names[i]) for i in order], return_index=True, return_inverse=True, return_counts=True
+    )
+    rng = np.random.default_rng(seed)
+    # Runs in an order of their own in every draw, each with as many places as it has segments, until all are taken.
+    turn = rng.permuted(np.tile(np.arange(len(size)), (DRAWS // 4, 1)), axis=1)
+    run = own[np.argsort(turn[:, own], axis=1, kind="stable")][:, np.arange(count) % len(own)]
+    rows = first[run] + (rng.random(run.shape) * size[run]).astype(int)
+    G, H = (np.sqrt(np.maximum(one[rows].mean(axis=1) - floor**2, 0.0)) for one in (before, after))
+    above = (floor / 2 <= G) & (G > 0)
+    if above.mean() < 0.5:
+        return None, None
+    low, middle, high = np.quantile(1.0 - H[above] / G[above], [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2])
+    return float(middle), (float(low), float(high))
 
 
 def _rows(rng: np.random.Generator, runs: Sequence[np.ndarray], count: int) -> np.ndarray:

@@ -10,8 +10,8 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.parity.finding import Element
 from r2s2r_cli.stages.diagnose.where.probes import KINDS, WINCHED_N, ProbeModel
-from r2s2r_cli.stages.diagnose.where.student import weight
 from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.mixture import weight
 from r2s2r_cli.stages.identify.predict import Predictor
 
 if TYPE_CHECKING:
@@ -43,13 +43,15 @@ class Column:
 
 @dataclass(frozen=True)
 class Design:
-    """Products of whitened columns of every stretch. gram: (stretch, q + P + 1, q + P + 1): q nuisances, P probes over
-    their scales, then the innovations themselves (observed less simulated). columns: of the probes. size: data of each
-    stretch; gait: number of its gait; known: how well the refit knows the nuisances, their precision (q, q).
-    caps: simulated, of every stretch (F, cap, 3) [m]; innovation: whitened cap residuals, (F, cap, 3).
+    """Products of whitened columns of every stretch. gram: (stretch, kind, q + P + 1, q + P + 1), white under each kind
+    of error: q nuisances, P probes over their scales, then the innovations themselves (observed less simulated).
+    logdet: of the covariance, (stretch, kind). columns: of the probes. size: data of each stretch; gait: number of its
+    gait; known: how well the refit knows the nuisances, their precision (q, q). caps: simulated, of every stretch
+    (F, cap, 3) [m]; innovation: cap residuals, white as the floor says, (F, cap, 3).
     """
 
     gram: np.ndarray
+    logdet: np.ndarray
     columns: tuple[Column, ...]
     size: np.ndarray
     gait: np.ndarray
@@ -83,7 +85,8 @@ def design(
     columns = _columns(model, arena)
     scale = np.array([one.scale for one in columns])
     spread = 1.0 / np.sqrt(np.diag(arena.precision))
-    grams, caps, innovations = [], [], []
+    grams: list[list[np.ndarray]] = []
+    caps, innovations = [], []
     for k, one in enumerate(arena.many):
         rows = seen.window == k
         own = seen.p_WE[rows]
@@ -91,21 +94,27 @@ def design(
         by = np.concatenate([seen.by_value[rows], later[rows][..., None], _observed(own, one.t)], axis=-1)
         whole = np.concatenate([_channels(arena, own, by), _sensing(arena, len(own))], axis=0)
         white = arena.white[k]
-        probes = _bounded(white.white(whole) * scale[:, None], white.size)
-        timing = white.white(_timing(arena, own, later[rows]))
-        nuisances = _bounded(arena.by_nuisance[white.rows].T * spread[:, None], white.size) / spread[:, None]
-        joined = np.concatenate([nuisances, timing, probes, -residual[None, white.rows]], axis=0)
-        grams.append(joined @ joined.T)
+        probes, timing = whole * scale[:, None, None], _timing(arena, own, later[rows])
+        reach = _reach(white.white(probes), white.size)
+        probes = np.where((reach > 0)[:, None, None], probes, 0.0) * reach[:, None, None]
+        held = _reach(arena.by_nuisance[white.rows].T * spread[:, None], white.size)
+        grams.append([])
+        for kind in white.kinds:
+            nuisances = np.nan_to_num(arena.by_nuisance[kind.rows].T) * held[:, None]
+            joined = np.concatenate(
+                [nuisances, kind.white(timing), kind.white(probes), -residual[None, kind.rows]], axis=0
+            )
+            grams[-1].append(joined @ joined.T)
         count = own.shape[1] * 3
         innovation = -residual[white.rows].reshape(-1, len(own))[:count]
         innovations.append(innovation.reshape(own.shape[1], 3, len(own)).transpose(2, 0, 1))
     gram, q = np.array(grams), len(z) + len(TIMING)
-    w = weight(gram[:, -1, -1], arena.sizes)
+    w = weight(gram[..., -1, -1], arena.logdets, arena.sizes)
     # Not from their prior anew: half of the gaits may leave one of them open, far beyond where derivatives hold.
     known = np.zeros((q, q))
-    known[: len(z), : len(z)] = _levelled(arena) + np.einsum("s,sij->ij", w, gram[:, : len(z), : len(z)])
+    known[: len(z), : len(z)] = _levelled(arena) + np.einsum("sc,scij->ij", w, gram[..., : len(z), : len(z)])
     known[range(len(z), q), range(len(z), q)] = [sd**-2.0 for sd in TIMING.values()]
-    return Design(gram, tuple(columns), arena.sizes, arena.gait, known, tuple(caps), tuple(innovations))
+    return Design(gram, arena.logdets, tuple(columns), arena.sizes, arena.gait, known, tuple(caps), tuple(innovations))
 
 
 def _timing(arena: Arena, caps: np.ndarray, later: np.ndarray) -> np.ndarray:
@@ -124,13 +133,12 @@ def _levelled(arena: Arena) -> np.ndarray:
     return precision
 
 
-def _bounded(probes: np.ndarray, size: int) -> np.ndarray:
-    """Probes (P, row) with those made smaller that move the caps by more than derivatives hold; 0 where nothing finite
-    came out: a robot about to tip over."""
-    finite = np.isfinite(probes).all(axis=1)
-    found = np.where(finite[:, None], probes, 0.0)
-    length = np.sqrt(np.sum(found**2, axis=1) / size)
-    return np.asarray(found * np.minimum(1.0, FARTHEST / np.maximum(length, 1e-12))[:, None])
+def _reach(white: np.ndarray, size: int) -> np.ndarray:
+    """Factors (P,) on columns (P, row) that make those smaller that move the caps by more than derivatives hold; 0
+    where nothing finite came out: a robot about to tip over."""
+    finite = np.isfinite(white).all(axis=1)
+    length = np.sqrt(np.sum(np.where(finite[:, None], white, 0.0) ** 2, axis=1) / size)
+    return np.asarray(np.where(finite, np.minimum(1.0, FARTHEST / np.maximum(length, 1e-12)), 0.0))
 
 
 def _columns(model: ProbeModel, arena: Arena) -> list[Column]:

@@ -1,23 +1,54 @@
-"""Whether the gap begins with an interval: what speaks for a probe before it and from it on."""
+"""Whether the gap begins with a target interval: what speaks for a cause before it and from it on."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
+from r2s2r_cli.stages.diagnose.evidence import Run
 from r2s2r_cli.stages.diagnose.where.found import Onset, SegmentGap
+from r2s2r_cli.stages.diagnose.where.place import TOUCHES_M
 
 DRAWS = 999
 LEVEL = 0.02
 QUIET = 0.3
 """Before the beginning the gap is at most this share of what it is afterwards."""
+SLIDES = 0.02
+"""[m/s] A cap that is slower stands: the floor under it says nothing."""
+SURE = 2.0
+"""Standard deviations of its smoothed speed by which it must be faster than standing still."""
 
 
-def onset(segments: tuple[SegmentGap, ...], gain: np.ndarray, seed: int) -> Onset | None:
+@dataclass(frozen=True)
+class Steps:
+    """Target intervals in the order of the evidence: one segment of each, and the log density that it gains by the
+    cause [nats], (interval,)."""
+
+    segments: tuple[SegmentGap, ...]
+    gain: np.ndarray
+
+
+def by_interval(segments: Sequence[SegmentGap], gain: np.ndarray) -> Steps:
+    """Gains of segments (segment,), which may be pieces of target intervals, summed over each interval."""
+    first: dict[int, SegmentGap] = {}
+    total: dict[int, float] = {}
+    for one, nats in zip(segments, gain, strict=True):
+        first.setdefault(one.order, one)
+        total[one.order] = total.get(one.order, 0.0) + float(nats)
+    orders = sorted(first)
+    return Steps(tuple(first[k] for k in orders), np.array([total[k] for k in orders]))
+
+
+def onset(segments: Sequence[SegmentGap], gain: np.ndarray, seed: int) -> Onset | None:
     """None where the gap is there from the first interval on, or nowhere, or no order of intervals is unusual.
 
-    gain: log density of every interval with the best probe over that without, (stretch,) [nats]. The interval is that
-    of the largest cumulative sum (Page 1954); the chance is that of one as large in intervals in another order.
+    gain: log density of every segment with the cause over that without, (segment,) [nats]. The interval is that of the
+    largest cumulative sum (Page 1954); the chance is that of one as large in intervals in another order.
     """
+    made = by_interval(segments, gain)
+    gain = made.gain
     if len(gain) < 4 or np.ptp(gain) == 0:
         return None
     steps = _steps(gain[None])[0]
@@ -28,8 +59,29 @@ def onset(segments: tuple[SegmentGap, ...], gain: np.ndarray, seed: int) -> Onse
     before, after = float(gain[:place].mean()), float(gain[place:].mean())
     if p > LEVEL or before > QUIET * after:
         return None
-    one = segments[place]
+    one = made.segments[place]
     return Onset(one.order, one.run, one.interval, (after - max(before, 0.0)) * (len(gain) - place), p)
+
+
+def reached(
+    runs: Sequence[Run], xy_m: tuple[float, float], within_m: float, cap_radius: np.ndarray, gain: float
+) -> Onset | None:
+    """The target interval in which a cap first slides over a place (x, y) on the floor [m]: what sits there begins with
+    it. within_m: of its middle; cap_radius (cap,) [m]; gain: what speaks for the place [nats]. None: none ever does."""
+    before = 0
+    for run in runs:
+        caps = run.caps
+        low = caps.p_WE[..., 2] - cap_radius < TOUCHES_M
+        near = np.linalg.norm(caps.p_WE[..., :2] - np.array(xy_m), axis=-1) < within_m
+        speed, sd = np.linalg.norm(caps.v_WE, axis=-1), np.sqrt(np.mean(caps.sd_v**2, axis=-1))
+        over = low & near & (speed > np.maximum(SLIDES, SURE * sd))
+        frames = np.flatnonzero(over.any(axis=1))
+        frames = frames[frames >= caps.intervals.first[0]]
+        if len(frames):
+            interval = int(np.searchsorted(caps.intervals.first, frames[0], side="right"))
+            return Onset(before + interval - 1, caps.name, interval, gain, 0.0)
+        before += len(caps.intervals)
+    return None
 
 
 def _steps(gain: np.ndarray) -> np.ndarray:

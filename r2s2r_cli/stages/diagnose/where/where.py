@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,18 +12,21 @@ from r2s2r_cli.stages.diagnose.evidence import Evidence
 from r2s2r_cli.stages.diagnose.parity.finding import MOST_NATS, Element, Parity, discoveries
 from r2s2r_cli.stages.diagnose.where.channels import ENOUGH_NATS, explained, fitted, gains, held_out, sizes
 from r2s2r_cli.stages.diagnose.where.columns import Design, design
-from r2s2r_cli.stages.diagnose.where.found import PlaceMap, ProbeGain, SegmentGap, Where
-from r2s2r_cli.stages.diagnose.where.onset import onset
+from r2s2r_cli.stages.diagnose.where.found import Onset, PlaceMap, ProbeGain, SegmentGap, Where
+from r2s2r_cli.stages.diagnose.where.onset import onset, reached
 from r2s2r_cli.stages.diagnose.where.place import place_map
 from r2s2r_cli.stages.diagnose.where.readings import readings
 from r2s2r_cli.stages.diagnose.which.arena import Arena
+
+if TYPE_CHECKING:
+    from r2s2r_cli.stages.diagnose.which.which import Compared
 
 CHANNELS = ("command", "motor", "cable", "mass", "contact", "world", "sensing", "observation")
 ALL = "all"
 """Name of the probe of all channels together: the free-form rival."""
 LEAST_GAIN = 20.0
-"""[nats] over all intervals, of probe and parity together: sets of the rig without an effect reach 19 (development
-bank, 16 sets)."""
+"""[nats] over all intervals, of probe and parity together: sets of the rig without an effect reached 19 (development
+bank, 16 sets, whole intervals)."""
 
 Told = Callable[[str, int, int], None]
 
@@ -34,12 +38,14 @@ def silent(part: str, done: int, total: int) -> None:
 def where(
     evidence: Evidence, arena: Arena, z: np.ndarray, *, level: float = 0.05, seed: int = 0,
     cache_dir: Path | None = None, threads: int = 2, told: Told = silent, found: Parity | None = None,
+    compared: Compared | None = None,
 ) -> Where:  # fmt: skip
     """Where the gap of the refit nominal model lies. arena: at the nuisances z (p + q,), prepared there.
 
     level: false discovery rate of the intervals that stand out. found: of the parity stage, which hears of sensing,
-    actuation and the camera what end caps do not show; its findings count for their channels. Raises NumericalError
-    where nothing can be simulated.
+    actuation and the camera what end caps do not show; its findings count for their channels. compared: of the effects;
+    where a name stands first, the gap begins where that name does, else where the best probe does. Raises
+    NumericalError where nothing can be simulated.
     """
     told("where", 0, 3)
     made = design(evidence.model, arena, z, cache_dir=cache_dir, threads=threads)
@@ -75,7 +81,7 @@ def where(
     told("where", 3, 3)
     return Where(
         segments=segments,
-        onset=None if best is None else onset(segments, by_channel[best.probe], seed),
+        onset=_onset(evidence, segments, None if best is None else by_channel[best.probe], compared, seed),
         readings=readings(arena, made, seed),
         probes=tuple(probes),
         channel=None if best is None else best.channel,
@@ -86,6 +92,27 @@ def where(
         t=np.concatenate([one.t for one in arena.many]),
         segment=np.concatenate([np.full(len(one.t), k) for k, one in enumerate(arena.many)]),
     )
+
+
+def _onset(
+    evidence: Evidence, segments: tuple[SegmentGap, ...], gain: np.ndarray | None, compared: Compared | None, seed: int
+) -> Onset | None:
+    """gain: of the best probe, (segment,) [nats]; None: no probe explains anything."""
+    which = None if compared is None else compared.which
+    best = None if which is None else which.best
+    if compared is None or which is None or best is None or which.verdict == "unknown":
+        return None if gain is None else onset(segments, gain, seed)
+    if which.verdict == "no_gap":
+        return None
+    mine = next((k for k, fit in enumerate(compared.fits) if fit.hypothesis.effects == (best.effect,)), None)
+    if mine is None:
+        return None  # what the logs alone show is there throughout
+    by_name = compared.scores[mine].elpd - compared.refit.elpd
+    radius = best.size.get("friction_field.patch_radius_m")
+    if best.element is not None and best.element.xy_m is not None and radius is not None:
+        caps = np.repeat([rod.cap_radius_m for rod in evidence.robot.rods], 2)
+        return reached(evidence.runs, best.element.xy_m, radius, caps, float(np.sum(by_name)))
+    return onset(segments, by_name, seed)
 
 
 def _groups(arena: Arena, made: Design) -> tuple[np.ndarray, list[str]]:
@@ -100,7 +127,7 @@ def _groups(arena: Arena, made: Design) -> tuple[np.ndarray, list[str]]:
 def _segments(evidence: Evidence, arena: Arena, made: Design, level: float) -> tuple[SegmentGap, ...]:
     from scipy.stats import chi2
 
-    square = made.gram[:, -1, -1]
+    square = made.gram[:, 0, -1, -1]
     p = chi2.sf(square, made.size)
     gap = discoveries(p, level)
     found = []

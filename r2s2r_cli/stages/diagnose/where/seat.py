@@ -1,0 +1,63 @@
+"""Where the cause sits, by both kinds of evidence: the names that compete for the gap, and the probes that have none.
+
+A name that is committed to says its own channel and element, so that a diagnosis does not contradict itself. Where
+several names remain, a channel is as probable as all its names together. Where none fits, the probes say. Both kinds
+stay in `Diagnosis.where` and the ranking as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from r2s2r_cli.stages.diagnose.parity.finding import Element
+from r2s2r_cli.stages.diagnose.where.found import Where
+from r2s2r_cli.stages.diagnose.which.found import Ranked, Which
+
+T = TypeVar("T", bound=Hashable)
+SAME_STRING = frozenset({"motor", "cable", "sensor"})
+"""Elements that share their numbers: motor and sensor i are those of cable i."""
+
+
+@dataclass(frozen=True)
+class Seat:
+    """channel: of the design; element: the part; None where there is no gap or nothing says."""
+
+    channel: str | None = None
+    element: Element | None = None
+
+
+def seat(which: Which, where: Where | None) -> Seat:
+    """Of a verdict and, where they were fitted, the probes."""
+    if which.verdict == "no_gap":
+        return Seat()
+    if which.verdict in ("effect", "pair"):
+        first = next((one for one in which.ranking if one.effect in which.effects), None)
+        return Seat() if first is None else Seat(first.channel, first.element)
+    names = [one for one in which.ranking if one.channel is not None]
+    if which.verdict == "unknown" and where is not None and where.channel is not None:
+        return Seat(where.channel, where.element)
+    channel = _likeliest((one.channel, one.probability) for one in names)
+    own = [one for one in names if one.channel == channel]
+    return Seat(channel, _element(own))
+
+
+def _element(names: list[Ranked]) -> Element | None:
+    """The one that the names of a channel speak for together, as far as they speak of one; of motor, cable and sensor
+    of one number that of the most probable name."""
+    told = [(_string(one.element), one.probability, one.element) for one in names if one.element is not None]
+    key = _likeliest((key, probability) for key, probability, _ in told)
+    return next((element for own, _, element in told if own == key), None)
+
+
+def _string(element: Element) -> tuple[object, ...]:
+    return ("string" if element.kind in SAME_STRING else element.kind, element.index)
+
+
+def _likeliest(weighed: Iterable[tuple[T, float]]) -> T | None:
+    """What has most of all weights; the first of equals."""
+    total: dict[T, float] = {}
+    for one, weight in weighed:
+        total[one] = total.get(one, 0.0) + weight
+    return max(total, key=lambda one: total[one], default=None)

@@ -1,0 +1,97 @@
+"""Where the cause sits: the committed name, the channel of most names, the probes; and where a cap reaches a place."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.stages.diagnose.parity.finding import Element
+from r2s2r_cli.stages.diagnose.where.onset import reached
+from r2s2r_cli.stages.diagnose.where.seat import Seat, seat
+from r2s2r_cli.stages.diagnose.which.found import Ranked
+
+RANKING = (
+    Ranked("tendon_relaxation", 18.0, 0.22, "cable"),
+    Ranked("cap_friction", 16.0, 0.21, "contact", Element("cap", 5)),
+    Ranked("friction_field", 15.0, 0.20, "contact"),
+    Ranked("sensor_gain", 9.0, 0.12, "sensing", Element("sensor", 3)),
+    Ranked("sensor_bias", 8.0, 0.13, "sensing", Element("sensor", 2)),
+    Ranked("none", 0.0, 0.12),
+)
+
+
+def _which(verdict: str, effects: tuple[str, ...] = ()) -> SimpleNamespace:
+    return SimpleNamespace(verdict=verdict, effects=effects, ranking=RANKING)
+
+
+WHERE = SimpleNamespace(channel="world", element=Element("rod", 1))
+
+
+@pytest.mark.parametrize(
+    ("verdict", "effects", "found"),
+    [
+        ("no_gap", (), Seat()),
+        ("effect", ("sensor_gain",), Seat("sensing", Element("sensor", 3))),
+        ("ambiguous", (), Seat("contact", Element("cap", 5))),
+        ("unknown", (), Seat("world", Element("rod", 1))),
+    ],
+)
+def test_the_seat_follows_what_was_concluded(verdict: str, effects: tuple[str, ...], found: Seat) -> None:
+    """A committed name has its own seat whatever the probes say; of several the channel whose names are most probable
+    together, not that of the first; without a name the probes'; without a gap nowhere."""
+    assert seat(_which(verdict, effects), WHERE) == found  # type: ignore[arg-type]
+
+
+def test_without_probes_the_names_say_where() -> None:
+    """An error without a name, and probes that explain nothing or were not fitted: the channel of the nearest names."""
+    silent = SimpleNamespace(channel=None, element=None)
+    for where in (None, silent):
+        assert seat(_which("unknown"), where).channel == "contact"  # type: ignore[arg-type]
+
+
+def test_motor_and_cable_of_one_number_speak_for_the_same_string() -> None:
+    """Motor 2 and cable 2 together outweigh cable 4, and the more probable of the two gives its kind."""
+    names = (
+        Ranked("a", 3.0, 0.4, "cable", Element("cable", 4)),
+        Ranked("b", 2.0, 0.3, "cable", Element("cable", 2)),
+        Ranked("c", 1.0, 0.25, "cable", Element("motor", 2)),
+    )
+    found = seat(SimpleNamespace(verdict="ambiguous", effects=(), ranking=names), None)  # type: ignore[arg-type]
+    assert found.element == Element("cable", 2)
+
+
+def _run(slides_at: int, *, speed: float) -> SimpleNamespace:
+    """40 frames in four intervals; one of two caps, both on the floor, is over (1, 0) from frame `slides_at` on."""
+    p, v = np.zeros((40, 2, 3)), np.zeros((40, 2, 3))
+    p[..., 2] = 0.02
+    p[slides_at:, 1, 0] = 1.0
+    v[slides_at:, 1, 0] = speed
+    caps = SimpleNamespace(name="g", p_WE=p, v_WE=v, sd_v=np.full_like(v, 1e-3), intervals=_Four(np.arange(0, 40, 10)))
+    return SimpleNamespace(caps=caps)
+
+
+class _Four:
+    """Four intervals of ten frames."""
+
+    def __init__(self, first: np.ndarray) -> None:
+        self.first = first
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+def test_a_place_begins_where_a_cap_first_slides_over_it() -> None:
+    """Never in the first run, in frame 25 of the second one: its third interval, the seventh of all. A cap that stands
+    there, or passes above it, has not reached it."""
+    runs = [_run(40, speed=0.1), _run(25, speed=0.1)]
+    at = {"xy_m": (1.05, 0.0), "within_m": 0.1, "cap_radius": np.array([0.02, 0.02]), "gain": 5.0}
+    found = reached(runs, **at)  # type: ignore[arg-type]
+    assert found is not None
+    assert (found.order, found.interval, found.run) == (6, 3, "g")
+    assert reached([_run(25, speed=0.0)], **at) is None  # type: ignore[arg-type]
+    high = _run(25, speed=0.1)
+    high.caps.p_WE[..., 2] = 0.1
+    assert reached([high], **at) is None  # type: ignore[arg-type]
+    assert reached(runs, **{**at, "within_m": 0.04}) is None  # type: ignore[arg-type]

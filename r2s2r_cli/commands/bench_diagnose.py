@@ -76,7 +76,9 @@ def diagnose(
         f"one diagnosis of {gaits} gaits, {robot_s:.0f} s of the robot, the whole catalogue ({machine})",
         ["part", "time"],
         [*([part, f"{s:.1f} s"] for part, s in seconds.items()), ["all", f"{wall:.1f} s"],
-         ["processor", f"{cpu:.1f} s"], ["first time, machine code compiled", f"{compiled:.1f} s"]],
+         ["processor", f"{cpu:.1f} s"],
+         ["rate", f"{found.rollouts / wall:.0f} simulated stretches a second ({found.rollouts})"],
+         ["first time, machine code compiled", f"{compiled:.1f} s"]],
     )  # fmt: skip
-    console.say(f"budget {BUDGET_S:g} s: " + ("kept" if wall <= BUDGET_S else "exceeded"))
-    console.say(f"verdict: {found.which.verdict} {' '.join(found.which.effects)}")
+    console.say(f"budget {BUDGET_S:g} s for 5 gaits on 2 cores: " + ("kept" if wall <= BUDGET_S else "exceeded"))
+    console.say(" ".join(["verdict:", found.which.verdict, *found.which.effects]))

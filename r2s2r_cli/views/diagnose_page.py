@@ -96,11 +96,13 @@ def _ranked(one: RankedName) -> list[str]:
 def _shrinkage(report: DiagnoseReport) -> PageTable:
     s = report.shrinkage
     assert s is not None  # noqa: S101
+    worse = s.ceiling is not None and s.refit is not None and s.ceiling > s.refit
+    learned = ", which learned nothing that holds here" if worse else ""
     rows = [
         ["as identified", _mm(s.nominal), ""],
         ["refit", _mm(s.refit), ""],
         [f"refit + {' + '.join(s.effects)}", _mm(s.refit_plus_effect), _share(s.own_share, s.ci90)],
-        ["refit + a black box", _mm(s.ceiling), ""],
+        ["refit + a black box" + learned, _mm(s.ceiling), ""],
         ["floor", _mm(s.floor), ""],
         ["predicted before it was looked at", "", _share(s.predicted, None)],
     ]
@@ -136,8 +138,8 @@ def _limits(report: DiagnoseReport) -> Iterator[list[str]]:
     else:
         one = report.next_gait
         told = "" if one.now is None else f", these runs by {one.now:.1f}"
-        how = f"r2s2r record {one.file}" if one.file else one.name
-        yield ["run next", f"{one.name}: separates the nearest candidates by {one.nats:.1f} nats{told}: {how}"]
+        how = f": r2s2r record {one.file}" if one.file else ""
+        yield ["run next", f"{one.name}: separates the nearest candidates by {one.nats:.1f} nats{told}{how}"]
 
 
 def _how(report: DiagnoseReport) -> Iterator[list[str]]:
@@ -152,7 +154,8 @@ def _how(report: DiagnoseReport) -> Iterator[list[str]]:
     yield ["probabilities", report.calibrated]
     for name, (value, sd) in report.refit.items():
         yield [f"refit: {name}", _number(value, sd, report.refit_units.get(name, ""))]
-    yield ["work", f"{report.rollouts} simulated intervals, {report.wall_s:.1f} s"
+    took = f", {report.wall_s:.1f} s" if report.wall_s else ""
+    yield ["work", f"{report.rollouts} simulated stretches{took}"
            + "".join(f"; {part} {seconds:.1f} s" for part, seconds in report.seconds.items())]  # fmt: skip
 
 

@@ -204,7 +204,8 @@ def _shifts(m: Material, fit: Fit) -> tuple[Shift, ...]:
         if abs(beside - refit) > SHIFTED * sd:
             number = m.arena.model.numbers[m.arena.engine[k]]
             if number.kind == "factor":
-                told = f"{100 * np.expm1(refit):+.0f} % without the effect, {100 * np.expm1(beside):+.0f} % beside it"
+                alone, both = (round(100 * np.expm1(one)) for one in (refit, beside))
+                told = f"{alone:+d} % without the effect, {both:+d} % beside it"
             else:
                 told = f"{refit:.3g} {number.unit} without the effect, {beside:.3g} {number.unit} beside it"
             words = f"refitting had been hiding {fit.hypothesis.effects[0]} in {number.what}: {told}"

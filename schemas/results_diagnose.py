@@ -49,7 +49,9 @@ class WhereFound(Frozen):
     segments: tuple[str, ...]
     """Target intervals that stand out, RUN:N."""
     onset_segment: int | None
-    """The gap begins with it, counted from 1 through the fitted intervals; None: it does not begin anywhere."""
+    """The gap begins with it, counted from 1 through all intervals of all runs; None: no beginning stands out."""
+    onset: str | None = None
+    """The same as RUN:N."""
     channel: str | None
     element: ElementFound | None
 

@@ -118,7 +118,7 @@ def _where(report: DiagnoseReport) -> Iterator[list[str]]:
     yield ["intervals with a gap", ", ".join(where.segments) or "none stands out"]
     yield [
         "begins with",
-        "no beginning stands out" if where.onset_segment is None else f"fitted interval {where.onset_segment}",
+        "no beginning stands out" if where.onset_segment is None else where.onset or f"interval {where.onset_segment}",
     ]
     yield ["channel", where.channel or "-"]
     yield ["element", element_words(where.element) or "-"]

@@ -58,9 +58,11 @@ def document(found: Diagnosis) -> dict[str, Any]:
 
 def _where(found: Diagnosis) -> WhereFound:
     element = found.seat.element
-    onset = None if found.where is None or found.where.onset is None else found.where.onset.order + 1
+    onset = None if found.where is None else found.where.onset
     return WhereFound(
-        segments=tuple(f"{one.run}:{one.interval}" for one in found.segments if one.gap), onset_segment=onset,
+        segments=tuple(f"{one.run}:{one.interval}" for one in found.segments if one.gap),
+        onset_segment=None if onset is None else onset.order + 1,
+        onset=None if onset is None else f"{onset.run}:{onset.interval}",
         channel=found.channel, element=None if element is None else _element(element),
     )  # fmt: skip
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from r2s2r_cli.views.page import Page, PageTable, Picture, render
 
 if TYPE_CHECKING:
-    from schemas.results_diagnose import DiagnoseReport, ElementFound, RankedName
+    from schemas.results_diagnose import DiagnoseReport, ElementFound, NextGaitFound, RankedName
 
 INDISTINCT = 3.0
 """[nats] Below, two effects cannot be told apart."""
@@ -136,10 +136,19 @@ def _limits(report: DiagnoseReport) -> Iterator[list[str]]:
     if report.next_gait is None:
         yield ["run next", "nothing: no gait of the library would decide more"]
     else:
-        one = report.next_gait
-        told = "" if one.now is None else f", these runs by {one.now:.1f}"
-        how = f": r2s2r record {one.file}" if one.file else ""
-        yield ["run next", f"{one.name}: separates the nearest candidates by {one.nats:.1f} nats{told}{how}"]
+        yield ["run next", _next(report.next_gait)]
+
+
+def _next(one: NextGaitFound) -> str:
+    """What to run, and what it is worth beside the runs so far: whole simulated runs, in which a tip-over counts in
+    full, so that the ratio says more than the nats."""
+    how = f": r2s2r record {one.file}" if one.file else ""
+    if one.now is None or one.now <= 0:
+        return f"{one.name}, which sets the nearest candidates {one.nats:.3g} nats apart as a whole run{how}"
+    if one.nats <= one.now:
+        return f"nothing separates the candidates better than these runs; the best of the library is {one.name}{how}"
+    times = one.nats / one.now
+    return f"{one.name}: simulated as a whole run, it separates the nearest candidates {times:.2g} times as well{how}"
 
 
 def _how(report: DiagnoseReport) -> Iterator[list[str]]:

@@ -9,6 +9,7 @@ from r2s2r_cli.views.diagnose_page import diagnose_page, diagnose_tables
 from schemas.results_diagnose import (
     DiagnoseReport,
     ElementFound,
+    NextGaitFound,
     RankedName,
     ShrinkageFound,
     WhereFound,
@@ -69,6 +70,22 @@ def test_rivals_and_numbers_say_what_they_are() -> None:
     assert "31.0 +- 4.0" in text and "none |  | 0.0 | 0.10" in text and "counts with what chance gains" in text
     assert "refit: friction | +10.5 % +- 2.2 % of the identified value" in text
     assert "refit: motor_lag.tau_s | +0.03 +- 0.004 s" in text
+
+
+@pytest.mark.parametrize(
+    ("nats", "now", "words"),
+    [
+        (300.0, 20.0, "ramps: simulated as a whole run, it separates the nearest candidates 15 times as well"),
+        (20.0, 30.0, "nothing separates the candidates better than these runs; the best of the library is ramps"),
+        (20.0, None, "ramps, which sets the nearest candidates 20 nats apart as a whole run"),
+    ],
+)
+def test_what_to_run_next_is_said_beside_what_was_run(nats: float, now: float | None, words: str) -> None:
+    """With the command; a gait that is worth less than the runs so far is not praised."""
+    one = NextGaitFound(name="ramps", file="70-diagnose-next.toml", targets=((1.0,),), nats=nats, now=now)
+    made = report().model_copy(update={"next_gait": one})
+    rows = [row for table in diagnose_tables(made) for row in table.rows if row[0] == "run next"]
+    assert rows == [["run next", f"{words}: r2s2r record 70-diagnose-next.toml"]]
 
 
 @pytest.mark.parametrize(

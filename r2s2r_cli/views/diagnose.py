@@ -21,6 +21,8 @@ GUILTY = "#d55e00"
 PLAIN = "#8792a2"
 NINETY = 1.645
 """Sd to either side of a 90 % interval."""
+LABELS = 60
+"""Letters that fit below an axis side by side."""
 BEFORE, AFTER, STALE, BLACK_BOX = "#0072b2", "#009e73", "#b8bec8", "#cc79a7"
 
 
@@ -56,12 +58,13 @@ def _gap(data: ArtifactData, report: DiagnoseReport) -> bytes:
                 middle, 1e3 * rows["effect"][at], "s--", color=AFTER, label=f"refit + {_best(report)}", lw=1.2, ms=4
             )
         own.axhline(1e3 * report.floor_m, color="#111111", lw=1, ls=":", label="floor")
-        own.set(xlabel=f"{run.decode()}, time [s]", ylim=(0, None))
+        own.set_xlabel(f"time [s]\n{run.decode()}", fontsize=8)
         own.tick_params(labelsize=8)
         if k == 0:
             own.set_ylabel("cap error at the end\nof an interval [mm]")
     from matplotlib.patches import Patch
 
+    axes[0].set_ylim(bottom=0.0)  # of all panels, once every one of them is drawn
     handles, labels = axes[0].get_legend_handles_labels()
     if rows["gap"].any():
         handles.append(Patch(color=GUILTY, alpha=0.14))
@@ -187,7 +190,7 @@ def _judged(data: ArtifactData, report: DiagnoseReport) -> bytes:
             all_.bar(k, float(np.sqrt(np.nanmean(values**2))), 0.7, color=color)
     for axes in (each, all_):
         axes.axhline(1e3 * report.floor_m, color="#111111", lw=1, ls=":", label="floor")
-    turned = len(names) > 6
+    turned = sum(map(len, names)) > LABELS
     each.set_xticks(
         range(len(names)), names, rotation=45 if turned else 0, ha="right" if turned else "center", fontsize=8
     )

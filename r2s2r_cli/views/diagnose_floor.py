@@ -43,7 +43,8 @@ def floor_picture(data: ArtifactData, report: DiagnoseReport) -> bytes:
     if element is not None and element.xy_m is not None:
         axes.plot(*element.xy_m, "x", ms=16, mew=3, color=GUILTY)
         what = "guilty place" if report.verdict in ("effect", "pair") else "most suspect place"
-        axes.annotate(what, element.xy_m, xytext=(10, 10), textcoords="offset points", color=GUILTY)
+        axes.annotate(what, element.xy_m, xytext=(10, 10), textcoords="offset points", color=GUILTY,
+                      bbox={"boxstyle": "round", "fc": "white", "ec": "none", "alpha": 0.8}, zorder=6)  # fmt: skip
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="x [m]", ylabel="y [m]",
              title="dots: caps at the ends of intervals; arrows: how much farther\n"

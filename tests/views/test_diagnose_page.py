@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
-from r2s2r_cli.views.diagnose import guilt
+from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.views.diagnose import draw_diagnosis, guilt
 from r2s2r_cli.views.diagnose_page import diagnose_page, diagnose_tables
 from schemas.results_diagnose import (
     DiagnoseReport,
@@ -105,3 +108,24 @@ def test_the_robot_is_blamed_as_surely_as_the_verdict(
     """A part is guilty only where the verdict commits to it; without one, what is known is said."""
     where = WhereFound(segments=(), onset_segment=None, channel=channel, element=element)
     assert guilt(report().model_copy(update={"verdict": verdict, "where": where})) == words
+
+
+def test_no_error_lies_outside_of_its_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Panels share an axis of errors: the largest of the last run is seen as well, and 0 is its lower end."""
+    figures: list[Figure] = []
+
+    def kept(figure: Figure) -> bytes:
+        figures.append(figure)
+        return b""
+
+    monkeypatch.setattr("r2s2r_cli.views.diagnose.png_bytes", kept)
+    refit = np.array([0.002, 0.003, 0.1, 0.004])
+    segments = Group({
+        "run": np.array([b"a", b"a", b"b", b"b"]), "interval": np.array([1, 2, 1, 2]), "gap": refit > 0.05,
+        "t": np.array([[0.0, 1.0], [1.0, 2.0], [0.0, 1.0], [1.0, 2.0]]), "refit": refit, "effect": refit / 2,
+    })  # fmt: skip
+    name, _, _ = next(draw_diagnosis(ArtifactData("diagnosis", {"segments": segments}), report()))
+    assert name == "gap"
+    for axes in figures[0].axes:
+        low, high = axes.get_ylim()
+        assert low == 0.0 and high > 100.0

@@ -16,8 +16,13 @@ from r2s2r_cli.effects.known import GROUP, loaded
 from r2s2r_cli.effects.words import page
 from r2s2r_cli.engine.errors import EngineInputError
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.effects import all_effects
+from r2s2r_cli.stages.identified import nominal
+from r2s2r_cli.stages.identify.effects_asked import effects_asked
 from r2s2r_cli.stages.identify.free.catalogue import catalogue
+from r2s2r_cli.stages.identify.free.mapping import Mapping
+from r2s2r_cli.stages.identify.free.select import select
 from tests.support.engine import MASS, G, free_rods, parameters, roll, state, threebar, vector
 
 GUIDE = Path(__file__).parents[2] / "docs" / "how-to-extend.md"
@@ -50,11 +55,17 @@ def example() -> str:
 
 
 def test_the_guides_example_is_an_effect_like_any_other(install: Install) -> None:
-    """It is found, free like the others, explained, and does what it says: F / m on every rod; off it is nothing."""
+    """It is found, free like the others with and without `--with-effect`, diagnosed, explained, and does what it says:
+    F / m on every rod; off it is nothing."""
     install(example(), "side_wind = wind_of_the_guide:SideWind")
     effect = known_effects()[-1]
     assert effect.name == "side_wind"
     assert "side_wind.force_n" in catalogue(threebar())
+    asked = effects_asked(["side_wind"], threebar())
+    fitted = Mapping(threebar(), select(asked.specs, threebar(), asked.ids), asked.ids)
+    assert fitted.names == ("side_wind.force_n",)
+    assert [one.name for one in fitted.structure.effects] == ["side_wind"]
+    assert "side_wind" in {one.name for one in Model(nominal(threebar())).effects}
     assert "- *Source*: statics." in page([effect])
     structure = free_rods(2, rod_contact=False).with_effects(effect)
     start = state(structure, torch.stack([vector(0.0, 0.0, 1.0), vector(0.0, 1.0, 1.0)]))

@@ -13,7 +13,7 @@ from r2s2r_cli.commands.bench_identify_case import BOUNDS, NOISE_M, NUMBERS, OFF
 from r2s2r_cli.commands.bench_identify_mujoco import SysidSide
 from r2s2r_cli.commands.bench_identify_ours import PHASE, OurSide, predictor_of
 from r2s2r_cli.commands.bench_identify_tally import judged, share, summed_up
-from r2s2r_cli.stages.identify.rounds import problem_of
+from r2s2r_cli.stages.identify.growing import problem_of
 from r2s2r_cli.stages.identify.solve.population import HELD
 from tests.commands.conftest import document, invoke
 from tests.support.rig_robots import known

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from r2s2r_cli.errors import NumericalError
-from r2s2r_cli.stages.identify.rounds import Near, near_fit
+from r2s2r_cli.stages.identify.near import Near, near_fit
 from r2s2r_cli.stages.identify.task import Task, free_parameters
 from r2s2r_cli.stages.identify.training import training_windows
 from schemas.identification import FIXED_BY_HAND

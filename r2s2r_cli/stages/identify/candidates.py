@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -137,7 +138,9 @@ def _caps(
     share = (at - low)[None, :, None]
     states = flat[:, low] * (1 - share) + flat[:, low + 1] * share
     k, frames = states.shape[:2]
-    theta = effective(structure, own).map(lambda x: x.expand(k, *x.shape[1:]).repeat_interleave(frames, dim=0))
+    theta = effective(structure, own)
+    # On their rods: all of the parameters that end caps are read off.
+    theta = replace(theta, p_BE=theta.p_BE.expand(k, -1, -1, -1).repeat_interleave(frames, dim=0))
     caps = end_caps(theta, unpack_state(structure, states.flatten(0, 1))).unflatten(0, (k, frames))
     seen = observe(structure, own, torch.as_tensor(window.run.t[window.frames]), caps).numpy().copy()
     seen[..., 2] += up[:, None, None]

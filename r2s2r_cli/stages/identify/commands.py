@@ -27,21 +27,22 @@ class CommandLog:
         """Commands in force at times t (n,) [s], (n, actuated)."""
         return np.asarray(self._control[np.searchsorted(self._knots, t, side="right")])
 
-    def rows(self, start: float, count: int, *, step: float, delay: float) -> tuple[np.ndarray, np.ndarray]:
-        """`count` commands of `step` seconds from `start` [s], (row, actuated), and their derivatives by the delay.
-
-        A row is the mean of the delayed command over its step: so the derivative exists where a switch falls into it.
-        """
-        edges = start + step * np.arange(count + 1) - delay
-        return self.means(start, count, step=step, delay=delay), -np.diff(self.at(edges), axis=0) / step
-
     def means(self, start: float, count: int, *, step: float, delay: float) -> np.ndarray:
-        """The commands of `rows` without their derivatives."""
+        """`count` commands of `step` seconds from `start` [s], (row, actuated).
+
+        Each is the mean of the delayed command over its step: so the derivative by the delay exists where a switch
+        falls into it.
+        """
         edges = start + step * np.arange(count + 1) - delay
         return np.asarray(np.diff(self._integral(edges), axis=0) / step)
 
+    def by_delay(self, start: float, count: int, *, step: float, delay: float) -> np.ndarray:
+        """Derivatives of the same commands by the delay, (row, actuated) [1/s]."""
+        edges = start + step * np.arange(count + 1) - delay
+        return np.asarray(-np.diff(self.at(edges), axis=0) / step)
+
     def all_means(self, start: float, count: int, *, step: float, delays: np.ndarray) -> np.ndarray:
-        """The same for several delays (d,) [s], (d, row, actuated)."""
+        """The commands for several delays (d,) [s], (d, row, actuated)."""
         edges = start + step * np.arange(count + 1) - delays[:, None]
         wound = self._integral(edges.ravel()).reshape(*edges.shape, -1)
         return np.asarray(np.diff(wound, axis=1) / step)
@@ -49,6 +50,6 @@ class CommandLog:
     def _integral(self, t: np.ndarray) -> np.ndarray:
         """Integral of the commands from the first row to t (n,) [s], (n, actuated)."""
         row = np.searchsorted(self._knots, t, side="right")
-        since = t - self._knots[np.maximum(row - 1, 0)]
-        before = np.where(row > 0, since, 0.0)[:, None]
-        return np.asarray(self._wound[np.maximum(row - 1, 0)] + before * self._control[row])
+        last = np.maximum(row - 1, 0)
+        before = np.where(row > 0, t - self._knots[last], 0.0)[:, None]
+        return np.asarray(self._wound[last] + before * self._control[row])

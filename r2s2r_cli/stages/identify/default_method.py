@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from r2s2r_cli.stages.identify.alike import as_the_others
 from r2s2r_cli.stages.identify.conclude import Fitted, concluded, known_before, start_found
 from r2s2r_cli.stages.identify.fit import fit
 from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep
@@ -31,6 +32,9 @@ def find_default(task: Task) -> Found:
     """Fit and judge. Raises as `identify`."""
     frees = free_parameters(task.robot, task.runs, task.request, task.settings)
     predictor = task.predictor(frees)
+    if task.near is not None:
+        predictor = task.near.predictor  # it holds machine code and start states already
+        predictor.rollouts = 0
     task, before = holding(task, predictor)
     kept = Kept(task.checkpoint)
     fitted = first_fit(task, predictor, kept)
@@ -60,7 +64,7 @@ def loss_words(task: Task) -> str:
 
 def first_fit(task: Task, predictor: Predictor, kept: Kept) -> Fit:
     """The fit from the starts of the parameters, with its trace, its progress and its checkpoints; or the rest of it,
-    from where `kept` was left. Raises as `fit`."""
+    from where `kept` was left. Winches that it could not show are as the others. Raises as `fit`."""
 
     def told(number: int, rounds: int, one: SolverProgress) -> None:
         kept.steps.append(TraceStep(0, f"round {number + 1}, {one.stage_name}", one.iteration, one.cost))
@@ -76,10 +80,11 @@ def first_fit(task: Task, predictor: Predictor, kept: Kept) -> Fit:
         solver = None if saved["solver"] is None else SolverCheckpoint.from_dict(saved["solver"])
         resume = saved["round"], np.array(saved["values"]), solver
         predictor.rollouts = saved["rollouts"]
-    return fit(
+    found = fit(
         task.runs, task.request.train, predictor, task.recipe, seed=task.request.seed, progress=told, checkpoint=hold,
         resume=resume, near=None if task.held else task.near,  # with numbers held it was another fit
     )  # fmt: skip
+    return as_the_others(found)
 
 
 def _other_starts(task: Task, fitted: Fit) -> tuple[tuple[StartFound, ...], np.ndarray]:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.stages.identify.data import RunData, Selection
+from r2s2r_cli.stages.identify.near import Near
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
-from r2s2r_cli.stages.identify.rounds import Fit, Near, first_round, later_round
+from r2s2r_cli.stages.identify.rounds import Fit, first_round, later_round
 from r2s2r_cli.stages.identify.solve.record import Checkpoint, Progress
 from r2s2r_cli.stages.identify.training import filtered_windows, training_windows
 

@@ -64,10 +64,29 @@ def displaced(structure: Structure, s: Tensor, offsets: Tensor) -> Tensor:
 
 
 def displacement_jacobian(structure: Structure, s: Tensor, offsets: Tensor) -> Tensor:
-    """D displaced / d offsets, (B, NS, offset)."""
-    from torch.func import jacfwd, vmap
+    """D displaced / d offsets, (B, NS, offset).
 
-    def one(s: Tensor, n: Tensor) -> Tensor:
-        return displaced(structure, s[None], n[None])[0]
+    A turn moves the quaternion of its own rod; every other offset is added to one number of the state.
+    """
+    import roma
+    import torch
+    from torch.func import jvp
 
-    return vmap(jacfwd(one, argnums=1))(s, offsets)
+    from r2s2r_cli.engine.flat import state_slots
+
+    slots, rods = state_slots(structure), structure.n_rods
+    found = s.new_zeros(len(s), s.shape[1], offsets.shape[1])
+    starts = {"p_WB": 0, "v_WB": 6 * rods, "w_R": 9 * rods, "rest": 12 * rods}
+    for name, column in starts.items():
+        each = torch.arange(slots[name].size)
+        found[:, slots[name].start + each, column + each] = 1.0
+    turn = slots["q_WR"]
+    q = s[:, turn.start : turn.start + turn.size].reshape(-1, 4).repeat(3, 1)
+    by = offsets[:, 3 * rods : 6 * rods].reshape(-1, 3)
+    axes = torch.eye(3, dtype=s.dtype).repeat_interleave(len(by), dim=0)
+    along = jvp(lambda r: roma.quat_product(q, roma.rotvec_to_unitquat(r)), (by.repeat(3, 1),), (axes,))[1]
+    along = along.reshape(3, len(s), rods, 4)
+    for rod in range(rods):
+        rows, columns = turn.start + 4 * rod, 3 * rods + 3 * rod
+        found[:, rows : rows + 4, columns : columns + 3] = along[:, :, rod].permute(1, 2, 0)
+    return found

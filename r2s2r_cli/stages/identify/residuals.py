@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 
 from r2s2r_cli.stages.identify.candidates import predict_candidates
-from r2s2r_cli.stages.identify.free.base import slopes_of, values_of
+from r2s2r_cli.stages.identify.free.base import Free, slopes_of, values_of
 from r2s2r_cli.stages.identify.offsets import StartSpread, count
 from r2s2r_cli.stages.identify.predict import Prediction, Predictor
 from r2s2r_cli.stages.identify.solve.problem import Evaluation
@@ -71,6 +72,17 @@ class CapResiduals:
         self.cluster = np.repeat(np.concatenate(place)[self.kept], self._observed[0].size)
         self.block = np.repeat(np.arange(self._observed[..., 0].size), 3)
         self._width = n
+
+    def starting(self, frees: Sequence[Free]) -> CapResiduals:
+        """The same problem with other starts and priors of its parameters; what is held is held at its new start."""
+        other, n = copy(self), self._width
+        other.frees = tuple(frees)
+        start = [free.to_z(free.start) for free in frees]
+        own_sd = [FIXED_SD if free.name in self.held else free.prior_sd for free in frees]
+        other.prior_mean = np.concatenate([start, self.prior_mean[n:]])
+        other.prior_sd = np.concatenate([own_sd, self.prior_sd[n:]])
+        other.z0 = other.prior_mean.copy()
+        return other
 
     @property
     def exact(self) -> bool:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
 from r2s2r_cli.stages.identify.free.base import values_of
+from r2s2r_cli.stages.identify.growing import BEFORE_POPULATION, EARLY_HORIZONS, problem_of, stages_of, started
+from r2s2r_cli.stages.identify.near import Near, tell
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
 from r2s2r_cli.stages.identify.residuals import CapResiduals
@@ -23,16 +25,10 @@ from r2s2r_cli.stages.identify.solve.record import Checkpoint, Counts, Progress,
 from r2s2r_cli.stages.identify.solve.starts import multi_start, starts
 from r2s2r_cli.stages.identify.windows import Window
 
-EARLY_HORIZONS = Limits(max_iterations=4, tolerance=1e-2, step_sd=0.3, gradient_sd=0.1)
-"""Of all horizons but the last: they only have to come near."""
-BEFORE_POPULATION = Limits(max_iterations=8, tolerance=1e-3, step_sd=0.3, gradient_sd=0.1)
-"""Of the last horizon that derivatives are trusted with."""
 FROM_AFAR = 1e-3
 """Relative gain at which the first round ends, whose minimum is not that of the later ones."""
 EXACT = 1.5
 """Residuals of at most so many times the noise that was measured: the model is not what is wrong."""
-SMOOTH = 2
-"""Intervals over which derivatives still tell where the minimum lies; beyond, a population does."""
 START_SPREAD = 0.4
 """Starts are drawn this far from the first in coordinates without a prior: for a logarithm, a factor of 1.5."""
 FIRST = 0.3
@@ -50,25 +46,16 @@ MOST_UNKNOWNS = 40
 
 
 @dataclass(frozen=True)
-class Near:
-    """What derivatives reach over the intervals that they can be trusted with, with what they said on the way, and how
-    many simulations that took. windows: those of the first round."""
-
-    windows: Sequence[Window]
-    solution: Solution
-    said: tuple[Progress, ...]
-    rollouts: int
-
-
-@dataclass(frozen=True)
 class Fit:
     """A finished fit. problem: at its last start states; solution: in its unknowns; values: (n,), units. drawn: their
-    covariance as candidates showed it, None where none were drawn."""
+    covariance as candidates showed it, None where none were drawn. alike: held parameters that are as others of their
+    kind are, with the number of these (`alike.py`)."""
 
     problem: CapResiduals
     solution: Solution
     values: np.ndarray
     drawn: np.ndarray | None = None
+    alike: Mapping[str, int] = field(default_factory=dict)
 
 
 def first_round(
@@ -89,18 +76,21 @@ def first_round(
     found for the same windows and values, which is not computed again. Raises as `fit`.
     """
     frees, loss = predictor.mapping.frees, LOSSES[recipe.loss]
-    names, stages, count = _stages(predictor, windows, recipe)
+    names, stages, count = stages_of(predictor, windows, recipe)
     problem = stages[-1]
     few = len(moving_of(problem)) <= MOST_UNKNOWNS
     smooth = count if few else len(stages)
     last = Limits(max_iterations=recipe.max_iterations, tolerance=FROM_AFAR, step_sd=0.05)
-    if near is not None and few and resume is None:
-        solution = near.solution
-        predictor.rollouts += near.rollouts
-        if progress is not None:
-            for one in near.said:
-                progress(one)
+    begun = near if resume is None else None
+    if begun is not None and few:
+        solution = begun.solution
+        predictor.rollouts += begun.rollouts
+        tell(begun.said, progress)
     else:
+        if begun is not None and begun.mark is not None:
+            resume = begun.mark.checkpoint
+            predictor.rollouts += begun.mark.rollouts - len(windows)  # the evaluation at the mark is made again
+            tell(begun.said[: begun.mark.said], progress)
         solution = solve_growing(
             list(zip(names, stages, strict=True))[:smooth], started(problem, values), loss=loss, early=EARLY_HORIZONS,
             last=BEFORE_POPULATION if few else last, progress=progress, checkpoint=checkpoint, resume=resume,
@@ -120,18 +110,6 @@ def first_round(
             problem, solution.z, loss=loss, max_iterations=recipe.max_iterations, tolerance=1e-4
         )
     return Fit(problem, solution, values_of(frees, solution.z[: len(frees)]))
-
-
-def near_fit(predictor: Predictor, windows: Sequence[Window], values: np.ndarray, recipe: Recipe) -> Near:
-    """The beginning of the first round alone. Raises as `fit`."""
-    names, stages, count = _stages(predictor, windows, recipe)
-    said: list[Progress] = []
-    before = predictor.rollouts
-    solution = solve_growing(
-        list(zip(names, stages, strict=True))[:count], started(stages[-1], values), loss=LOSSES[recipe.loss],
-        early=EARLY_HORIZONS, last=BEFORE_POPULATION, progress=said.append,
-    )  # fmt: skip
-    return Near(tuple(windows), solution, tuple(said), predictor.rollouts - before)
 
 
 def later_round(
@@ -193,17 +171,6 @@ def more_starts(
     return found
 
 
-def _stages(
-    predictor: Predictor, windows: Sequence[Window], recipe: Recipe
-) -> tuple[list[str], list[CapResiduals], int]:
-    """Problems over growing horizons with their names, and how many of them derivatives can be trusted with."""
-    lengths = recipe.horizons(max(len(one.intervals) for one in windows))
-    stages = [problem_of(predictor, [one.until(length) for one in windows], recipe) for length in lengths[:-1]]
-    stages.append(problem_of(predictor, windows, recipe))
-    names = [*(f"{length} intervals" for length in lengths[:-1]), "all"]
-    return names, stages, max(1, sum(length <= SMOOTH for length in lengths))
-
-
 def wide_about(problem: CapResiduals, cooling: Cooling, share: float = 1.0) -> np.ndarray:
     """A curvature (n, n) of which the first draw is as wide as this share of the priors, where those are flat of how
     starts are drawn."""
@@ -214,23 +181,6 @@ def wide_about(problem: CapResiduals, cooling: Cooling, share: float = 1.0) -> n
 def members_for(problem: CapResiduals) -> int:
     """Candidates of a generation: more unknowns need more, or the regression cannot tell their effects apart."""
     return max(MEMBERS, LANES * math.ceil((3 * len(moving_of(problem)) + TRIED) / LANES) - TRIED)
-
-
-def problem_of(
-    predictor: Predictor, windows: Sequence[Window], recipe: Recipe, *, noise: float | None = None
-) -> CapResiduals:
-    """The problem of a recipe, or with another least noise [m]."""
-    return CapResiduals(
-        predictor, windows, spread=recipe.spread, noise=recipe.noise if noise is None else noise,
-        key_only=recipe.key_only, held=recipe.held,
-    )  # fmt: skip
-
-
-def started(problem: CapResiduals, values: np.ndarray) -> np.ndarray:
-    """Unknowns at these values (n,), start states not moved."""
-    z: np.ndarray = problem.z0.copy()
-    z[: len(problem.frees)] = [free.to_z(float(value)) for free, value in zip(problem.frees, values, strict=True)]
-    return z
 
 
 def _settled(

@@ -8,8 +8,9 @@ every frame pulls them towards it. What is not seen follows through its covarian
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,7 @@ from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.ensemble import analysis, centred, student_weights
 from r2s2r_cli.stages.identify.members import mean, placed, places
 from r2s2r_cli.stages.identify.predict import Predictor, refused
+from r2s2r_cli.stages.identify.ways import Way
 from r2s2r_cli.stages.init.attachment import rod_frames
 
 if TYPE_CHECKING:
@@ -69,22 +71,38 @@ def start_states(
 
     The first is the robot at rest in the observed pose (paper, section System Identification: cable lengths and end
     caps at t = 0, then gravity), from the run's first frame. The others are means of an ensemble.
+    The predictor keeps those of the last values: asked again, nothing is simulated twice.
     Raises NumericalError, InputError where the robot cannot be simulated.
     """
     import torch
 
     from r2s2r_cli.engine import EngineError
 
-    theta = predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64))
-    up = np.array([0.0, 0.0, predictor.mapping.observation(values).ground_height])
+    belief = belief or Filter()
+    way = predictor.ways.get(run.name)
+    if way is None or not way.same(run, values, belief):
+        way = predictor.ways[run.name] = Way(run, values.copy(), belief, _coming(run, predictor, values, belief))
     try:
         with torch.no_grad():
-            rest = _rest(predictor, theta, run.observed[run.intervals.first[0]] - up)
-            if last == 1:
-                return [rest]
-            return [rest, *_Ensemble(run, predictor, values, rest, belief or Filter()).starts(last)]
-    except EngineError as error:
-        raise refused(error, ()) from error
+            way.found.extend(islice(way.coming, max(last - len(way.found), 0)))
+    except BaseException as error:
+        del predictor.ways[run.name]  # a filter that was broken off does not go on
+        if isinstance(error, EngineError):
+            raise refused(error, ()) from error
+        raise
+    return way.found[:last]
+
+
+def _coming(run: RunData, predictor: Predictor, values: np.ndarray, belief: Filter) -> Iterator[State]:
+    """The start states, each simulated when it is asked for."""
+    import torch
+
+    theta = predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64))
+    up = np.array([0.0, 0.0, predictor.mapping.observation(values).ground_height])
+    rest = _rest(predictor, theta, run.observed[run.intervals.first[0]] - up)
+    yield rest
+    if len(run.intervals) > 1:
+        yield from _Ensemble(run, predictor, values, rest, belief).starts()
 
 
 def states_at(
@@ -142,24 +160,22 @@ class _Ensemble:
         self._add(belief.first)
         self._redraw()
 
-    def starts(self, last: int) -> list[State]:
-        """States at the starts of intervals 2 to `last`."""
+    def starts(self) -> Iterator[State]:
+        """States at the starts of intervals 2, 3 and so on."""
         from r2s2r_cli.engine.flat import unpack_state
 
-        run, first = self.run, [int(frame) for frame in self.run.intervals.first[:last]]
+        run, first = self.run, [int(frame) for frame in self.run.intervals.first]
         t = run.t[first[0] : first[-1] + 1] - run.t[first[0]]
         at = np.round(t / self.step).astype(int)
-        u, _ = CommandLog(run).rows(float(run.t[first[0]]), int(at[-1]), step=self.step, delay=self.delay)
-        states = []
+        u = CommandLog(run).means(float(run.t[first[0]]), int(at[-1]), step=self.step, delay=self.delay)
         for k in range(1, len(at)):
             self._simulate(u[at[k - 1] : at[k]])
             self._add(self.belief.drift, math.sqrt(t[k] - t[k - 1]))
             self._see(first[0] + k, float(t[k] - t[k - 1]))
             if first[0] + k in first:
-                states.append(unpack_state(self.structure, mean(self.structure, self.flat)[0][None]))
+                yield unpack_state(self.structure, mean(self.structure, self.flat)[0][None])
                 self._add(self.belief.interval)
                 self._redraw()
-        return states
 
     def _simulate(self, u: np.ndarray) -> None:
         """All members under the commands u (row, actuated)."""

@@ -14,10 +14,10 @@ from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.found import ParameterFound
 from r2s2r_cli.stages.identify.free import Free, Mapping, select
 from r2s2r_cli.stages.identify.free.extend import PLUS, extended, name_of
+from r2s2r_cli.stages.identify.near import Near
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe, default_fixed, default_free, recipe_of
 from r2s2r_cli.stages.identify.request import Checkpoint, Progress, Request, silent
-from r2s2r_cli.stages.identify.rounds import Near
 from schemas.config import IdentifySettings
 from schemas.robot import Robot
 
@@ -179,5 +179,5 @@ def _wound(run: RunData, intervals: Sequence[int], way: float) -> np.ndarray:
     for number in intervals:
         begin, end = (float(side[number - 1]) for side in (run.intervals.t_first, run.intervals.t_last))
         if end > begin:
-            spent += (end - begin) * log.rows(begin, 1, step=end - begin, delay=0.0)[0][0]
+            spent += (end - begin) * log.means(begin, 1, step=end - begin, delay=0.0)[0]
     return spent

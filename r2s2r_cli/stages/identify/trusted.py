@@ -64,6 +64,8 @@ def _parameters(
         trust, reason = judged[k]
         if free.name in problem.held:
             trust, reason = Trust.NOT_IDENTIFIABLE, "the training intervals do not show it: held at its start"
+            if free.name in fitted.alike:
+                reason = f"the training intervals do not show it: held as the {fitted.alike[free.name]} others are"
         elif trust is not Trust.NOT_IDENTIFIABLE and free.name in bound and values[k] != free.start:
             trust, reason = Trust.ON_BOUND, "the runs ask for more than its bound allows"
         wide = (np.nan, np.nan) if trust is Trust.NOT_IDENTIFIABLE else (float(reach[k, 0]), float(reach[k, 1]))

@@ -38,7 +38,7 @@ def wound(run: RunData, start: float, end: float) -> np.ndarray:
 def test_rows_wind_what_the_log_winds(delay: float, sampled: bool) -> None:
     """The rows' integral is that of the delayed log over their span, each row's the same over its step."""
     run = logged(1, sampled=sampled)
-    rows, _ = CommandLog(run).rows(0.9, 150, step=0.01, delay=delay)
+    rows = CommandLog(run).means(0.9, 150, step=0.01, delay=delay)
     assert rows.shape == (150, WINCHES)
     whole = wound(run, 0.9 - delay, 2.4 - delay)
     np.testing.assert_allclose(0.01 * rows.sum(axis=0), whole, atol=1e-12)
@@ -56,9 +56,9 @@ def test_before_the_first_row_nothing_moves() -> None:
         np.testing.assert_array_equal(
             found, np.stack([0 * run.control[0]] * 2 + [run.control[0]] + [run.control[-1]] * 2)
         )
-        rows, by_delay = CommandLog(run).rows(first - 0.5, 40, step=0.01, delay=0.05)
-        assert not rows.any()
-        assert not by_delay.any()
+        where = {"start": first - 0.5, "count": 40, "step": 0.01, "delay": 0.05}
+        assert not CommandLog(run).means(**where).any()
+        assert not CommandLog(run).by_delay(**where).any()
 
 
 def test_sent_commands_hold_and_sampled_ones_switch_half_way() -> None:
@@ -77,16 +77,16 @@ def test_rows_on_the_stamps_are_the_log() -> None:
     t = 0.25 * np.arange(8)
     control = np.random.default_rng(3).integers(-1, 2, (8, WINCHES)).astype(float)
     log = CommandLog(replace(gait(2), t_command=t, control=control))
-    np.testing.assert_array_equal(log.rows(0.0, 8, step=0.25, delay=0.0)[0], control)
-    np.testing.assert_array_equal(log.rows(0.25, 8, step=0.25, delay=0.25)[0], control)
-    late = log.rows(0.25, 7, step=0.25, delay=0.0625)[0]
+    np.testing.assert_array_equal(log.means(0.0, 8, step=0.25, delay=0.0), control)
+    np.testing.assert_array_equal(log.means(0.25, 8, step=0.25, delay=0.25), control)
+    late = log.means(0.25, 7, step=0.25, delay=0.0625)
     np.testing.assert_allclose(late, 0.25 * control[:-1] + 0.75 * control[1:], atol=1e-12)
 
 
 def test_what_was_not_logged_is_no_command() -> None:
     """NaN counts as 0."""
     run = replace(gait(2), t_command=np.array([0.0, 1.0]), control=np.array([[np.nan], [1.0]]))
-    assert CommandLog(run).rows(0.0, 4, step=0.5, delay=0.0)[0][:, 0].tolist() == [0, 0, 1, 1]
+    assert CommandLog(run).means(0.0, 4, step=0.5, delay=0.0)[:, 0].tolist() == [0, 0, 1, 1]
 
 
 @pytest.mark.parametrize("sampled", [False, True])
@@ -95,8 +95,8 @@ def test_the_derivative_by_the_delay_is_the_difference(sampled: bool) -> None:
     together change by what leaves at the end and enters at the start."""
     run, eps, step, delay = logged(4, sampled=sampled), 1e-6, 0.01, 0.0331
     log = CommandLog(run)
-    by_delay = log.rows(0.9, 130, step=step, delay=delay)[1]
-    up, down = (log.rows(0.9, 130, step=step, delay=delay + d)[0] for d in (eps, -eps))
+    by_delay = log.by_delay(0.9, 130, step=step, delay=delay)
+    up, down = (log.means(0.9, 130, step=step, delay=delay + d) for d in (eps, -eps))
     np.testing.assert_allclose(by_delay, (up - down) / (2 * eps), atol=1e-5)
     switches = int((np.diff(np.vstack([np.zeros(WINCHES), run.control]), axis=0) != 0).sum())
     assert 0 < int((by_delay != 0).sum()) <= switches

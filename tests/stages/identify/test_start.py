@@ -156,7 +156,33 @@ def test_later_frames_change_no_bit() -> None:
 
 def test_one_seed_one_result() -> None:
     """Fewer intervals and another call give the same bits, another seed gives others, no further off than the noise."""
-    assert bits(start_states(run(), predictor(), SPEED, 2, belief=WHITE)) == bits(found()[:2])
+    whole = bits(found())
+    predictor().ways.clear()
+    assert bits(start_states(run(), predictor(), SPEED, 2, belief=WHITE)) == whole[:2]
     other = start_states(run(), predictor(), SPEED, 2, belief=replace(WHITE, seed=1))
     assert bits(other[1:]) != bits(found()[1:2])
     assert other[1].p_WB.numpy() == pytest.approx(found()[1].p_WB.numpy(), abs=NOISE)
+
+
+def test_what_was_found_is_not_found_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Asked for more intervals, the filter goes on, with the bits of one that was asked for all at once; asked for
+    fewer, nothing is simulated. Other values, frames or beliefs begin anew."""
+    whole = bits(found())
+    predictor().ways.clear()
+    asked = [start_states(run(), predictor(), SPEED, count, belief=WHITE) for count in (1, COUNT)]
+    assert bits(asked[0]) == whole[:1] and bits(asked[1]) == whole
+
+    def advance(*args: object, **options: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(predictor().simulator, "advance", advance)
+    assert bits(start_states(run(), predictor(), SPEED, 2, belief=WHITE)) == whole[:2]
+    kept = dict(predictor().ways)
+    for other in (
+        {"values": 1.01 * SPEED}, {"run": replace(run())}, {"belief": replace(WHITE, seed=1)},
+    ):  # fmt: skip
+        predictor().ways.update(kept)
+        given = {"run": run(), "values": SPEED, "belief": WHITE, **other}
+        with pytest.raises(AssertionError):
+            start_states(given["run"], predictor(), given["values"], 2, belief=given["belief"])  # type: ignore[arg-type]
+        assert not predictor().ways

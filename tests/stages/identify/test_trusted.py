@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from r2s2r_cli.stages.identify.found import ProfileFound
 from r2s2r_cli.stages.identify.rounds import Fit
+from r2s2r_cli.stages.identify.trust.identifiability import Trust
 from r2s2r_cli.stages.identify.trusted import Sureness, sureness, widened_by
 from tests.stages.identify.trust.planted import planted, solved
 
@@ -55,3 +57,13 @@ def test_a_profile_inside_the_interval_changes_nothing() -> None:
     """A profile that is narrower than the covariance says takes nothing away."""
     fitted, sure = _sure()
     assert widened_by(fitted, sure, [_profile(sure, -1.0, 1.0)]) is sure
+
+
+def test_what_is_held_says_what_at() -> None:
+    """At its start, or as others of its kind are."""
+    fitted, _ = _sure()
+    name = fitted.problem.frees[1].name
+    fitted.problem.held = (name,)
+    for alike, words in (({}, "held at its start"), ({name: 5}, "held as the 5 others are")):
+        one = sureness(replace(fitted, alike=alike), np.zeros((0, 3)), loss="none", seed=0).parameters[1]
+        assert one.trust is Trust.NOT_IDENTIFIABLE and one.reason.endswith(words)

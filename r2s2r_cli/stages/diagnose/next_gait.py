@@ -1,8 +1,8 @@
 """What to run next: the gait of a library under which the remaining candidates differ most.
 
-T-optimal (Hunter and Reiner 1965): the largest of the smallest distances between two candidates, with what nuisances
-can make up for taken off. Commands are those of an ideal controller, the same for all candidates, as in the replay of a
-recorded run.
+T-optimal (Hunter and Reiner 1965): the largest of the smallest distances between the most probable candidate, as if it
+were the truth, and another one, with what that one's nuisances and numbers can make up for taken off. Commands are
+those of an ideal controller, the same for all candidates, as in the replay of a recorded run.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Evidence
+from r2s2r_cli.stages.diagnose.next_apart import apart
 from r2s2r_cli.stages.diagnose.which.arena import Arena
-from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
+from r2s2r_cli.stages.diagnose.which.fit import Fit
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.diagnose.which.which import Compared
 from r2s2r_cli.stages.identify.windows import Window
@@ -27,7 +28,7 @@ Targets = tuple[tuple[float, ...], ...]
 SETTLE_S = 0.3
 """After the last cable of a target is there."""
 RATE_HZ = 10.0
-LONGEST = 14
+LONGEST = 8
 """Targets of a policy that are simulated: a longer one goes on as it began."""
 REMAINING = 4
 """Candidates that are told apart."""
@@ -42,9 +43,9 @@ class GaitLibrary:
 
 @dataclass(frozen=True)
 class NextGait:
-    """name, targets: the policy. separates: pairs of candidates with the nats that it tells them apart by. nats: the
-    smallest of these; now: that of the best of the gaits that were run, in the same manner. typical: median over the
-    library, which is what a gait taken at random is worth."""
+    """name, targets: the policy. separates: the first candidate with every other one and the nats that it tells them
+    apart by. nats: the smallest of these; now: that of the best of the gaits that were run, in the same manner.
+    typical: median over the library, which is what a gait taken at random is worth."""
 
     name: str
     targets: Targets
@@ -102,48 +103,16 @@ def _targets(targets: np.ndarray) -> Targets:
 
 
 def _distances(arena: Arena, fits: Sequence[Fit], targets: Targets) -> tuple[tuple[str, str, float], ...]:
-    """Half the squared distance, over noise and floor, between what every two candidates would be seen to do; the
-    nuisances are fitted to the difference, within their priors."""
+    """Between the first candidate, taken as the truth, and every other one; empty where there is nothing to see."""
     many = _imagined(arena, targets)
     if not many:
         return ()
-    p = len(arena.engine)
-    solver = Fits(arena)
-    by = 0.3 / np.sqrt(np.diag(arena.precision)[:p])
-    around = np.repeat(arena.mean[None], p, axis=0)
-    around[np.arange(p), np.arange(p)] += by
-    around = np.clip(around, arena.lower, arena.upper)
-    step = (around - arena.mean)[np.arange(p), np.arange(p)]
-    values = np.concatenate(
-        [arena.values(arena.mean[None]), arena.values(around)]
-        + [solver.values(fit.hypothesis, fit.z[None], fit.x[None]) for fit in fits]
+    first, *others = fits
+    found = apart(arena, many[0], first, others)
+    return tuple(
+        (first.hypothesis.effects[0], other.hypothesis.effects[0], nats)
+        for other, nats in zip(others, found, strict=True)
     )
-    seen = np.concatenate([_weighed(arena, one, values) for one in many], axis=1)
-    if not np.isfinite(seen).all() or np.any(step == 0.0):
-        seen = np.nan_to_num(seen)
-        step = np.where(step == 0.0, 1.0, step)
-    J = ((seen[1 : p + 1] - seen[0]) / step[:, None]).T
-    H = J.T @ J + arena.precision[:p, :p]
-    found = []
-    for i in range(len(fits)):
-        for j in range(i + 1, len(fits)):
-            d = seen[p + 1 + i] - seen[p + 1 + j]
-            pull = J.T @ d
-            nats = 0.5 * float(d @ d - pull @ np.linalg.solve(H, pull))
-            found.append((fits[i].hypothesis.effects[0], fits[j].hypothesis.effects[0], max(nats, 0.0)))
-    return tuple(found)
-
-
-def _weighed(arena: Arena, one: Stretch, values: np.ndarray) -> np.ndarray:
-    """What is seen of an imagined stretch, over noise and floor, (k, number)."""
-    seen = arena.replayer.seen([one], values)[0]
-    share = (one.t - one.window.start) / max(float(one.t[-1]) - one.window.start, 1e-9)
-    sd = np.sqrt(one.noise**2 * arena.noise**2 + (arena.floor_m**2 / 3.0) * share[:, None, None])
-    parts = [(seen.caps / sd[None]).reshape(len(values), -1)]
-    if one.length is not None and one.length_sd is not None:
-        wide = np.sqrt(one.length_sd**2 + (arena.floor_m**2 / 3.0) * share[:, None])
-        parts.append((seen.length / wide[None]).reshape(len(values), -1))
-    return np.concatenate(parts, axis=1)
 
 
 def _imagined(arena: Arena, targets: Targets) -> list[Stretch]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from r2s2r_cli.stages.diagnose.next_apart import left
 from r2s2r_cli.stages.diagnose.next_gait import SETTLE_S, _commands
 from r2s2r_cli.stages.diagnose.stage import library_of
 from tests.support.builders import robot
@@ -25,3 +26,33 @@ def test_the_library_has_the_excitations_and_what_was_planned() -> None:
     made = library_of(robot(), {"straight": [[1.0] * 6, [0.0] * 6]}).gaits
     assert {"ramps", "holds", "reversals", "repeats", "straight"} <= set(made)
     assert made["straight"][1] == (0.0,) * 6
+
+
+def _pieces(seed: int, count: int = 12, numbers: int = 40) -> list[np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return list(rng.standard_normal((count, numbers)) / np.sqrt(numbers))
+
+
+def test_what_the_other_candidate_can_make_up_for_is_no_distance() -> None:
+    """Differences that are three times a column of it: nothing is left but what its prior takes, 3^2 / 2 / 10^2 nats.
+    Differences at right angles to all its columns are left whole, half their squares."""
+    rng = np.random.default_rng(0)
+    columns = [rng.standard_normal((2, 40)) for _ in range(12)]
+    prior = np.diag([1e-2, 1e-2])
+    assert left([3.0 * J[0] for J in columns], columns, prior) == pytest.approx(0.045, rel=0.1)
+    across = []
+    for J, d in zip(columns, _pieces(1), strict=True):
+        Q, _ = np.linalg.qr(J.T)
+        across.append(0.2 * (d - Q @ (Q.T @ d)))
+    assert left(across, columns, prior) == pytest.approx(0.5 * sum(float(d @ d) for d in across), rel=0.01)
+
+
+def test_no_piece_tells_candidates_apart_alone() -> None:
+    """A fall that only one of two candidates has, 1000 nats of one piece, is worth 15 log(1 + 1000 / 15) = 63; the same
+    spread over 100 pieces nearly all of it."""
+    none = np.zeros((0, 0))
+    one = np.full(40, np.sqrt(2000.0 / 40))
+    empty = np.zeros((0, 40))
+    assert left([one], [empty], none) == pytest.approx(15.0 * np.log1p(1000.0 / 15.0))
+    spread = left([one / 10.0] * 100, [empty] * 100, none)
+    assert 700.0 < spread < 1000.0

@@ -1,0 +1,81 @@
+"""Ctrl-C in every computing stage of `run`, then the same command again: the artifacts are those of a run in one go."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import tomlkit
+
+from r2s2r_cli.store.header import read_header
+
+SMALL = {
+    "identify.free": ["friction"], "identify.starts": 1, "identify.profiles": 0, "identify.max_iterations": 2,
+    "identify.window": 2, "identify.step_s": 0.002, "identify.train_share": 1.0,
+    "plan.depth": 2, "plan.draws": 2, "plan.starts": 1, "plan.candidates": 3, "plan.kept": 2, "plan.cycles": 2,
+    "plan.most_changed": 2, "plan.step_s": 0.002,
+}  # fmt: skip
+"""Settings of a loop of seconds."""
+STAGES = ("estimate", "identify", "plan")
+ARTIFACTS = ("10-record.h5", "20-estimate.h5", "30-identify.h5", "40-plan.h5")
+COMMAND = [sys.executable, "-m", "r2s2r_cli", "run", "sample.csv", "--until", "plan", "--no-draw"]
+BEGUN_S = 1.5
+"""How long a stage without checkpoints is left alone: its imports take about a second."""
+LIMIT_S = 120.0
+
+
+def interrupted(project: Path, stage: str) -> int:
+    """Exit code of a run that gets Ctrl-C, with all its processes, in the midst of this stage: at its first checkpoint,
+    where it keeps any."""
+    with subprocess.Popen(
+        COMMAND, cwd=project, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        # A suite in the background ignores SIGINT, and so would what it starts.
+        start_new_session=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as child:  # fmt: skip
+        assert child.stderr is not None
+        for line in child.stderr:
+            if f"r2s2r {stage} " in line:
+                begun(project, stage)
+                os.killpg(child.pid, signal.SIGINT)
+                break
+        said = child.stderr.read()
+        code = child.wait()
+    assert "Traceback" not in said
+    return code
+
+
+def begun(project: Path, stage: str) -> None:
+    """Wait until the stage is at work."""
+    if stage == "estimate":
+        time.sleep(BEGUN_S)
+        return
+    end = time.monotonic() + LIMIT_S
+    while not list(project.rglob(f"*-{stage}.partial")):
+        assert time.monotonic() < end, f"{stage} kept no checkpoint"
+        time.sleep(0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name == "nt", reason="there are no groups of processes to interrupt")
+def test_an_interrupted_loop_goes_on_to_the_same(project: Path, tmp_path: Path) -> None:
+    """Stopped in estimate, identify and plan, then run to its end, beside one that nobody stopped: the same hashes."""
+    settings = tomlkit.parse((project / "project.toml").read_text("utf-8"))
+    for name, value in SMALL.items():
+        section, key = name.split(".")
+        settings[section][key] = value
+    (project / "project.toml").write_text(tomlkit.dumps(settings), "utf-8")
+    whole = Path(shutil.copytree(project, tmp_path / "whole"))
+    assert [interrupted(project, stage) for stage in STAGES] == [130] * len(STAGES)
+    hashes = []
+    for folder in (project, whole):
+        done = subprocess.run(COMMAND, cwd=folder, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        headers = [read_header(folder / "iterations" / "001" / name) for name in ARTIFACTS]
+        hashes.append([one.content_sha256 for one in headers])
+    assert hashes[0] == hashes[1]

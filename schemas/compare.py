@@ -25,7 +25,7 @@ FLOOR = GroupSpec(
         AttributeSpec(name="com_end", type="float", unit="m", required=False, description="from repeats of the runs"),
         AttributeSpec(name="heading_end", type="float", unit="rad", required=False, description="from repeats of the runs"),
         AttributeSpec(name="segment", type="float", unit="s", required=False, description="duration of a target interval, from repeats"),
-        AttributeSpec(name="keyframe_cap", type="float", unit="m", required=False, description="from floor.h5, else from repeats of the runs"),
+        AttributeSpec(name="keyframe_cap", type="float", unit="m", required=False, description="from repeats of the runs, else from floor.h5"),
         AttributeSpec(name="path", type="float", unit="m", required=False, description="centre of mass along the run, from repeats of the runs"),
         AttributeSpec(name="cap", type="float", unit="m", required=False, description="caps along the run, from repeats of the runs"),
         AttributeSpec(name="gait", type="float", unit="m", required=False,

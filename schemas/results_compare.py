@@ -14,8 +14,8 @@ class Durations(Frozen):
 
 
 class CompareFloor(Frozen):
-    """What a perfect simulator would be found to be wrong by, from repeats of the runs (key frames: from floor.h5,
-    where there is one)."""
+    """What a perfect simulator would be found to be wrong by, from repeats of the runs (key frames: else from
+    floor.h5)."""
 
     com_end_m: float | None
     heading_end_rad: float | None

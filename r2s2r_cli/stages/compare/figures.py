@@ -30,11 +30,11 @@ def measures(mine: Sequence[CompareRun], first: Sequence[CompareRun], floor: Com
 
 
 def floor_of(walks: Mapping[str, Walk], policies: Mapping[str, str], keyframe_m: float | None) -> CompareFloor:
-    """From repeats among these runs; that of key frames from floor.h5, and where that has none from the repeats as
-    well: caps at the end of an interval, laid on each other at its start. A run is compared with one simulation, so
-    that the floor of the mean over repeats is not lower."""
+    """From repeats among these runs; that of key frames is of caps at the end of an interval, laid on each other at its
+    start, and where nothing repeats that of floor.h5 (keyframe_m). A run is compared with one simulation, so that the
+    floor of the mean over repeats is not lower."""
     known: Floors = floors(walks, policies)
-    keyframe_m = known.gait if keyframe_m is None else keyframe_m
+    keyframe_m = keyframe_m if known.gait is None else known.gait
     return CompareFloor(
         com_end_m=known.com, heading_end_rad=known.heading, segment_s=known.segment, keyframe_cap_m=keyframe_m,
         path_m=known.path, cap_m=known.cap, gait_m=known.gait,

@@ -127,12 +127,13 @@ def test_floors_along_the_run_are_those_of_the_errors() -> None:
 
 
 def test_key_frames_have_a_floor_where_anything_repeats() -> None:
-    """That of floor.h5; without it that of the repeats, whose key frames are laid on each other at their starts too."""
+    """That of the repeats, whose key frames are laid on at their starts too; without any that of floor.h5."""
     walks = {"run-1": walk(0.1), "run-2": walk(0.12)}
     policies = dict.fromkeys(walks, "run")
-    assert floor_of(walks, policies, 0.004).keyframe_cap_m == 0.004
-    assert floor_of(walks, policies, None).keyframe_cap_m == floors(walks, policies).gait
-    assert floor_of({"run-1": walks["run-1"]}, policies, None).keyframe_cap_m is None
+    alone = {"run-1": walks["run-1"]}
+    assert floor_of(walks, policies, 0.004).keyframe_cap_m == floors(walks, policies).gait
+    assert floor_of(alone, policies, 0.004).keyframe_cap_m == 0.004
+    assert floor_of(alone, policies, None).keyframe_cap_m is None
 
 
 def test_a_single_run_has_no_floor() -> None:

@@ -140,15 +140,13 @@ def _limits(report: DiagnoseReport) -> Iterator[list[str]]:
 
 
 def _next(one: NextGaitFound) -> str:
-    """What to run, and what it is worth beside the runs so far: whole simulated runs, in which a tip-over counts in
-    full, so that the ratio says more than the nats."""
+    """What to run, and what it is worth beside the runs so far."""
     how = f": r2s2r record {one.file}" if one.file else ""
-    if one.now is None or one.now <= 0:
-        return f"{one.name}, which sets the nearest candidates {one.nats:.3g} nats apart as a whole run{how}"
-    if one.nats <= one.now:
+    if one.now is not None and one.nats <= one.now:
         return f"nothing separates the candidates better than these runs; the best of the library is {one.name}{how}"
-    times = one.nats / one.now
-    return f"{one.name}: simulated as a whole run, it separates the nearest candidates {times:.2g} times as well{how}"
+    beside = "" if one.now is None else f", these runs by {one.now:.1f}"
+    enough = "" if one.nats >= INDISTINCT else " (too few to tell them apart)"
+    return f"{one.name}: would separate the likeliest candidates by {one.nats:.1f} nats{enough}{beside}{how}"
 
 
 def _how(report: DiagnoseReport) -> Iterator[list[str]]:

@@ -78,9 +78,9 @@ def test_rivals_and_numbers_say_what_they_are() -> None:
 @pytest.mark.parametrize(
     ("nats", "now", "words"),
     [
-        (300.0, 20.0, "ramps: simulated as a whole run, it separates the nearest candidates 15 times as well"),
-        (20.0, 30.0, "nothing separates the candidates better than these runs; the best of the library is ramps"),
-        (20.0, None, "ramps, which sets the nearest candidates 20 nats apart as a whole run"),
+        (30.0, 2.0, "ramps: would separate the likeliest candidates by 30.0 nats, these runs by 2.0"),
+        (2.0, 3.0, "nothing separates the candidates better than these runs; the best of the library is ramps"),
+        (2.0, None, "ramps: would separate the likeliest candidates by 2.0 nats (too few to tell them apart)"),
     ],
 )
 def test_what_to_run_next_is_said_beside_what_was_run(nats: float, now: float | None, words: str) -> None:

@@ -90,10 +90,11 @@ def _together(
     up = np.array([one.ground_height for one in seen])
     predictor.rollouts += len(s0)
     n = predictor.simulator.substeps(theta, unpack_state(structure, s0), step)
+    # Nobody differentiates, so the states need no copy of their own, which `Simulator.advance` makes: they are large.
+    kernels, threads = predictor.simulator.kernels, predictor.simulator.threads
     with torch.no_grad():
-        flat = predictor.simulator.advance(
-            s0, u, pack_parameters(structure, theta), h=step / n, hold=n, every=stride * n
-        )  # fmt: skip
+        p = pack_parameters(structure, theta)
+        flat = kernels.forward(s0, u, p, h=step / n, hold=n, every=stride * n, threads=threads)
         return [
             _caps(predictor.structure, own, up, flat[place :: len(windows)], window, stride * step)
             for place, window in enumerate(windows)

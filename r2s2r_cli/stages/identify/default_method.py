@@ -68,12 +68,15 @@ def first_fit(task: Task, predictor: Predictor, kept: Kept) -> Fit:
 
     def told(number: int, rounds: int, one: SolverProgress) -> None:
         kept.steps.append(TraceStep(0, f"round {number + 1}, {one.stage_name}", one.iteration, one.cost))
-        kept.save_with_trace(rollouts=predictor.rollouts)
+        if kept.held:
+            kept.save_with_trace(rollouts=predictor.rollouts)
         done = (number + one.fraction) / rounds
         task.progress(Step("fit", int(1000 * done), 1000, one.cost))
 
     def hold(number: int, values: np.ndarray, one: SolverCheckpoint | None) -> None:
         kept.hold(round=number, values=values.tolist(), solver=None if one is None else one.to_dict())
+        if one is None:  # a round that is taken up begins anew, with the trace and the count of its beginning
+            kept.save_with_trace(rollouts=predictor.rollouts)
 
     saved, resume = kept.saved, None
     if saved:

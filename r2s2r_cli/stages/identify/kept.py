@@ -13,7 +13,8 @@ class Kept:
 
     steps: as `Found.trace`; a step is saved without its values. saved: of the interrupted work, {} where there was
     none. A fit holds what belongs to its next checkpoint, and saves it with the step that it has just made, so that no
-    step is in one and not in the other.
+    step is in one and not in the other. Steps after that belong to work that is done again: they wait for the next.
+    held: whether something waits to be saved.
     """
 
     def __init__(self, checkpoint: Checkpoint | None) -> None:
@@ -21,16 +22,19 @@ class Kept:
         self.saved: dict[str, Any] = (checkpoint.load() if checkpoint is not None else None) or {}
         self.steps = [TraceStep(*row) for row in self.saved.get("trace", ())]
         self._values = dict(self.saved)
+        self.held = False
 
     def hold(self, **values: Any) -> None:
         """JSON values for the next save; those of other names stay as they are."""
         self._values.update(values)
+        self.held = True
 
     def save(self, **values: Any) -> None:
         """Replace what was saved. Raises what the checkpoint raises."""
         self.hold(**values)
         if self._checkpoint is not None:
             self._checkpoint.save(self._values)
+        self.held = False
 
     def save_with_trace(self, **values: Any) -> None:
         """The same, with all steps of the trace so far."""

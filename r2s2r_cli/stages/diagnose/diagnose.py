@@ -93,7 +93,7 @@ def diagnose(
         fitted.arena, fitted.base, floor_m=fitted.floor.rmse, calibration=settings.calibration or calibration(),
         sizes={} if said is None else said.starts(), suspected=None if said is None else said.suspected(),
         effects=settings.effects, seed=settings.seed, told=progress,
-        ways=Ways(settings.held_out, settings.with_unknown),
+        ways=Ways(settings.held_out, settings.with_unknown), healthy=fitted.healthy,
     )  # fmt: skip
     found: Where | None = None
     if settings.with_where:

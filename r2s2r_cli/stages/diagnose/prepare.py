@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run
 from r2s2r_cli.stages.diagnose.starts import Starts, as_smoothed
 from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.before import Healthy
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.pieces import pieces
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
@@ -24,7 +24,7 @@ NUMERICS_M = 3e-3
 """[m] What two good engines differ by at the end of a step of this robot, beside noise (tier B without an effect)."""
 FLOORS = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.0, 4.0)
 """Factors on the floor that healthy runs are tried with."""
-NOISES = (1.0, 1.4, 2.0, 2.8)
+NOISES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
 FLOOR_SPREAD = 0.5
 """Of the logarithm of the floor, before healthy runs are looked at: noisy ones say little of it."""
 ROUNDS = 2
@@ -51,6 +51,7 @@ class Refit:
     base: Fit
     floor: FloorGiven
     warnings: tuple[str, ...] = ()
+    healthy: Healthy | None = None
 
 
 def refit(
@@ -59,23 +60,19 @@ def refit(
     *,
     starts: Starts,
     told: Told,
-    kept: Mapping[str, Any] | None = None,
-    keep: Callable[[str, Any], None] = lambda name, value: None,
     again: bool = True,
     with_floor: bool = True,
 ) -> Refit:
-    """The nominal model fitted again to the intervals of `fit`, its nuisances alone. kept, keep: nuisances that were
-    reached before an interruption, and where to keep them. again: False, they stay as they were, with_floor: False, the
-    simulator is taken to be perfect (ablations).
+    """The nominal model fitted again to the intervals of `fit`, its nuisances alone. again: False, they stay as they
+    were, with_floor: False, the simulator is taken to be perfect (ablations).
 
     With healthy runs these are fitted first: they say what the numbers were, how large the floor is and how wrong the
     stated noise. Raises NumericalError where nothing can be simulated, InputError where nothing is left to fit.
     """
     floor, warnings = floor_for(evidence)
     simulator = np.sqrt(max(floor.rmse**2 - floor.sensor**2, (0.25 * floor.rmse) ** 2))
-    kept = kept or {}
     simulator = simulator if with_floor else NO_FLOOR_M
-    begin = prior = None
+    begin = prior = healthy = None
     noise = 1.0
     if evidence.healthy:
         told("healthy runs", 0, 1)
@@ -84,13 +81,11 @@ def refit(
             for run in evidence.healthy
         )
         arena, base = _fitted(
-            evidence.healthy, part, replayer, simulator, 1.0, None, starts, _known(kept, "healthy"), rounds=2
-        )
-        simulator, noise = _calibrated(arena, base) if with_floor else (simulator, noise)
-        arena.whiten(floor_m=simulator, noise=noise)
+            evidence.healthy, part, replayer, simulator, 1.0, None, starts, None, calibrate=with_floor
+        )  # fmt: skip
+        simulator, noise = arena.floor_m, arena.noise
         prior = _posterior(arena, base)
-        begin = base.z[: arena.shared]
-        keep("healthy", base.z.tolist())
+        healthy, begin = Healthy(arena, base), base.z[: arena.shared]
         if evidence.floor is None:
             sensor = float(np.sqrt(np.mean([np.sum(one.noise[-1] ** 2, axis=-1).mean() for one in arena.whole])))
             ends = Fits(arena)
@@ -100,21 +95,15 @@ def refit(
             rmse = float(np.sqrt(np.mean(usual)))
             floor = FloorGiven(rmse, min(sensor, rmse), "the healthy runs, refitted", True)
         told("healthy runs", 1, 1)
-    arena, base = _fitted(evidence.runs, evidence.fit, replayer, simulator, noise, prior, starts,
-                          begin if "refit" not in kept else _known(kept, "refit"), told)  # fmt: skip
+    arena, base = _fitted(evidence.runs, evidence.fit, replayer, simulator, noise, prior, starts, begin, told)
     if not again:
         arena, base = _frozen(arena, base, prior)
-    keep("refit", base.z.tolist())
     asked = sum(len(one.intervals) for one in evidence.fit)
     if len(arena.whole) < asked:
         warnings.append(
             f"{asked - len(arena.whole)} of {asked} intervals have no key frame: the robot tips over as they begin"
         )
-    return Refit(arena, base, floor, tuple(warnings))
-
-
-def _known(kept: Mapping[str, Any], name: str) -> np.ndarray | None:
-    return np.array(kept[name], dtype=float) if name in kept else None
+    return Refit(arena, base, floor, tuple(warnings), healthy)
 
 
 def floor_for(evidence: Evidence) -> tuple[FloorGiven, list[str]]:
@@ -149,16 +138,17 @@ def _sensor(runs: Sequence[Run]) -> float:
 def _fitted(
     runs: Sequence[Run], part: Sequence[Selection], replayer: Replayer, simulator: float, noise: float,
     prior: tuple[np.ndarray, np.ndarray] | None, starts: Starts, begin: np.ndarray | None, told: Told | None = None,
-    rounds: int = ROUNDS,
+    calibrate: bool = False,
 ) -> tuple[Arena, Fit]:  # fmt: skip
-    """Nuisances and start states in turns."""
+    """Nuisances and start states in turns. calibrate: with them the floor and the noise, of healthy runs: under a noise
+    that is too small every piece looks like a fall, and a fit of falls learns nothing."""
     model = replayer.model
     named = {run.name: run for run in runs}
     last = {one.run: max(one.intervals) for one in part if one.intervals}
     z = begin
-    for number in range(rounds):
+    for number in range(ROUNDS):
         if told is not None:
-            told("refit", number, rounds)
+            told("refit", number, ROUNDS)
         values = model.values0.copy()
         if z is not None:
             values[list(model.nuisances)] = z[: len(model.nuisances)]
@@ -173,16 +163,25 @@ def _fitted(
             )  # fmt: skip
         arena = Arena(replayer, many, floor_m=simulator, noise=noise, prior=prior, whole=whole)
         z = _begun(arena, z)
-        for _ in range(JACOBIANS if number == rounds - 1 else 1):
+        for _ in range(JACOBIANS if number == ROUNDS - 1 else 1):
             arena.prepare(z)
-            fits = Fits(arena)
-            residual = arena.residuals(arena.values(z[None]), z[None])[0]
-            base = fits.begin(Hypothesis(), z, np.zeros(0), residual)
-            fits.run([base])
+            if calibrate:
+                _calibrate(arena, z)
+            base = _from(arena, z)
+            Fits(arena).run([base])
             z = base.z
+        simulator, noise = arena.floor_m, arena.noise
+    if calibrate:
+        _calibrate(arena, base.z)
+        base = _from(arena, base.z)
     if told is not None:
-        told("refit", rounds, rounds)
+        told("refit", ROUNDS, ROUNDS)
     return arena, base
+
+
+def _from(arena: Arena, z: np.ndarray) -> Fit:
+    """The refit nominal model at nuisances z, not moved yet."""
+    return Fits(arena).begin(Hypothesis(), z, np.zeros(0), arena.residuals(arena.values(z[None]), z[None])[0])
 
 
 def _frozen(arena: Arena, base: Fit, prior: tuple[np.ndarray, np.ndarray] | None) -> tuple[Arena, Fit]:
@@ -191,8 +190,7 @@ def _frozen(arena: Arena, base: Fit, prior: tuple[np.ndarray, np.ndarray] | None
     z = arena.mean.copy()
     arena.precision = FROZEN * arena.precision
     arena.prepare(z)
-    residual = arena.residuals(arena.values(z[None]), z[None])[0]
-    return arena, Fits(arena).begin(Hypothesis(), z, np.zeros(0), residual)
+    return arena, _from(arena, z)
 
 
 def _begun(arena: Arena, z: np.ndarray | None) -> np.ndarray:
@@ -204,10 +202,10 @@ def _begun(arena: Arena, z: np.ndarray | None) -> np.ndarray:
     return np.clip(found, arena.lower, arena.upper)
 
 
-def _calibrated(arena: Arena, base: Fit) -> tuple[float, float]:
-    """Floor [m] and factor on the noise under which healthy residuals are most likely."""
+def _calibrate(arena: Arena, z: np.ndarray) -> None:
+    """Whitens with the floor and the factor on the noise under which healthy residuals at z are most likely."""
     own = arena.floor_m
-    raw = arena.raw(arena.values(base.z[None]), base.z[None])
+    raw = arena.raw(arena.values(z[None]), z[None])
 
     def best(pairs: Iterable[tuple[float, float]]) -> tuple[float, float]:
         found = {}
@@ -219,16 +217,14 @@ def _calibrated(arena: Arena, base: Fit) -> tuple[float, float]:
 
     floor, noise = best((factor * own, 1.0) for factor in FLOORS)
     floor, noise = best((floor, noise) for noise in NOISES)
-    return best((factor * floor, noise) for factor in (0.6, 0.8, 1.0)) if noise > 1 else (floor, noise)
+    if noise > 1:
+        floor, noise = best((factor * floor, noise) for factor in (0.6, 0.8, 1.0))
+    arena.whiten(floor_m=floor, noise=noise)
 
 
 def _posterior(arena: Arena, base: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Mean and precision of the nuisances after the healthy runs, a little wider: a robot ages."""
-    fits = Fits(arena)
-    again = fits.begin(
-        base.hypothesis, base.z, base.x, arena.residuals(arena.values(base.z[None]), base.z[None])[0]
-    )  # fmt: skip
-    H, _ = fits.normal(again)
+    H, _ = Fits(arena).normal(base)
     n = arena.shared
     aged = AGED**2 * np.diag(1.0 / np.diag(arena.precision)[:n])
     return base.z[:n], np.linalg.inv(np.linalg.inv(H)[:n, :n] + aged)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,7 +56,8 @@ class Starts:
                     rest = self._rest[run.name]
                     states = [rest]
                     if last[run.name] > 1:
-                        states += _Ensemble(caps, predictor, values, rest, self.belief).starts(last[run.name])
+                        later = _Ensemble(caps, predictor, values, rest, self.belief).starts()
+                        states += islice(later, last[run.name] - 1)
             except EngineError as error:
                 raise refused(error, ()) from error
             found.update({(run.name, k + 1): state for k, state in enumerate(states)})

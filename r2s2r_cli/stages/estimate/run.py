@@ -11,6 +11,7 @@ from r2s2r_cli.artifact import Group
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.estimate.contacts import contact_probability, contacts, height_error
 from r2s2r_cli.stages.estimate.ground import Ground, find_ground
+from r2s2r_cli.stages.estimate.lasting import lasting
 from r2s2r_cli.stages.estimate.lengths import SensorLengths, sensor_lengths
 from r2s2r_cli.stages.estimate.noise import observation_noise
 from r2s2r_cli.stages.estimate.rigid import Rods, is_rigid, make_rigid
@@ -62,6 +63,9 @@ def estimate_run(run: str, streams: dict[str, Group], robot: Robot, settings: Es
     kept, t, observed = observations(run, streams)
     check_robot(run, observed, robot, settings)
     noise, held = observation_noise(t, observed, streams["caps"], where=f"runs/{run}/caps")
+    rigid = is_rigid(observed, noise)
+    if not rigid.any():
+        noise = noise * lasting(t, observed, noise)
     intervals, parts = _intervals(run, streams, t)
     tracks = smooth(
         t,
@@ -73,7 +77,6 @@ def estimate_run(run: str, streams: dict[str, Group], robot: Robot, settings: Es
     )
     length = np.array([rod.length_m for rod in robot.rods])
     radius = np.repeat([rod.cap_radius_m for rod in robot.rods], 2)
-    rigid = is_rigid(observed, noise)
     rods = make_rigid(tracks.p_WE, tracks.cov_p, tracks.v_WE, tracks.cov_v, length, ~rigid)
     ground = find_ground(observed, tracks.quality != OUTLIER, radius)
     p_WE = rods.p_WE + np.array([0.0, 0.0, ground.shift])

@@ -43,13 +43,15 @@ class Material:
     unexplained: float
     groups: np.ndarray
     calibration: Calibration
+    chronic: np.ndarray
+    """What of the gain of each fit was there before (`before.chronic`) [nats]."""
     logged: Mapping[str, float] = field(default_factory=dict)
     """Gains [nats] of effects that change no prediction, from the logs alone."""
 
 
 def concluded(m: Material) -> Which:
     """The verdict."""
-    gains = dict(enumerate(gains_of(m.refit, m.scores).tolist()))
+    gains = dict(enumerate((gains_of(m.refit, m.scores) - m.chronic).tolist()))
     order = sorted(gains, key=lambda i: -gains[i])
     singles = [i for i in order if len(m.fits[i].hypothesis.parts) == 1]
     best: dict[str, int] = {}

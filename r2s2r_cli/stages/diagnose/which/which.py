@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.parity.finding import MOST_NATS
 from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.before import Healthy, chronic
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY, candidates
 from r2s2r_cli.stages.diagnose.which.fit import DAMPING, Fit, Fits, Hypothesis
@@ -61,10 +61,10 @@ class Compared:
 def compare_effects(
     arena: Arena, base: Fit, *, floor_m: float, calibration: Calibration, sizes: Mapping[str, Mapping[str, float]],
     suspected: Mapping[str, float] | None = None, effects: Sequence[str] | None = None, seed: int = 0, told: Told,
-    ways: Ways | None = None, kept: Mapping[str, Any] | None = None,
-    keep: Callable[[str, Any], None] = lambda name, value: None,
+    ways: Ways | None = None, healthy: Healthy | None = None,
 ) -> Compared:  # fmt: skip
     """All effects against the refit nominal model `base` of this arena. floor_m: key-frame RMSE with nothing wrong.
+    healthy: the runs of before; an effect that helps there as well makes up for the simulator.
 
     sizes, suspected: of the parity stage: sizes to begin with, and how surely (in sd) it suspects an effect: the first
     are fitted whatever the screening says. effects: only these. Raises NumericalError where nothing can be simulated.
@@ -77,26 +77,28 @@ def compare_effects(
     groups = groups_of(arena)
     suspected = {name: sd for name, sd in (suspected or {}).items() if effects is None or name in effects}
     picked = _picked(responses, tuple(suspected))
-    fits = _fitted(arena, base, picked, told, kept or {})
-    keep("fits", {fit.hypothesis.label: [fit.z.tolist(), fit.x.tolist()] for fit in fits})
+    base, fits = _fitted(arena, base, picked, told)
     wider, unexplained = _widened(arena, [base, *fits[:LOOKED_AT]]) if ways.unknown else (1.0, 0.0)
     if wider > 1.0:
         arena.whiten(floor_m=wider * arena.floor_m)
         base, *fits = _again(arena, [base, *fits])
     told("left out", 0, 1)
     refit, *own = scores(arena, [base, *fits], groups, held_out=ways.held_out)
-    pairs = _pairs(arena, base, fits, refit, own)
+    old = chronic(arena, healthy, fits)
+    pairs = _pairs(arena, base, fits, gains(refit, own) - old)
     if pairs:
         fits, own = [*fits, *pairs], [*own, *scores(arena, pairs, groups, held_out=ways.held_out)]
+        old = np.concatenate([old, chronic(arena, healthy, pairs)])
     told("left out", 1, 1)
     material = Material(
         arena=arena, base=base, refit=refit, fits=tuple(fits), scores=tuple(own), responses=responses,
         chance=chance(arena, responses, groups, seed=seed), no_gap=no_gap(refit, floor_m), wider=wider,
         unexplained=unexplained if ways.unknown else -np.inf, groups=groups, calibration=calibration,
+        chronic=old,
         logged={name: min(0.5 * suspected[name] ** 2, MOST_NATS) for name in NO_REPLAY if name in suspected},
     )  # fmt: skip
     which = concluded(material)
-    order = np.argsort(-gains(refit, own), kind="stable")
+    order = np.argsort(old - gains(refit, own), kind="stable")
     return Compared(arena, base, tuple(fits[i] for i in order), refit, tuple(own[i] for i in order), which)
 
 
@@ -125,33 +127,30 @@ def _picked(responses: Sequence[Response], suspected: Sequence[str]) -> list[Res
     return found
 
 
-def _fitted(arena: Arena, base: Fit, picked: Sequence[Response], told: Told, kept: Mapping[str, Any]) -> list[Fit]:
-    """Fits of the picked candidates from several sizes and signs, the best of each, best first; from where they were
-    before an interruption (kept)."""
+def _fitted(arena: Arena, base: Fit, picked: Sequence[Response], told: Told) -> tuple[Fit, list[Fit]]:
+    """The refit nominal model and fits of the picked candidates, all from the same start with the same budget: else
+    who goes on gains what the other left. Candidates from several sizes and signs, the best of each, best first."""
     fits = Fits(arena)
-    points: list[tuple[Hypothesis, np.ndarray, np.ndarray]] = []
+    points: list[tuple[Hypothesis, np.ndarray, np.ndarray]] = [(Hypothesis(), base.z, base.x)]
     for response in picked:
         one = response.candidate
-        if one.label in kept.get("fits", {}):
-            z, x = kept["fits"][one.label]
-            points.append((Hypothesis((one,)), np.array(z), np.array(x)))
-            continue
         for share in (1.0, 0.3, -1.0):
             x = np.clip(one.off + share * (response.size - one.off), one.lower, one.upper)
             if share == 1.0 or np.any(np.abs(x - one.off) > 1e-6):
                 points.append((Hypothesis((one,)), response.start_z if share == 1.0 else base.z, x))
-    if not points:
-        return []
     begun = _begun(arena, fits, points)
     told("fits", 0, 1)
     fits.run(begun, iterations=FIRST)
     begun = _best_of(begun)
     fits.run(begun, told=lambda done, total: told("fits", done, total))
     best = _best_of(begun)
-    for fit in best[:POLISHED]:  # from derivatives taken where it is now
+    nominal = next(fit for fit in best if not fit.hypothesis.parts)
+    best = [fit for fit in best if fit is not nominal]
+    going = [nominal, *best[:POLISHED]]
+    for fit in going:  # from derivatives taken where it is now
         fit.ended, fit.damping = False, DAMPING
-    fits.run(best[:POLISHED])
-    return _best_of(best)
+    fits.run(going)
+    return nominal, _best_of(best)
 
 
 def _begun(arena: Arena, fits: Fits, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]]) -> list[Fit]:
@@ -195,11 +194,12 @@ def _again(arena: Arena, old: Sequence[Fit]) -> list[Fit]:
     return begun
 
 
-def _pairs(arena: Arena, base: Fit, fits: Sequence[Fit], refit: Score, own: Sequence[Score]) -> list[Fit]:
-    """The best single effect with each other one that was fitted: where one effect leaves something, two may not."""
+def _pairs(arena: Arena, base: Fit, fits: Sequence[Fit], gained: np.ndarray) -> list[Fit]:
+    """The best single effect with each other one that was fitted: where one effect leaves something, two may not.
+    gained (fit,): by each [nats]."""
     if len(fits) < 2:
         return []
-    order = np.argsort(-gains(refit, own), kind="stable")
+    order = np.argsort(-gained, kind="stable")
     first = fits[order[0]]
     others = [fits[i] for i in order[1:] if fits[i].hypothesis.effects != first.hypothesis.effects]
     seen: set[str] = set()

@@ -101,8 +101,10 @@ def _again(project: Project, path: Path, say: Callable[[str], None]) -> Iterator
     made = read_header(path).provenance
     number = path.parent.name
     sources = [project.root / ref.path for ref in made.inputs]
-    if made.stage in ("record", "execute") or (made.stage == "import" and not all(one.exists() for one in sources)):
-        return  # measured: it cannot be made again. What would be executed is asked for with its plan, below
+    if made.stage in ("record", "execute", "collect") or (
+        made.stage == "import" and not all(one.exists() for one in sources)
+    ):
+        return  # measured, or collected by hand: no command makes it again. The plan asks what would be executed, below
     header, old = read_artifact(path)
     if made.stage == "estimate" and not _has_sightings(project, made.inputs[0].path):
         say(f"{name}: the pictures it was made from are not kept")

@@ -133,6 +133,7 @@ def main(out: Path) -> None:
     for words in (("identify",), ("plan",)):
         bench.r2s2r(*words, "--iteration", "2", "--no-draw")
     bench.execute(2, SECOND)
+    collect(bench.root)
     for name in (".r2s2r", "world.toml.lock"):
         shutil.rmtree(bench.root / name, ignore_errors=True)
     bench.r2s2r("status")
@@ -150,10 +151,39 @@ def update(out: Path) -> None:
     bench = Bench(out.resolve())
     for path in Project.find(bench.root).artifacts():
         made = read_header(path).provenance
-        if made.stage in ("record", "execute") or path.name.startswith("51-"):
+        if made.stage in ("record", "execute", "collect") or path.name.startswith("51-"):
             continue
         bench.r2s2r(*shlex.split(command_again(made, path))[1:], "--no-draw")
+    collect(bench.root)
     shutil.rmtree(bench.root / ".r2s2r", ignore_errors=True)
+
+
+def collect(root: Path) -> None:
+    """The policies of the project in one artifact, `policies.h5`: the recorded one and the executed ones.
+
+    No command writes this kind; every command that takes a policy reads it (`r2s2r simulate policies.h5:walk`)."""
+    from datetime import UTC, datetime
+
+    from r2s2r_cli.artifact import ArtifactData
+    from r2s2r_cli.commands.simulate_inputs import read_policies
+    from r2s2r_cli.stages.simulate.policies import policy_group
+    from r2s2r_cli.store.header import whole_header
+    from r2s2r_cli.store.project import Project
+    from r2s2r_cli.store.provenance import build_provenance
+    from r2s2r_cli.store.staleness import artifact_ref, source_ref
+    from r2s2r_cli.store.write import write_artifact
+
+    project = Project.find(root)
+    walk = root / "policies" / "walk.toml"
+    plans = {root / "iterations" / f"{number:03d}" / "40-plan.h5": names for number, names in ((1, FIRST), (2, SECOND))}
+    texts = [str(walk), *(f"{plan}:{name}" for plan, names in plans.items() for name in names)]
+    groups = {f"policies/{one.name}": policy_group(one) for text in texts for one in read_policies(text)}
+    inputs = [source_ref(project, walk), *(artifact_ref(project, plan, whole_header(plan)) for plan in plans)]
+    made = build_provenance(
+        stage="collect", stage_version=1, argv=["make.py"], settings={"flags": {}}, overrides={}, robot={},
+        inputs=inputs, started=datetime.now(UTC), wall_s=0.0,
+    )  # fmt: skip
+    write_artifact(project.artifact("policy", None), ArtifactData("policy", groups), made)
 
 
 def settle(path: Path) -> None:

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from r2s2r_cli.stages.diagnose.next_apart import left
-from r2s2r_cli.stages.diagnose.next_gait import SETTLE_S, _commands
+from r2s2r_cli.stages.diagnose.next_apart import apart, left
+from r2s2r_cli.stages.diagnose.next_gait import SETTLE_S, _commands, _imagined
+from r2s2r_cli.stages.diagnose.sample import _at_rest, planted
 from r2s2r_cli.stages.diagnose.stage import library_of
+from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.candidates import candidates
+from r2s2r_cli.stages.diagnose.which.fit import Fit, Hypothesis
+from r2s2r_cli.stages.diagnose.which.numbers import Model
+from r2s2r_cli.stages.diagnose.which.replay import Replayer
+from r2s2r_cli.stages.diagnose.which.stretches import stretch_of
+from r2s2r_cli.stages.identified import nominal
+from r2s2r_cli.stages.identify.windows import window
 from tests.support.builders import robot
 
 
@@ -56,3 +67,30 @@ def test_no_piece_tells_candidates_apart_alone() -> None:
     assert left([one], [empty], none) == pytest.approx(15.0 * np.log1p(1000.0 / 15.0))
     spread = left([one / 10.0] * 100, [empty] * 100, none)
     assert 700.0 < spread < 1000.0
+
+
+@pytest.mark.slow
+def test_motors_that_run_tell_a_late_one_from_a_slow_one(tmp_path: Path) -> None:
+    """Commands that come 0.2 s late as the truth: themselves they are never apart; motors that lag are, by more nats on
+    six targets than on two, and not at all where no motor runs."""
+    body = robot()
+    model = Model(nominal(body))
+    replayer = Replayer(model, step=2e-3, cache_dir=tmp_path, threads=1)
+    run = planted(body, {}, gaits=2, targets=2, cache_dir=tmp_path).runs[0]
+    like = stretch_of(run, 1, window(run.caps, (1,), _at_rest(replayer)), 0)
+    arena = Arena(replayer, [like], floor_m=2e-3)
+    found = {one.effect: one for one in candidates(model) if one.element is None}
+
+    def fit(effect: str, tau_s: float) -> Fit:
+        x = np.array([tau_s])
+        return Fit(Hypothesis((found[effect],)), arena.mean.copy(), x, np.zeros(0), np.zeros((0, 0)), 0.0, x)
+
+    late, slow = fit("command_latency", 0.2), fit("motor_lag", 0.2)
+    six = tuple(tuple(float((k + i) % 2) for i in range(6)) for k in range(6))
+    still = ((1.0,) * 6,) * 6
+    nats = {}
+    for name, targets in {"six": six, "two": six[:2], "still": still}.items():
+        same, nats[name] = apart(arena, _imagined(arena, targets)[0], late, [late, slow])
+        assert same == pytest.approx(0.0, abs=1e-6)
+    assert nats["six"] > nats["two"] > 1.0
+    assert nats["still"] < 1e-3

@@ -60,6 +60,9 @@ RULES = (
     Rule("simulation", "runs/*/frames/p_WE", 10e-3),
     Rule("simulation", "runs/*/frames/length", 5e-3),
     Rule("floor", "caps@floor", 0.05, relative=True),
+    # The key-frame error of the refit, on one interval; which effect comes first is not decided by so few runs.
+    Rule("diagnosis", "judged/nominal", 5e-3),
+    Rule("diagnosis", "judged/refit", 10e-3),
     Rule("comparison", "runs/*/real/*", 1e-6),
     Rule("comparison", "runs/*/simulated/trained_on", 0.0),
     Rule("comparison", "runs/*/simulated/keyframe", 2e-3),

@@ -100,13 +100,12 @@ class Bench:
                 process.terminate()
 
     def execute(self, iteration: int, policies: tuple[str, ...]) -> None:
-        """Executed, estimated, without its pictures, compared."""
+        """Executed, estimated, without its pictures."""
         here = ("--iteration", str(iteration))
         with self.rig(LARGE) as robot:
             self.r2s2r("execute", *policies, "--repeats", str(REPEATS), "--yes", "--no-draw", *here, *robot)
         self.r2s2r("estimate", "--of", "execute", "--no-draw", *here)
         without_pictures(self.root / "iterations" / f"{iteration:03d}" / "50-execute.h5")
-        self.r2s2r("compare", "--no-draw", *here)
 
 
 def main(out: Path) -> None:
@@ -123,7 +122,7 @@ def main(out: Path) -> None:
     bench.r2s2r("calibrate", "--points", "points.csv", "--no-draw")
     with bench.rig(SMALL) as robot:
         bench.r2s2r("record", "policies/walk.toml", "--no-draw", *robot)
-    for words in (("estimate",), ("floor",), ("identify",), ("plan",)):
+    for words in (("estimate",), ("identify",), ("plan",)):
         bench.r2s2r(*words, "--no-draw")
     bench.execute(1, FIRST)
     bench.r2s2r(
@@ -133,6 +132,9 @@ def main(out: Path) -> None:
     for words in (("identify",), ("plan",)):
         bench.r2s2r(*words, "--iteration", "2", "--no-draw")
     bench.execute(2, SECOND)
+    for words in (("floor",), ("compare", "--iteration", "1"), ("compare", "--iteration", "2"),
+                  ("diagnose", "--iteration", "1")):  # fmt: skip
+        bench.r2s2r(*words, "--no-draw")
     collect(bench.root)
     for name in (".r2s2r", "world.toml.lock"):
         shutil.rmtree(bench.root / name, ignore_errors=True)
@@ -149,8 +151,9 @@ def update(out: Path) -> None:
     from r2s2r_cli.store.project import Project
 
     bench = Bench(out.resolve())
-    for path in Project.find(bench.root).artifacts():
-        made = read_header(path).provenance
+    later = ("floor", "compare", "diagnose")  # in this order, after everything that they read
+    found = [(read_header(path).provenance, path) for path in Project.find(bench.root).artifacts()]
+    for made, path in sorted(found, key=lambda one: 1 + later.index(one[0].stage) if one[0].stage in later else 0):
         if made.stage in ("record", "execute", "collect") or path.name.startswith("51-"):
             continue
         bench.r2s2r(*shlex.split(command_again(made, path))[1:], "--no-draw")

@@ -90,8 +90,8 @@ def test_a_place_begins_where_a_cap_first_slides_over_it() -> None:
     found = reached(runs, **at)  # type: ignore[arg-type]
     assert found is not None
     assert (found.order, found.interval, found.run) == (6, 3, "g")
-    assert reached([_run(25, speed=0.0)], **at) is None  # type: ignore[arg-type]
+    assert reached([_run(25, speed=0.0)], **at) is None  # type: ignore[arg-type, list-item]
     high = _run(25, speed=0.1)
     high.caps.p_WE[..., 2] = 0.1
-    assert reached([high], **at) is None  # type: ignore[arg-type]
+    assert reached([high], **at) is None  # type: ignore[arg-type, list-item]
     assert reached(runs, **{**at, "within_m": 0.04}) is None  # type: ignore[arg-type]

@@ -39,6 +39,9 @@ JACOBIANS = 2
 AGED = 0.35
 """Of a nuisance's own prior: how far it may have moved since the healthy runs, and how wrong their fit may be: where
 robots fall over, two fits of the same runs differ by as much."""
+AGED_NUMERICS = 0.1
+"""The same of effects that are nuisances because another engine has a little of them: numerics do not age, and what
+has grown since is the effect."""
 
 Told = Callable[[str, int, int], None]
 
@@ -226,5 +229,7 @@ def _posterior(arena: Arena, base: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Mean and precision of the nuisances after the healthy runs, a little wider: a robot ages."""
     H, _ = Fits(arena).normal(base)
     n = arena.shared
-    aged = AGED**2 * np.diag(1.0 / np.diag(arena.precision)[:n])
+    own = np.array([arena.model.numbers[k].kind == "own" for k in arena.engine])
+    share = np.where(np.pad(own, (0, n - len(own))), AGED_NUMERICS, AGED)
+    aged = np.diag(share**2 / np.diag(arena.precision)[:n])
     return base.z[:n], np.linalg.inv(np.linalg.inv(H)[:n, :n] + aged)

@@ -61,8 +61,8 @@ def compare(
     """Compare real runs with the same policies in the simulator: ends, headings, paths, caps, times, ranking of gaits.
 
     Every policy is simulated with the controller in the loop, from where the real robot came to rest before it; key
-    frames are by command replay. Each error stands beside the floor: what a perfect simulator would be found to be wrong by. From the second
-    iteration on the executed runs of the earlier ones are compared as well: how the gap went.
+    frames are by command replay. Each error stands beside the floor: what a perfect simulator would be found to be
+    wrong by. From the second iteration on the executed runs of the earlier ones are compared as well: how the gap went.
 
     Example: r2s2r compare --iteration 2
     """

@@ -29,24 +29,26 @@ def seen(rho: float, sd: float, *, seed: int = 0, seconds: float = SECONDS) -> t
 
 @pytest.mark.parametrize("seed", range(5))
 def test_white_noise_does_not_last(seed: int) -> None:
+    """Exactly 1: logs of white noise are estimated as before."""
     t, caps = seen(0.0, 0.003, seed=seed)
     assert lasting(t, caps, noise_sd(t, caps)) == 1.0
 
 
 @pytest.mark.parametrize("rho", [0.5, 0.7, 0.85])
 def test_an_ar1_error_counts_as_the_white_noise_of_its_spectrum_at_rest(rho: float) -> None:
+    """S(0) of an AR(1) process is sd^2 (1 + rho) / (1 - rho); lags that are left out make it a little less."""
     sd = 0.01
     found = []
     for seed in range(5):
         t, caps = seen(rho, sd, seed=seed)
         stated = noise_sd(t, caps)
         found.append(lasting(t, caps, stated) * float(np.sqrt(np.mean(stated**2))))
-    # S(0) of an AR(1) process: sd^2 (1 + rho) / (1 - rho); lags below the threshold are left out, so a little less.
     wanted = sd * np.sqrt((1 + rho) / (1 - rho))
     assert 0.8 * wanted < np.median(found) < 1.15 * wanted
 
 
 def test_the_mean_of_some_frames_is_as_sure_as_the_white_noise_says() -> None:
+    """What smoothing makes of it: means over 2 s scatter as those of the white noise."""
     rho, sd, count = 0.7, 0.01, 60
     t, caps = seen(rho, sd, seconds=400.0)
     _, true = seen(rho, 0.0, seconds=400.0)
@@ -56,6 +58,7 @@ def test_the_mean_of_some_frames_is_as_sure_as_the_white_noise_says() -> None:
 
 
 def test_a_wrong_scale_and_exchanged_caps_are_no_noise_that_lasts() -> None:
+    """A length that is wrong all the time, and one that is wrong for three frames."""
     t, caps = seen(0.0, 0.003)
     caps = 1.04 * caps
     caps[100:103, [0, 1]] = caps[100:103, [3, 2]]
@@ -63,5 +66,6 @@ def test_a_wrong_scale_and_exchanged_caps_are_no_noise_that_lasts() -> None:
 
 
 def test_a_few_frames_say_nothing() -> None:
+    """45 frames."""
     t, caps = seen(0.7, 0.01, seconds=1.5)
     assert lasting(t, caps, noise_sd(t, caps)) == 1.0

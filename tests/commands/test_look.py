@@ -80,8 +80,9 @@ def test_a_new_stage_version_makes_its_results_stale(estimated: Path, monkeypatc
     """Raising a stage's version is a reason of its own."""
     from schemas import versions
 
-    monkeypatch.setitem(versions.STAGE_VERSIONS, "estimate", 2)
-    assert states()[ESTIMATE] == ("stale", ["stage estimate changed: made by version 1, now 2"])
+    now = versions.STAGE_VERSIONS["estimate"]
+    monkeypatch.setitem(versions.STAGE_VERSIONS, "estimate", now + 1)
+    assert states()[ESTIMATE] == ("stale", [f"stage estimate changed: made by version {now}, now {now + 1}"])
 
 
 def test_status_of_a_damaged_artifact(estimated: Path) -> None:

@@ -118,7 +118,8 @@ def test_a_new_stage_version_is_a_reason(project: Project) -> None:
     """What an older version of the stage computed is stale."""
     header, now = estimated(project), want(project)
     newer = Wanted(now.stage_version + 1, now.settings, now.robot)
-    assert reasons(project, header, newer) == ["stage estimate changed: made by version 1, now 2"]
+    said = f"made by version {now.stage_version}, now {now.stage_version + 1}"
+    assert reasons(project, header, newer) == [f"stage estimate changed: {said}"]
 
 
 def test_an_input_that_changed_is_named(project: Project) -> None:

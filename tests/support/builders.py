@@ -17,6 +17,7 @@ from r2s2r_cli.stages.init.robots import robot_toml
 from schemas.base import DIM_SIZES, ArtifactSpec, DatasetSpec, GroupSpec
 from schemas.header import InputRef, Provenance
 from schemas.robot import Robot
+from schemas.versions import STAGE_VERSIONS
 from tests.support.identified import identification as identified
 from tests.support.motion import Motion, motion
 
@@ -33,7 +34,8 @@ def robot() -> Robot:
 def provenance(**changes: Any) -> Provenance:
     """A provenance that is the same on every machine and at every time."""
     values: dict[str, Any] = {
-        "stage": "import", "stage_version": 1, "argv": ("r2s2r", "import", "walk.csv"),
+        "stage": "import", "stage_version": STAGE_VERSIONS.get(changes.get("stage", "import"), 1),
+        "argv": ("r2s2r", "import", "walk.csv"),
         "settings": {"rod_length_tolerance": 0.05, "flags": {}}, "robot": {"name": "threebar"},
         "config_sha256": "0" * 64, "inputs": (InputRef(path="walk.csv", kind="file", sha256="1" * 64),),
         "versions": {"r2s2r": "0", "python": "3"}, "platform": "nowhere", "started": STARTED.isoformat(),

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import _thread
 import signal
 import sys
+import threading
+from collections.abc import Callable
+from typing import Any
+
+SOON_S = 0.02
+"""After which a swallowed interrupt comes again."""
 
 
 def main() -> None:
     """Load the app and run it. Ctrl-C counts as an interrupt from the first moment to the last, without a traceback."""
+    sys.unraisablehook = again(sys.unraisablehook)
     try:
         early: list[int] = []
         usual = signal.signal(signal.SIGINT, lambda number, _: early.append(number))
@@ -22,6 +30,21 @@ def main() -> None:
         sys.exit(130)
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done: Python's own exit has nothing to interrupt
+
+
+def again(usual: Callable[[Any], object]) -> Callable[[Any], object]:
+    """A hook for what Python can raise nowhere: an interrupt that fell into the callback of a weak reference or into a
+    finaliser is not lost and says nothing, but comes once more."""
+
+    def hook(raised: Any) -> None:
+        if raised.exc_type is KeyboardInterrupt:
+            later = threading.Timer(SOON_S, _thread.interrupt_main)  # at once it would fall into this very hook
+            later.daemon = True
+            later.start()
+        else:
+            usual(raised)
+
+    return hook
 
 
 if __name__ == "__main__":

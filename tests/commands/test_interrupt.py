@@ -81,3 +81,24 @@ def test_ctrl_c_leaves_everything_whole(estimated: Path) -> None:
 def test_ctrl_c_at_many_moments(estimated: Path) -> None:
     """Forty moments over the whole command."""
     check(estimated, [0.02 + 0.05 * i for i in range(40)])
+
+
+def test_an_interrupt_that_a_finaliser_swallows_comes_again() -> None:
+    """Python prints an exception of a weak reference's callback and goes on; ours ends the command, without a word."""
+    program = """
+import signal, sys, time, weakref
+from r2s2r_cli.__main__ import again
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background process inherits "ignore"
+sys.unraisablehook = again(sys.unraisablehook)
+class Thing: pass
+def swallowed(_): raise KeyboardInterrupt
+thing = Thing()
+kept = weakref.ref(thing, swallowed)
+try:
+    del thing
+    time.sleep(10)
+except KeyboardInterrupt:
+    print("came again")
+"""
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    assert (found.stdout, found.stderr) == ("came again\n", "")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import _thread
+import os
 import signal
 import sys
 import threading
@@ -38,7 +38,7 @@ def again(usual: Callable[[Any], object]) -> Callable[[Any], object]:
 
     def hook(raised: Any) -> None:
         if raised.exc_type is KeyboardInterrupt:
-            later = threading.Timer(SOON_S, _thread.interrupt_main)  # at once it would fall into this very hook
+            later = threading.Timer(SOON_S, os.kill, (os.getpid(), signal.SIGINT))  # at once it falls into this hook
             later.daemon = True
             later.start()
         else:

@@ -16,14 +16,12 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.which.arena import LOST_M, SECANT, Arena
 from r2s2r_cli.stages.diagnose.which.fit import PRIOR_SCALES, Fit, Fits
 from r2s2r_cli.stages.diagnose.which.mixture import ENOUGH
-from r2s2r_cli.stages.diagnose.which.pieces import length_of
+from r2s2r_cli.stages.diagnose.which.pieces import LEAST_SPEED_SD, length_of
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.diagnose.which.white import FLOOR_S
 from r2s2r_cli.stages.identify.windows import Window
 
 ROUNDS = 6
-LEAST_SPEED_SD = 5e-3
-"""[m/s] Of a start, as in `which/pieces.py`."""
 
 
 def apart(arena: Arena, whole: Stretch, truth: Fit, others: Sequence[Fit]) -> tuple[float, ...]:

@@ -12,11 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
-from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
+from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, unlikely
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
-
-ENOUGH = 12.0
-"""[nats] No piece says more than that, for or against: a robot that tips over is explained by anything."""
+from r2s2r_cli.stages.diagnose.which.score import ENOUGH
 
 
 @dataclass(frozen=True)
@@ -29,7 +27,7 @@ class Healthy:
 
 def chronic(arena: Arena, healthy: Healthy | None, fits: Sequence[Fit]) -> np.ndarray:
     """What of each fit's gain in `arena` is owed to what was there before [nats], (fit,): its gain in the healthy runs,
-    by as many pieces as there are now. 0 without healthy runs."""
+    by as many pieces as there are now; no piece says more than ENOUGH. 0 without healthy runs."""
     if healthy is None:
         return np.zeros(len(fits))
     more = max(1.0, len(arena.many) / len(healthy.arena.many))
@@ -76,9 +74,4 @@ def _pieces(arena: Arena, residuals: np.ndarray) -> np.ndarray:
 
 def _gain(arena: Arena, own: np.ndarray, z_own: np.ndarray, z: np.ndarray, residuals: np.ndarray) -> np.ndarray:
     by_piece = np.clip(own[None] - _pieces(arena, residuals), -ENOUGH, ENOUGH).sum(axis=1)
-
-    def prior(at: np.ndarray) -> np.ndarray:
-        away = at - arena.mean
-        return 0.5 * np.einsum("ki,ij,kj->k", away, arena.precision, away)
-
-    return np.asarray(by_piece + prior(z_own[None]) - prior(z))
+    return np.asarray(by_piece + unlikely(arena, z_own[None]) - unlikely(arena, z))

@@ -94,8 +94,7 @@ class Fits:
 
     def cost(self, hypothesis: Hypothesis, z: np.ndarray, x: np.ndarray, residual: np.ndarray) -> np.ndarray:
         """Robust cost with priors, (k,), at z (k, p + q), x (k, n), residuals (k, M); inf where not finite."""
-        away = z - self.arena.mean
-        prior = 0.5 * np.einsum("ki,ij,kj->k", away, self.arena.precision, away)
+        prior = unlikely(self.arena, z)
         if x.shape[1]:
             sd = PRIOR_SCALES * hypothesis.stack("scale")
             prior = prior + 0.5 * np.sum(((x - hypothesis.stack("off")) / sd) ** 2, axis=1)
@@ -236,6 +235,12 @@ class Fits:
         for (fit, i, by), residual in zip(where, self._evaluate(points), strict=True):
             column = (residual - fit.residual) / by
             fit.jacobian[:, len(fit.z) + i] = np.where(np.isfinite(column), column, 0.0)
+
+
+def unlikely(arena: Arena, z: np.ndarray) -> np.ndarray:
+    """-log prior density of nuisances z (k, p + q), up to a constant, (k,) [nats]."""
+    away = z - arena.mean
+    return np.asarray(0.5 * np.einsum("ki,ij,kj->k", away, arena.precision, away))
 
 
 def _spread(

@@ -75,7 +75,7 @@ def one(job: Job) -> dict[str, Any]:
     if digest(folder) != job.logs:
         raise InputError(
             "the logs of a set are not those that the bank was closed with", where=str(folder), expected=job.logs,
-            received=digest(folder), hint="r2s2r blind make --out bank",
+            received=digest(folder), hint="r2s2r blind make bank --key labels.key",
         )  # fmt: skip
     diagnoser = _diagnoser(job.diagnoser)
     guard = _guard(job.bank)

@@ -21,6 +21,8 @@ from schemas.robot import Robot
 
 JUDGED = 3
 """Of so many gaits one is judged on, the last ones; the others are fitted."""
+FOLLOW = "follow"
+"""Folder of what was run after the gaits of a set, because of their verdict (`blind follow`)."""
 ROD_TOLERANCE = 0.1
 """A camera whose scale is wrong is something to be diagnosed, not refused."""
 
@@ -31,7 +33,7 @@ def set_names(folder: Path) -> tuple[str, ...]:
     if not found:
         raise InputError(
             "there are no blind sets", where=str(folder), expected="folders with robot.toml and gaits/",
-            received="none", hint="r2s2r blind make --out bank",
+            received="none", hint="r2s2r blind make bank --key labels.key",
         )  # fmt: skip
     return found
 
@@ -39,7 +41,7 @@ def set_names(folder: Path) -> tuple[str, ...]:
 def read_set(folder: Path, *, shuffled: int | None = None) -> Evidence:
     """The evidence of one set. The simulator is that of its robot.toml: nothing was identified before.
 
-    The last third of the gaits is judged, the others are fitted. shuffled: seed with which the commands of the target
+    The last third of the gaits is judged, the others are fitted, and with them what was run later on. shuffled: seed with which the commands of the target
     intervals are exchanged (`Evidence.shuffled`), a negative control; the healthy runs stay. Raises InputError where
     the folder is no set.
     """
@@ -49,12 +51,15 @@ def read_set(folder: Path, *, shuffled: int | None = None) -> Evidence:
     if len(runs) < 2:
         raise InputError(
             "a set needs two gaits, one of them to judge on", where=str(folder / "gaits"), expected="at least 2 logs",
-            received=str(len(runs)), hint="r2s2r blind make --out bank",
+            received=str(len(runs)), hint="r2s2r blind make bank --key labels.key",
         )  # fmt: skip
+    # Judged are the same gaits whatever was run later, and runs stand in the order in which they were made: an effect
+    # may begin with one of them.
+    later = _runs(folder / FOLLOW, robot) if (folder / FOLLOW).is_dir() else ()
     judged = max(1, round(len(runs) / JUDGED))
     evidence = Evidence(
-        robot=robot, model=nominal(robot), runs=runs, fit=_complete(runs[:-judged]), judge=_complete(runs[-judged:]),
-        healthy=healthy,
+        robot=robot, model=nominal(robot), runs=(*runs, *later), fit=_complete((*runs[:-judged], *later)),
+        judge=_complete(runs[-judged:]), healthy=healthy,
     )  # fmt: skip
     return evidence if shuffled is None else evidence.shuffled(shuffled)
 
@@ -65,7 +70,7 @@ def _robot(path: Path) -> Robot:
     except (OSError, ValueError, ValidationError) as error:
         raise InputError(
             "the robot of a set cannot be read", where=str(path), expected="a robot.toml",
-            received=str(error).splitlines()[0], hint="r2s2r blind make --out bank",
+            received=str(error).splitlines()[0], hint="r2s2r blind make bank --key labels.key",
         ) from error  # fmt: skip
 
 

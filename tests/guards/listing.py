@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import functools
 import re
+import shlex
 import subprocess
+from itertools import dropwhile, groupby
 from pathlib import Path
 from typing import Any
 
@@ -51,15 +53,36 @@ def commands() -> dict[str, Any]:
     return found
 
 
-FENCED = re.compile(r"^```(?:sh|bash|console|shell)?\n(.*?)^```", flags=re.DOTALL | re.MULTILINE)
+FENCED = re.compile(r"^( *)(```+)(\w*)[^\n]*\n(.*?)^\1\2 *$", flags=re.DOTALL | re.MULTILINE)
+"""Indentation, fence, language and text of a block. The closing fence is part of it, or it would open the next one."""
+SHELLS = {"", "sh", "bash", "console", "shell"}
 
 
 def inline_code(markdown: str) -> list[str]:
-    """What stands between single backticks, outside the fenced blocks."""
-    return re.findall(r"`([^`]+)`", re.sub(r"^```.*?^```", "", markdown, flags=re.DOTALL | re.MULTILINE))
+    """What stands between single backticks, outside the fenced blocks, on one line each."""
+    return [" ".join(code.split()) for code in re.findall(r"`([^`]+)`", FENCED.sub("", markdown))]
 
 
 def shell_lines(markdown: str) -> list[str]:
     """Command lines in the fenced code blocks of a page, without prompts, comments and continuation breaks."""
-    lines = "\n".join(FENCED.findall(markdown)).replace("\\\n", " ").splitlines()
+    blocks = [block[4] for block in FENCED.finditer(markdown) if block[3] in SHELLS]
+    lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
     return [text for line in lines if (text := re.sub(r"(^|\s)#.*", "", line).strip().removeprefix("$ "))]
+
+
+def shell_commands(markdown: str) -> list[list[str]]:
+    """Words of every `r2s2r` command in the code blocks of a page, without the name.
+
+    A command stands between pipes, `&&` and redirections, and after settings of the environment.
+    """
+    found = []
+    for line in shell_lines(markdown):
+        if "r2s2r " not in line:
+            continue
+        reader = shlex.shlex(line, posix=True, punctuation_chars=True)
+        reader.whitespace_split, reader.commenters = True, ""
+        for operator, words in groupby(reader, key=lambda word: set(word) <= set("();<>|&")):
+            rest = list(dropwhile(lambda word: re.match(r"\w+=", word), words))
+            if not operator and rest[:1] == ["r2s2r"]:
+                found.append(rest[1:])
+    return found

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from r2s2r_cli.blind.split import FOLLOW
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, Run
 from r2s2r_cli.stages.estimate import estimate
@@ -21,8 +22,6 @@ from schemas.robot import Robot
 
 JUDGED = 3
 """Of so many gaits one is judged on, the last ones; the others are fitted."""
-FOLLOW = "follow"
-"""Folder of what was run after the gaits of a set, because of their verdict (`blind follow`)."""
 ROD_TOLERANCE = 0.1
 """A camera whose scale is wrong is something to be diagnosed, not refused."""
 
@@ -41,9 +40,9 @@ def set_names(folder: Path) -> tuple[str, ...]:
 def read_set(folder: Path, *, shuffled: int | None = None) -> Evidence:
     """The evidence of one set. The simulator is that of its robot.toml: nothing was identified before.
 
-    The last third of the gaits is judged, the others are fitted, and with them what was run later on. shuffled: seed with which the commands of the target
-    intervals are exchanged (`Evidence.shuffled`), a negative control; the healthy runs stay. Raises InputError where
-    the folder is no set.
+    The last third of the gaits is judged; the others are fitted, and with them what was run later on. shuffled: seed
+    with which the commands of the target intervals are exchanged (`Evidence.shuffled`), a negative control; the healthy
+    runs stay. Raises InputError where the folder is no set.
     """
     robot = _robot(folder / "robot.toml")
     runs = _runs(folder / "gaits", robot)

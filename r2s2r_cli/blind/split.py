@@ -56,6 +56,8 @@ RATES_HZ = (10.0, 30.0)
 GAITS = (3, 5, 8)
 TARGETS = 5
 """Of a gait."""
+FOLLOW = "follow"
+"""Folder in a set of what was run after its gaits, because of their verdict (`blind follow`)."""
 
 
 def seeds(bank: Bank, count: int, first: int = 0) -> range:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -64,7 +65,7 @@ def make(asked: Asked, *, executor: str = "local", workers: int = 1) -> Iterator
     todo = []
     for number, world in enumerate(worlds(asked)):
         job = (asked, world, labels.set_name(asked.key, number))
-        if _sealed(asked.out, job[2]).exists():
+        if sealed(asked.out, job[2]).exists():
             yield job[2]
         else:
             todo.append(job)
@@ -77,30 +78,43 @@ def make(asked: Asked, *, executor: str = "local", workers: int = 1) -> Iterator
 
 def close(asked: Asked) -> None:
     """Write the list of the bank, in the order of the names, which says nothing."""
-    sets = {}
-    for number in range(asked.count):
-        name = labels.set_name(asked.key, number)
-        sets[name] = {
-            "label": labels.commitment_of(_sealed(asked.out, name).read_bytes(), asked.key),
-            "logs": digest(asked.out / labels.SETS / name),
+    names = [labels.set_name(asked.key, number) for number in range(asked.count)]
+    write_list(asked.out, asked.key, names, tier=asked.tier, bank=asked.bank.value)
+
+
+def write_list(out: Path, key: bytes, names: Iterable[str], *, tier: str, bank: str) -> None:
+    """Write `index.json` of the bank `out`: what every set's label was committed to with, and a digest of its logs."""
+    sets = {
+        name: {
+            "label": labels.commitment_of(sealed(out, name).read_bytes(), key),
+            "logs": digest(out / labels.SETS / name),
         }
-    text = index_text(asked.tier, asked.bank.value, sets, f"r2s2r {__version__}")
-    (asked.out / labels.INDEX).write_text(text, encoding="utf-8")
+        for name in names
+    }
+    text = index_text(tier, bank, sets, f"r2s2r {__version__}")
+    (out / labels.INDEX).write_text(text, encoding="utf-8")
+
+
+def write_set(out: Path, name: str, key: bytes, make: Callable[[Path], dict[str, Any]]) -> None:
+    """A set and, after it, its sealed label, each there as a whole or not at all. make: writes the set into a folder
+    that is not there yet, and gives the label."""
+    folder, part = out / labels.SETS / name, out / labels.SETS / f".{name}.part"
+    for old in (folder, part):
+        shutil.rmtree(old, ignore_errors=True)  # of a maker that was interrupted
+    label = make(part)
+    part.rename(folder)
+    data, _ = labels.seal(label, key)
+    path = sealed(out, name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.with_suffix(".part").write_bytes(data)
+    path.with_suffix(".part").rename(path)
+
+
+def sealed(out: Path, name: str) -> Path:
+    """Where the label of a set lies; there once the set is done."""
+    return out / labels.LABELS / f"{name}.sealed"
 
 
 def _one(job: tuple[Asked, Hidden, str]) -> None:
     asked, world, name = job
-    folder, part = asked.out / labels.SETS / name, asked.out / labels.SETS / f".{name}.part"
-    for old in (folder, part):
-        shutil.rmtree(old, ignore_errors=True)  # of a maker that was interrupted
-    label = make_set(world, part, observed=asked.observed, oracle=asked.oracle)
-    part.rename(folder)
-    sealed, _ = labels.seal(label, asked.key)
-    path = _sealed(asked.out, name)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.with_suffix(".part").write_bytes(sealed)
-    path.with_suffix(".part").rename(path)
-
-
-def _sealed(out: Path, name: str) -> Path:
-    return out / labels.LABELS / f"{name}.sealed"
+    write_set(asked.out, name, asked.key, partial(make_set, world, observed=asked.observed, oracle=asked.oracle))

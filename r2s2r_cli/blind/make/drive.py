@@ -25,7 +25,7 @@ SLOPE_F_PER_M, OFFSET_F = 3e-11, 1.4e-11
 
 @dataclass(frozen=True)
 class Gait:
-    """What the robot is told, and where it is put down. targets: positions 0 or 1, (target, actuated)."""
+    """What the robot is told, and where it is put down. targets: positions 0 .. 1, (target, actuated)."""
 
     name: str
     targets: np.ndarray
@@ -57,11 +57,12 @@ class Driven:
     moments: tuple[object, ...]
 
 
-def random_gait(name: str, rng: np.random.Generator, actuated: int = 6) -> Gait:
-    """Random shapes of short and long cables, each at least two cables away from the one before, at a random place."""
+def random_gait(name: str, rng: np.random.Generator, actuated: int = 6, count: int = TARGETS) -> Gait:
+    """`count` random shapes of short and long cables, each at least two cables away from the one before, at a random
+    place."""
     shape = np.ones(actuated)
     targets: list[np.ndarray] = []
-    while len(targets) < TARGETS:
+    while len(targets) < count:
         wanted = rng.integers(0, 2, actuated).astype(float)
         if np.abs(wanted - shape).sum() >= 2:
             targets.append(wanted)

@@ -48,7 +48,9 @@ def write_run(folder: Path, run: Driven, seen: Seen, robot: Robot) -> None:
     n, m = p.shape[1], run.target.shape[1]
     names = ["t_s", *(f"cap{i}_{axis}_m" for i in range(n) for axis in "xyz"), *(f"target{k}" for k in range(m))]
     names += [*(f"control{k}" for k in range(m)), *(f"length{j}_m" for j in range(run.length.shape[1]))]
-    digits = [4] + [5] * (3 * n) + [0] * m + [3] * m + [5] * run.length.shape[1]
+    # Targets of gaits by chance are whole numbers; a suggested one may stop a cable on its way.
+    places = 0 if (run.target == run.target.round()).all() else 3
+    digits = [4] + [5] * (3 * n) + [places] * m + [3] * m + [5] * run.length.shape[1]
     lines = [",".join(names)]
     lines += [",".join("nan" if x != x else f"{x:.{d}f}" for x, d in zip(r, digits, strict=True)) for r in table]
     stem.with_suffix(".csv").write_text("\n".join(lines) + "\n", encoding="ascii")

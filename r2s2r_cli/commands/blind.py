@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from r2s2r_cli.commands.blind_follow import follow
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.options import DrawOption, JsonOption, QuietOption
@@ -153,6 +154,9 @@ def run(
     console.document(result)
     console.data(f"{result.done} of {result.sets} sets have a verdict, {len(failed)} broke off now")
     console.hint(f"r2s2r blind score {bank} --verdicts {out} --key labels.key")
+
+
+blind_app.command("follow")(follow)
 
 
 @blind_app.command("score")

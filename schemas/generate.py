@@ -19,6 +19,7 @@ from pydantic import BaseModel
 
 import schemas
 from schemas.base import DIM_SIZES, ArtifactSpec, Frozen, GroupSpec
+from schemas.blind import BlindPublished
 from schemas.config import ProjectFile, RunConfig
 from schemas.header import Header
 from schemas.policy import PolicyFile
@@ -29,7 +30,7 @@ from schemas.versions import KINDS
 HOME = Path(__file__).resolve().parent
 FILES: dict[str, type[BaseModel]] = {
     "project": ProjectFile, "config": RunConfig, "robot": Robot, "policy": PolicyFile, "sidecar": Sidecar,
-    "header": Header,
+    "header": Header, "blind_published": BlindPublished,
 }  # fmt: skip
 """Models of files, by the name of their JSON Schema."""
 _BASE = "https://json-schema.org/draft/2020-12/schema"

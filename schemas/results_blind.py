@@ -94,6 +94,50 @@ class BlindMiss(Frozen):
     """What is known of it from the label and the verdict."""
 
 
+class BlindShard(Frozen):
+    """One bank of those that were scored together."""
+
+    where: str
+    """Its published file, or the folder of its verdicts."""
+    index_sha256: str
+    sets: int
+    scored: int
+    commit: str | None
+    """Of the code that judged it; None: not known."""
+    sources_sha256: str | None
+    calibrated: tuple[str, ...]
+    """Where its probabilities come from."""
+
+
+class BlindBaseline(Frozen):
+    """A diagnoser that looks at nothing, scored on the same labels."""
+
+    name: str
+    values: dict[str, float]
+    """By the name of the row; rows that it cannot have are left out."""
+
+
+class BlindSplit(Frozen):
+    """The sets with one value of noise, gaits or rate: counts, no targets."""
+
+    by: Literal["noise", "gaits", "rate"]
+    value: str
+    sets: int
+    clear: int
+    """Clear single effects; the next four count among them."""
+    top1: int
+    top3: int
+    named: int
+    right: int
+    """Of the named ones."""
+    none: int
+    """Sets with nothing wrong."""
+    alarms: int
+    """Of these, anything but `no_gap`."""
+    cpu_median_s: float | None
+    """Processor time of a diagnosis."""
+
+
 class BlindScoreResult(Frozen):
     """Everything `blind score` found."""
 
@@ -111,6 +155,24 @@ class BlindScoreResult(Frozen):
     calibration: tuple[BlindBin, ...]
     recall: tuple[BlindRecall, ...]
     misses: tuple[BlindMiss, ...]
+    baselines: tuple[BlindBaseline, ...] = ()
+    splits: tuple[BlindSplit, ...] = ()
+    shards: tuple[BlindShard, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+class BlindPublishResult(Frozen):
+    """A published file."""
+
+    out: str
+    bytes: int
+    sets: int
+    missing: tuple[str, ...]
+    """Sets without a verdict."""
+    index_sha256: str
+    content_sha256: str
+    commit: str | None
+    sources_sha256: str
     warnings: tuple[str, ...] = ()
 
 

@@ -31,12 +31,24 @@ def read_index(path: Path) -> tuple[dict[str, Any], str]:
     """The list, and its own SHA-256. Raises InputError where it is none."""
     try:
         data = path.read_bytes()
+    except OSError as error:
+        raise _no_index(str(path), error) from error
+    return index_of(data, where=str(path))
+
+
+def index_of(data: bytes, *, where: str) -> tuple[dict[str, Any], str]:
+    """The list of these bytes, and their SHA-256. Raises InputError where it is none."""
+    try:
         found = json.loads(data)
         if found["format"] != FORMAT:
             raise ValueError(f"format {found['format']!r}")
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(
-            "the list of the blind sets cannot be read", where=str(path), expected=f"index.json of a bank ({FORMAT})",
-            received=str(error), hint="r2s2r blind make --out bank",
-        ) from error  # fmt: skip
+    except (ValueError, KeyError, TypeError) as error:
+        raise _no_index(where, error) from error
     return found, sha256(data).hexdigest()
+
+
+def _no_index(where: str, error: Exception) -> InputError:
+    return InputError(
+        "the list of the blind sets cannot be read", where=where, expected=f"index.json of a bank ({FORMAT})",
+        received=str(error), hint="r2s2r blind make bank --key labels.key",
+    )  # fmt: skip

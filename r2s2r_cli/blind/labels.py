@@ -65,12 +65,17 @@ def seal(label: dict[str, Any], key: bytes) -> tuple[bytes, str]:
     """The encrypted label, and the commitment: SHA-256 of the label with its salt."""
     from cryptography.fernet import Fernet
 
-    plain = json.dumps({"salt": secrets.token_hex(_SALT_BYTES), "label": label}, sort_keys=True).encode()
+    plain = plain_text(label, secrets.token_hex(_SALT_BYTES))
     return Fernet(key).encrypt(plain), sha256(plain).hexdigest()
 
 
 def opened(sealed: bytes, key: bytes, commitment: str, *, where: str) -> dict[str, Any]:
     """The label. Raises InputError where the key is another, or the label is not the one that was committed to."""
+    return unsealed(sealed, key, commitment, where=where)[0]
+
+
+def unsealed(sealed: bytes, key: bytes, commitment: str, *, where: str) -> tuple[dict[str, Any], str]:
+    """The label and its salt. Raises as `opened`."""
     from cryptography.fernet import Fernet, InvalidToken
 
     try:
@@ -80,14 +85,24 @@ def opened(sealed: bytes, key: bytes, commitment: str, *, where: str) -> dict[st
             "a label cannot be opened with this key", where=where, expected="the key that sealed it",
             received="another key, or a damaged file", hint="r2s2r blind score --key FILE",
         ) from error  # fmt: skip
+    check(plain, commitment, where=where)
+    found = json.loads(plain)
+    return found["label"], found["salt"]
+
+
+def plain_text(label: dict[str, Any], salt: str) -> bytes:
+    """What is committed to: everybody who is told label and salt can make it again."""
+    return json.dumps({"salt": salt, "label": label}, sort_keys=True).encode()
+
+
+def check(plain: bytes, commitment: str, *, where: str) -> None:
+    """Raises InputError where the text of a label is not the one that was committed to."""
     found = sha256(plain).hexdigest()
     if found != commitment:
         raise InputError(
             "a label is not the one that was committed to", where=where, expected=commitment, received=found,
-            hint="r2s2r blind make --out bank   # these figures cannot be trusted",
+            hint="r2s2r blind make bank --key labels.key   # these figures cannot be trusted",
         )  # fmt: skip
-    label: dict[str, Any] = json.loads(plain)["label"]
-    return label
 
 
 def commitment_of(sealed: bytes, key: bytes) -> str:

@@ -1,4 +1,4 @@
-"""`r2s2r blind`: blind trials of `diagnose`: make sets, run verdicts on them, open the labels and score."""
+"""`r2s2r blind`: blind trials of `diagnose`: make sets and run verdicts on them; `blind_score` opens the labels."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Annotated
 
 import typer
 
-from r2s2r_cli.commands.blind_follow import follow
+from r2s2r_cli.commands.blind_score import calibrate, publish, score
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import UsageError
-from r2s2r_cli.options import DrawOption, JsonOption, QuietOption
+from r2s2r_cli.options import JsonOption, QuietOption
 
 blind_app = typer.Typer(help="Blind trials of diagnose: make sets, run, score.", no_args_is_help=True)
 
@@ -56,6 +56,15 @@ def make(
         Tier, typer.Option("--tier", help="B: the MuJoCo rig. A: our own engine, other step and laws.")
     ] = Tier.B,
     count: Annotated[int, typer.Option("--count", min=1, help="Sets of the whole bank.")] = 24,
+    first: Annotated[
+        int | None,
+        typer.Option(
+            "--first",
+            metavar="K",
+            min=0,
+            help="Number of the first set; default: 0, of a blind bank what the key decides.",
+        ),
+    ] = None,
     commissioning: Annotated[
         int, typer.Option("--commissioning", min=0, help="Runs of the healthy robot in each set.")
     ] = 2,
@@ -88,9 +97,12 @@ def make(
     if key.resolve().is_relative_to(out.resolve()):
         raise UsageError("the key lies in the bank that it locks", where="--key", expected=f"a file outside {out}",
                          received=str(key), hint=f"r2s2r blind make --key {out.name}.key {out}")  # fmt: skip
+    if first is not None:
+        _check_first(first, count, bank, console)
     asked = ["--out", str(out), "--key", str(key), "--bank", bank.value, "--tier", tier.value, "--count", str(count),
              "--commissioning", str(commissioning), "--observed", str(observed), "--executor", executor,
              "--workers", str(workers), *(["--effect", effect] if effect else []),
+             *([] if first is None else ["--first", str(first)]),
              *(["--gaits", str(gaits)] if gaits else []), *([] if oracle else ["--no-oracle"])]  # fmt: skip
     with console.progress("blind sets", count) as advance:
         _maker(asked, advance)
@@ -156,75 +168,25 @@ def run(
     console.hint(f"r2s2r blind score {bank} --verdicts {out} --key labels.key")
 
 
-blind_app.command("follow")(follow)
 
 
-@blind_app.command("score")
-def score(
-    bank: Annotated[Path, typer.Argument(metavar="BANK", help="Folder of `blind make`.")],
-    verdicts: Annotated[Path, typer.Option("--verdicts", metavar="DIR", help="Folder of `blind run`.")],
-    key: Annotated[Path, typer.Option("--key", metavar="FILE", help="Of the labels.")],
-    again: Annotated[
-        Path | None,
-        typer.Option("--again", metavar="DIR", help="Verdicts on the same worlds under other noise: how many agree."),
-    ] = None,
-    page: Annotated[
-        Path | None, typer.Option("--page", metavar="FILE", help="HTML page; default: score.html beside the verdicts.")
-    ] = None,
-    draw: DrawOption = True,
-    json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Open the labels, check them against what was committed to, and print every figure with n and interval.
-
-    Example: r2s2r blind score bank --verdicts verdicts --key labels.key
-    """
-    from r2s2r_cli.blind.labels import read_key
-    from r2s2r_cli.blind.score import score as judge
-    from r2s2r_cli.views.blind import blind_page, blind_tables, draw_blind
-
-    console = Console(json=json, quiet=quiet)
-    result = judge(bank, verdicts, read_key(key), again=again)
-    console.document(result)
-    for table in blind_tables(result):
-        console.table(table.title, table.columns, table.rows)
-    for text in result.warnings:
-        console.warn(text)
-    if draw:
-        pictures = dict(draw_blind(result))
-        target = page or verdicts.parent / f"{verdicts.name}-score.html"
-        target.write_bytes(blind_page(result, pictures))
-        for name, png in pictures.items():
-            target.with_name(f"{target.stem}-{name}.png").write_bytes(png)
-        console.say(f"page: {target}")
+blind_app.command("score")(score)
+blind_app.command("publish")(publish)
+blind_app.command("calibrate")(calibrate)
 
 
-@blind_app.command("calibrate")
-def calibrate(
-    bank: Annotated[Path, typer.Argument(metavar="BANK", help="A calibration bank of `blind make`.")],
-    verdicts: Annotated[Path, typer.Option("--verdicts", metavar="DIR", help="Folder of `blind run`.")],
-    key: Annotated[Path, typer.Option("--key", metavar="FILE", help="Of the labels.")],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="JSON, for stages/diagnose/which.")],
-    json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Learn from a calibration bank how gains become probabilities, and from which one on a name is committed to.
+def _check_first(first: int, count: int, bank: BankName, console: Console) -> None:
+    """Raises UsageError where the bank ends before the last of `count` sets."""
+    from r2s2r_cli.blind.split import RANGES, Bank
 
-    Example: r2s2r blind calibrate bank --verdicts verdicts --key labels.key --out calibration.json
-    """
-    import json as format_json
-
-    from r2s2r_cli.blind.labels import read_key
-    from r2s2r_cli.blind.score import calibration
-    from schemas.results_blind import BlindCalibrateResult
-
-    console = Console(json=json, quiet=quiet)
-    found = calibration(bank, verdicts, read_key(key))
-    out.write_text(format_json.dumps(found, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-    result = BlindCalibrateResult.model_validate({**found, "out": str(out), **found["left_out"]}, extra="ignore")
-    console.document(result)
-    console.data(f"{result.sets} sets: temperature {result.temperature:.1f} nats, a name from {result.commit:.2f} on; "
-                 f"first guess right in {100 * result.top1:.0f} % of the sets left out")  # fmt: skip
+    whole = len(RANGES[Bank(bank.value)].seeds)
+    if first + count > whole:
+        raise UsageError(f"the bank {bank.value} has no such sets", where="--first",
+                         expected=f"0 to {max(whole - count, 0)} for {count} sets", received=str(first),
+                         hint=f"r2s2r blind make --bank {bank.value} --first 0 --count {min(count, whole)} "
+                         "--key new.key bank")  # fmt: skip
+    if bank is BankName.BLIND:
+        console.warn("--first is no secret: whoever knows it can make the worlds of this bank again")
 
 
 def _settings(items: list[str] | None, without: str | None) -> dict[str, object]:

@@ -14,7 +14,7 @@ _INK, _PALE = "#0b5fa5", "#8792a2"
 
 
 def blind_tables(result: BlindScoreResult) -> Iterator[PageTable]:
-    """Every figure with its interval; recall by effect; the misses."""
+    """Every figure with its interval; recall by effect; what figures are worth; splits; shards; the misses."""
     strata = ", ".join(f"{n} {name}" for name, n in sorted(result.strata.items()))
     yield PageTable(
         f"tier {result.tier}, {result.bank} bank: {result.scored} of {result.sets} sets ({strata})",
@@ -29,6 +29,17 @@ def blind_tables(result: BlindScoreResult) -> Iterator[PageTable]:
             [[r.effect, str(r.sets), str(r.clear), _of(r.top1, r.clear), _of(r.top3, r.clear), _of(r.named, r.clear)]
              for r in result.recall],
         )  # fmt: skip
+    if result.baselines:
+        yield _worth(result)
+    if result.splits:
+        yield _splits(result)
+    if len(result.shards) > 1:
+        yield PageTable(
+            "shards: banks with a key and a list each",
+            ["bank", "sets", "judged", "code", "list (SHA-256)"],
+            [[one.where, str(one.sets), str(one.scored), (one.commit or one.sources_sha256 or "not known")[:12],
+              one.index_sha256] for one in result.shards],
+        )  # fmt: skip
     if result.misses:
         yield PageTable(
             "misses: first guess wrong on a clear set, or where nothing is wrong",
@@ -36,6 +47,28 @@ def blind_tables(result: BlindScoreResult) -> Iterator[PageTable]:
             [[m.set, m.truth, f"{m.d:.1f}", m.said, "" if m.probability is None else f"{m.probability:.2f}",
               "not ranked" if m.rank is None else str(m.rank), m.verdict, m.why] for m in result.misses],
         )  # fmt: skip
+
+
+def _worth(result: BlindScoreResult) -> PageTable:
+    """Figures beside those of diagnosers that look at nothing, where these have any."""
+    told = [row for row in result.rows if any(row.name in one.values for one in result.baselines)]
+    return PageTable(
+        "what a figure is worth: the same of diagnosers that look at nothing",
+        ["figure", "found", *(one.name for one in result.baselines)],
+        [[row.what, _number(row, row.value),
+          *(_number(row, one.values[row.name]) if row.name in one.values else "" for one in result.baselines)]
+         for row in told],
+    )  # fmt: skip
+
+
+def _splits(result: BlindScoreResult) -> PageTable:
+    return PageTable(
+        "by noise, gaits and rate (of the clear single effects; alarms of the sets with nothing wrong)",
+        ["by", "value", "sets", "clear", "first", "in three", "named", "named rightly", "alarms", "CPU, median"],
+        [[one.by, one.value, str(one.sets), str(one.clear), _of(one.top1, one.clear), _of(one.top3, one.clear),
+          _of(one.named, one.clear), _of(one.right, one.named), _of(one.alarms, one.none),
+          "" if one.cpu_median_s is None else f"{one.cpu_median_s:.0f} s"] for one in result.splits],
+    )  # fmt: skip
 
 
 def draw_blind(result: BlindScoreResult) -> Iterator[tuple[str, bytes]]:

@@ -11,7 +11,9 @@ def test_tables_and_page_hold_every_figure() -> None:
     """A row a metric with interval and verdict, `not shown` where the interval holds the target; both pictures."""
     labels = blind_bank.bank(60)
     result = score_of(blind_bank.answered(labels, blind_bank.by_chance), tier="B", bank="test", sets=60, index="f00")
-    figures, recall, misses = blind_tables(result)
+    figures, recall, worth, splits, misses = blind_tables(result)
+    assert len(worth.columns) == 2 + len(result.baselines) and len(worth.rows[0]) == len(worth.columns)
+    assert [row[:3] for row in splits.rows] == [[one.by, one.value, str(one.sets)] for one in result.splits]
     assert len(figures.rows) == len(result.rows) and len(recall.rows) == len(result.recall)
     assert len(misses.rows) == len(result.misses)
     for row, shown in zip(result.rows, figures.rows, strict=True):

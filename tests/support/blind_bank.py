@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from r2s2r_cli.blind.score.facts import Said, Truth, said_of, truth_of
-from r2s2r_cli.blind.split import Kind, kinds
+from r2s2r_cli.blind.split import GAITS, NOISE_M, RATES_HZ, Kind, kinds
 
 EFFECTS = {
     "payload": ("mass", {"kind": "rod", "index": 1, "xy_m": None}),
@@ -26,8 +26,10 @@ Answer = Callable[[dict[str, Any], np.random.Generator], dict[str, Any]]
 def bank(count: int = 250, seed: int = 0) -> list[dict[str, Any]]:
     """Labels as the maker writes them, of worlds that were never simulated."""
     rng = np.random.default_rng(seed)
+    # Of its own, so that what was recorded does not change what is wrong.
+    seen = np.random.default_rng([seed, 1])
     found = []
-    for kind in kinds(count, rng):
+    for number_of_set, kind in enumerate(kinds(count, rng)):
         number = {Kind.NONE: 0, Kind.SINGLE: 1, Kind.PAIR: 2, Kind.OUTSIDE: 0}[kind]
         ids = [str(one) for one in rng.choice(list(EFFECTS), number, replace=False)]
         d = float(np.exp(rng.uniform(np.log(1.0), np.log(30.0))))
@@ -39,6 +41,8 @@ def bank(count: int = 250, seed: int = 0) -> list[dict[str, Any]]:
         found.append({
             "kind": kind.value, "effects": effects, "d": None if kind is Kind.NONE else d, "d_each": [d] * number,
             "outside": {"name": "floor_bump", "channel": "contact"} if kind is Kind.OUTSIDE else None,
+            "noise_m": float(seen.choice(NOISE_M)), "gaits": int(seen.choice(GAITS)),
+            "rate_hz": float(seen.choice(RATES_HZ)), "seed": 1000 * seed + number_of_set, "observed": 0,
         })  # fmt: skip
     return found
 
@@ -85,5 +89,6 @@ def document(verdict: str, effects: list[str], probability: dict[str, float]) ->
         "verdict": verdict, "effects": effects, "probability": probability[order[0]], "set90": order[:2],
         "ranking": [{"effect": name, "elpd_gain": 0.0, "probability": probability[name]} for name in order],
         "where": {"channel": "contact", "element": {"kind": "place", "index": None, "xy_m": [0.1, 0.3]}},
-        "shrinkage": {"own_share": 0.7, "predicted": 0.65},
+        "shrinkage": {"own_share": 0.7, "predicted": 0.65}, "chance_nats": 2.0, "floor_m": 0.01, "refit_upper_m": 0.02,
+        "calibrated": "by hand",
     }  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 NONE, UNKNOWN = "none", "unknown"
@@ -14,7 +14,8 @@ WEAK, CLEAR = 3.0, 8.0
 class Truth:
     """kind: none | single | pair | outside. effects: ids. d: of everything together, 0 where nothing is wrong; each: of
     every effect. element: {"kind", "index"} of a single one that has one. place: of a patch [m]. onset: target interval
-    of the set with which it begins, 1-based; None: it holds throughout."""
+    of the set with which it begins, 1-based; None: it holds throughout. noise_m, gaits, rate_hz: of what was recorded.
+    """
 
     kind: str
     effects: tuple[str, ...]
@@ -26,6 +27,9 @@ class Truth:
     onset: dict[str, Any] | None
     name: str
     """In words, for tables."""
+    noise_m: float | None = None
+    gaits: int | None = None
+    rate_hz: float | None = None
 
     @property
     def stratum(self) -> str:
@@ -47,7 +51,8 @@ class Truth:
 @dataclass(frozen=True)
 class Said:
     """A verdict. order: ids, `none` and `unknown` from the most probable on; probabilities beside them. named: what it
-    commits to. failed: it broke off, and says nothing."""
+    commits to. failed: it broke off, and says nothing. rmse: of names that were fitted, at the ends of intervals that
+    were left out [m]. suggested, random: whether one more gait decided the set, rightly; None: nobody tried."""
 
     verdict: str
     named: tuple[str, ...]
@@ -60,6 +65,10 @@ class Said:
     own_share: float | None
     predicted: float | None
     failed: bool
+    cpu_s: float | None = None
+    rmse: dict[str, float] = field(default_factory=dict)
+    suggested: bool | None = None
+    random: bool | None = None
 
     @property
     def first(self) -> str:
@@ -80,6 +89,7 @@ def truth_of(label: dict[str, Any]) -> Truth:
         element=element if element and element.get("index") is not None else None,
         place=None if place is None else (float(place[0]), float(place[1])), onset=one["onset"] if one else None,
         name=outside["name"] if outside else " + ".join(e["id"] for e in effects) or NONE,
+        noise_m=label.get("noise_m"), gaits=label.get("gaits"), rate_hz=label.get("rate_hz"),
     )  # fmt: skip
 
 
@@ -87,7 +97,7 @@ def said_of(verdict: dict[str, Any]) -> Said:
     """Of a verdict file; one that failed says nothing."""
     document = verdict.get("diagnosis") or {}
     if verdict.get("failed") or not document:
-        return Said("failed", (), (), (), (), None, None, None, None, None, True)
+        return Said("failed", (), (), (), (), None, None, None, None, None, True, verdict.get("cpu_s"))
     ranking = sorted(document["ranking"], key=lambda row: -float(row["probability"]))
     where, shrunk = document.get("where") or {}, document.get("shrinkage") or {}
     kind = document["verdict"]
@@ -97,4 +107,6 @@ def said_of(verdict: dict[str, Any]) -> Said:
         probability=tuple(float(row["probability"]) for row in ranking), set90=tuple(document["set90"]),
         channel=where.get("channel"), element=where.get("element"), onset=where.get("onset_segment"),
         own_share=shrunk.get("own_share"), predicted=shrunk.get("predicted"), failed=False,
+        cpu_s=verdict.get("cpu_s"),
+        rmse={row["effect"]: float(row["rmse_m"]) for row in ranking if row.get("rmse_m") is not None},
     )  # fmt: skip

@@ -141,6 +141,15 @@ def _foretold(pair: Pair) -> float | None:
     return None if s.own_share is None or s.predicted is None else abs(s.own_share - s.predicted)
 
 
+def _rival(pair: Pair) -> bool | None:
+    """Whether the right effect leaves less than the most probable wrong one, of clear sets where both were fitted."""
+    t, s = pair
+    wrong = [name for name in s.order if name not in (NONE, UNKNOWN, t.right) and name in s.rmse]
+    if not _clear(t) or t.right not in s.rmse or not wrong:
+        return None
+    return s.rmse[str(t.right)] < s.rmse[wrong[0]]
+
+
 METRICS = (
     Metric("top1_clear", "first guess right, clear single effects", {"A": 0.90, "B": 0.75},
            lambda p: p[1].first == p[0].right if _clear(p[0]) else None),
@@ -181,11 +190,22 @@ METRICS = (
            {"A": 0.80, "B": 0.60}, _own, of="median"),
     Metric("foretold", "predicted against realised own share, mean distance", {"A": 0.08, "B": 0.12}, _foretold,
            above=False),
+    Metric("wrong_less", "the right effect leaves less error on left-out intervals than its nearest rival, clear", {},
+           _rival),
+    Metric("next_gait_resolves", "ambiguous sets that the suggested gait resolves", {"A": 0.60, "B": 0.50},
+           lambda p: p[1].suggested),
+    Metric("next_gait_random", "ambiguous sets that a random gait resolves", {}, lambda p: p[1].random),
+    Metric("top1_all", "first guess right, all sets but pairs", {},
+           lambda p: p[1].first == p[0].right if p[0].right is not None else None),
+    Metric("ambiguous", "'ambiguous', all sets", {}, lambda p: p[1].verdict == "ambiguous"),
 )  # fmt: skip
 """In the order of the table; calibration and coverage are made apart."""
 CONTROL = Metric("shuffled_named", "a name is committed to although the commands were exchanged (negative control)",
                  {"A": 0.0, "B": 0.0}, lambda p: bool(p[1].named), above=False)  # fmt: skip
 """The only row where commands were exchanged between target intervals: nothing may be named."""
+WITHOUT = Metric("without_named", "an effect is named that the catalogue was not given (negative control)",
+                 {"A": 0.0, "B": 0.0}, lambda p: p[1].failed, above=False)  # fmt: skip
+"""Where `failed` says that one was."""
 AGAIN = Metric("same_verdict", "the same verdict under other noise on the same world (negative control)",
                {"A": 0.95, "B": 0.95}, lambda p: not p[1].failed)  # fmt: skip
 """Where `failed` says that both verdicts differ."""

@@ -1,0 +1,55 @@
+"""The negative control of other noise: verdicts on the same worlds, observed once more."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from r2s2r_cli.blind.score.facts import Said, Truth, said_of
+from r2s2r_cli.blind.score.pool import Pool
+from r2s2r_cli.blind.score.published import read_published
+from r2s2r_cli.blind.score.rows import AGAIN, row
+from r2s2r_cli.errors import InputError
+from schemas.results_blind import BlindRow
+
+
+def same(pool: Pool, found: Sequence[tuple[str, Truth, Said]], again: Sequence[Path]) -> BlindRow:
+    """How often other noise on the same world leaves the verdict as it is.
+
+    again: folders of `blind run`, or published files. Raises InputError where none of them knows a set of the pool, or
+    where a published one has another world under its name.
+    """
+    labels = {one.name: one.label for one in pool.sets}
+    others: dict[str, Mapping[str, Any]] = {}
+    for path in again:
+        others |= _verdicts(path, labels)
+    pairs = []
+    for name, truth, said in found:
+        if name in others:
+            other = said_of(dict(others[name]))
+            pairs.append((truth, replace(said, failed=(said.verdict, said.named) != (other.verdict, other.named))))
+    if not pairs:
+        raise InputError("there is no second verdict on any of these sets", where=", ".join(map(str, again)),
+                         expected="verdicts on a bank of the same key, made with --observed 1", received="none",
+                         hint="r2s2r blind make --observed 1 --key SAME.key again")  # fmt: skip
+    return row(AGAIN, pairs, pool.tier)
+
+
+def _verdicts(path: Path, labels: Mapping[str, dict[str, Any]]) -> dict[str, Mapping[str, Any]]:
+    """Second verdicts by name: of a folder of `blind run`, or of a published file, whose worlds can be compared."""
+    if path.is_dir():
+        return {name: json.loads((path / f"{name}.json").read_text(encoding="utf-8")) for name in labels
+                if (path / f"{name}.json").exists()}  # fmt: skip
+    found: dict[str, Mapping[str, Any]] = {}
+    for one in read_published(path).sets:
+        if one.name in labels:
+            mine, other = (which.get("seed") for which in (labels[one.name], one.label))
+            if mine != other:
+                raise InputError("two sets of one name are of different worlds", where=f"{path}: {one.name}",
+                                 expected=f"seed {mine}", received=f"seed {other}",
+                                 hint="r2s2r blind make --observed 1 --key SAME.key again")  # fmt: skip
+            found[one.name] = one.verdict
+    return found

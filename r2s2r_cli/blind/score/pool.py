@@ -1,0 +1,111 @@
+"""Shards put together: banks of one tier and kind, each committed to before its own verdicts, asked the same."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from r2s2r_cli.blind.score.shard import Judged, Shard
+from r2s2r_cli.errors import InputError
+from schemas.results_blind import BlindShard
+
+_LISTED = 3
+
+
+@dataclass(frozen=True)
+class Pool:
+    """sets: of all shards, by name. own: their lists' hashes, in the order of the hashes. total: sets of the banks,
+    judged or not."""
+
+    sets: tuple[Judged, ...]
+    tier: Any
+    bank: str
+    asked: dict[str, Any]
+    total: int
+    shards: tuple[BlindShard, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def own(self) -> str:
+        """What was committed to, of every shard."""
+        return " + ".join(one.index_sha256 for one in self.shards)
+
+    @property
+    def shuffled(self) -> bool:
+        """A negative control, in which nothing is true."""
+        return self.asked["shuffled"] is not None
+
+    @property
+    def kept(self) -> frozenset[str] | None:
+        """The catalogue that was asked for; None: the whole of it."""
+        effects = self.asked["settings"].get("effects")
+        return None if effects is None else frozenset(map(str, effects))
+
+
+def pooled(shards: Sequence[Shard]) -> Pool:
+    """One or several. Raises InputError where a set or a world is in two, or where they differ in tier, bank or what
+    was asked."""
+    shards = sorted(shards, key=lambda one: one.own)
+    _alike(shards, "are of different tiers", lambda one: str(one.index["tier"]))
+    _alike(shards, "are of different banks", lambda one: str(one.index["bank"]))
+    _alike(shards, "answer different questions", lambda one: json.dumps(one.asked, sort_keys=True))
+    _apart(shards)
+    found = sorted((one for shard in shards for one in shard.sets), key=lambda one: one.name)
+    first = shards[0]
+    return Pool(
+        sets=tuple(found), tier=first.index["tier"], bank=first.index["bank"], asked=first.asked,
+        total=sum(len(one.index["sets"]) for one in shards), shards=tuple(map(_facts, shards)),
+        warnings=tuple(_warnings(shards)),
+    )  # fmt: skip
+
+
+def _alike(shards: Sequence[Shard], what: str, of: Callable[[Shard], str]) -> None:
+    first = shards[0]
+    for one in shards[1:]:
+        if of(one) != of(first):
+            raise InputError(f"these shards {what}", where=f"{first.where}, {one.where}", expected=of(first),
+                             received=of(one), hint=f"r2s2r blind score --published {first.where}")  # fmt: skip
+
+
+def _apart(shards: Sequence[Shard]) -> None:
+    names: dict[object, str] = {}
+    for shard in shards:
+        for one in shard.sets:
+            world = (one.label.get("seed"), one.label.get("observed"))
+            for key in (one.name, *((world,) if world[0] is not None else ())):
+                if key in names:
+                    where = names[key]
+                    raise InputError(
+                        "one world would be counted twice", where=f"{where}, {shard.where}: {one.name}",
+                        expected="shards made each with its own key and, of a calibration bank, its own --first",
+                        received="the same file twice" if where == shard.where else f"set {one.name} in both",
+                        hint=f"r2s2r blind score --published {where}",
+                    )  # fmt: skip
+            names |= {one.name: shard.where} | ({world: shard.where} if world[0] is not None else {})
+
+
+def _facts(shard: Shard) -> BlindShard:
+    code = shard.code or {}
+    return BlindShard(where=shard.where, index_sha256=shard.own, sets=len(shard.index["sets"]), scored=len(shard.sets),
+                      commit=code.get("commit"), sources_sha256=code.get("sources_sha256"),
+                      calibrated=shard.calibrated)  # fmt: skip
+
+
+def _warnings(shards: Sequence[Shard]) -> list[str]:
+    found = []
+    missing = sum(len(one.missing) for one in shards)
+    if missing:
+        found.append(f"{missing} sets have no verdict: only the others are counted")
+    codes = {(one.code or {}).get("sources_sha256") for one in shards}
+    if len(codes) > 1:
+        commits = sorted({str((one.code or {}).get("commit") or "no checkout")[:12] for one in shards})
+        found.append(f"different code judged these shards ({', '.join(commits)}): one figure mixes them")
+    for one in shards:
+        if (one.code or {}).get("changed"):
+            found.append(f"{one.where}: judged from a checkout with changes that were not committed")
+    learned = sorted({words for one in shards for words in one.calibrated})
+    if len(learned) > 1:
+        found.append(f"probabilities come from {len(learned)} calibrations ({'; '.join(learned[:_LISTED])})")
+    return found

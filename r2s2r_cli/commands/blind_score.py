@@ -1,0 +1,186 @@
+"""`r2s2r blind score`, `publish` and `calibrate`: what is done with labels and verdicts, or with published files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from r2s2r_cli.console import Console
+from r2s2r_cli.errors import UsageError
+from r2s2r_cli.options import DrawOption, JsonOption, QuietOption
+
+_BANKS = typer.Argument(metavar="BANK | FILE...", help="Folder of `blind make`; with --published: published files.")
+Published = Annotated[
+    bool, typer.Option("--published", help="Files of `blind publish` instead of a bank; they need no key.")
+]
+Verdicts = Annotated[Path | None, typer.Option("--verdicts", metavar="DIR", help="Folder of `blind run`.")]
+Key = Annotated[Path | None, typer.Option("--key", metavar="FILE", help="Of the labels.")]
+Follow = Annotated[
+    Path | None, typer.Option("--follow", metavar="DIR", help="Folder of `blind follow`: what one more gait decided.")
+]
+
+
+def score(
+    banks: Annotated[list[Path], _BANKS],
+    verdicts: Verdicts = None,
+    key: Key = None,
+    published: Published = False,
+    again: Annotated[
+        list[Path] | None,
+        typer.Option("--again", metavar="DIR", help="Verdicts on the same worlds under other noise: how many agree. "
+                     "With --published also a file, and several."),
+    ] = None,
+    follow: Follow = None,
+    page: Annotated[
+        Path | None,
+        typer.Option("--page", metavar="FILE", help="HTML page; default: NAME-score.html beside the verdicts, of "
+                     "published files here."),
+    ] = None,
+    draw: DrawOption = True,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:  # fmt: skip
+    """Open the labels, check them against what was committed to, and print every figure with n and interval.
+
+    With --published several banks (shards) of one tier and kind are scored as one.
+
+    Example: r2s2r blind score --published docs/blind/blind-b-1.json docs/blind/blind-b-2.json
+    """
+    from r2s2r_cli.blind.score import score as of_bank, score_published
+    from r2s2r_cli.views.blind import blind_page, blind_tables, draw_blind
+
+    console = Console(json=json, quiet=quiet)
+    if published:
+        _alone(verdicts, key)
+        result = score_published(banks, again=again or (), follow=follow)
+        beside = Path(banks[0].name.removesuffix(".gz")).with_suffix("")
+    else:
+        bank, verdicts, secret = _bank(banks, verdicts, key, "score")
+        if again is not None and len(again) > 1:
+            raise UsageError(
+                "a bank has one second run of verdicts", where="--again", expected="one folder",
+                received=str(len(again)), hint="r2s2r blind score --published FILE --again FILE",
+            )  # fmt: skip
+        result = of_bank(bank, verdicts, secret, again=again[0] if again else None, follow=follow)
+        beside = verdicts
+    console.document(result)
+    for table in blind_tables(result):
+        console.table(table.title, table.columns, table.rows)
+    for text in result.warnings:
+        console.warn(text)
+    if draw:
+        pictures = dict(draw_blind(result))
+        target = page or beside.parent / f"{beside.name}-score.html"
+        target.write_bytes(blind_page(result, pictures))
+        for name, png in pictures.items():
+            target.with_name(f"{target.stem}-{name}.png").write_bytes(png)
+        console.say(f"page: {target}")
+
+
+def publish(
+    bank: Annotated[Path, typer.Argument(metavar="BANK", help="Folder of `blind make`.")],
+    verdicts: Annotated[Path, typer.Option("--verdicts", metavar="DIR", help="Folder of `blind run`.")],
+    key: Annotated[Path, typer.Option("--key", metavar="FILE", help="Of the labels.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="JSON; compressed where it ends with .gz.")],
+    follow: Follow = None,
+    code: Annotated[
+        Path | None,
+        typer.Option("--code", metavar="DIR", help="Checkout whose code judged; default: the one of this command."),
+    ] = None,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Open the labels, check as `score` does, and write one file that anybody can check and score without the key.
+
+    It opens every label that has a verdict: from then on the bank is not blind any more.
+
+    Example: r2s2r blind publish bank --verdicts verdicts --key labels.key --out docs/blind/blind-b-1.json
+    """
+    from r2s2r_cli.blind.labels import read_key
+    from r2s2r_cli.blind.score import publish as opened
+    from r2s2r_cli.blind.score.published import write_form
+    from r2s2r_cli.store.atomic import write_bytes
+    from schemas.blind import BlindPublished
+    from schemas.results_blind import BlindPublishResult
+
+    console = Console(json=json, quiet=quiet)
+    data = opened(bank, verdicts, read_key(key), judged_by=code, follow=follow)
+    form = write_form(data, out.name)
+    write_bytes(out, form)
+    told = BlindPublished.model_validate_json(data)
+    warnings = []
+    if told.missing:
+        warnings.append(f"{len(told.missing)} sets have no verdict; labels that are open tell seeds: judge none of "
+                        "them from now on")  # fmt: skip
+    if told.code.changed:
+        warnings.append("the checkout has changes that were not committed: its commit does not say what judged")
+    result = BlindPublishResult(
+        out=str(out), bytes=len(form), sets=len(told.sets), missing=told.missing, index_sha256=told.index_sha256,
+        content_sha256=told.content_sha256, commit=told.code.commit, sources_sha256=told.code.sources_sha256,
+        warnings=tuple(warnings),
+    )  # fmt: skip
+    console.document(result)
+    console.data(f"{result.sets} sets in {out}, {result.bytes / 1000 / result.sets:.1f} kB each\n"
+                 f"{told.index_sha256}  index.json, as it was published before the verdicts")  # fmt: skip
+    for text in warnings:
+        console.warn(text)
+    console.hint(f"r2s2r blind score --published {out}")
+
+
+def calibrate(
+    banks: Annotated[list[Path], _BANKS],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="JSON, for stages/diagnose/which.")],
+    verdicts: Verdicts = None,
+    key: Key = None,
+    published: Published = False,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Learn from a calibration bank how gains become probabilities, and from which one on a name is committed to.
+
+    Example: r2s2r blind calibrate --published docs/blind/calibration-1.json --out calibration.json
+    """
+    import json as format_json
+
+    from r2s2r_cli.blind.score import calibration, calibration_published
+    from schemas.results_blind import BlindCalibrateResult
+
+    console = Console(json=json, quiet=quiet)
+    if published:
+        _alone(verdicts, key)
+        found = calibration_published(banks)
+    else:
+        found = calibration(*_bank(banks, verdicts, key, "calibrate"))
+    out.write_text(format_json.dumps(found, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    result = BlindCalibrateResult.model_validate({**found, "out": str(out), **found["left_out"]}, extra="ignore")
+    console.document(result)
+    console.data(f"{result.sets} sets: temperature {result.temperature:.1f} nats, a name from {result.commit:.2f} on; "
+                 f"first guess right in {100 * result.top1:.0f} % of the sets left out")  # fmt: skip
+
+
+def _bank(banks: list[Path], verdicts: Path | None, key: Path | None, command: str) -> tuple[Path, Path, bytes]:
+    """Folder, verdicts and key. Raises UsageError where one of them is not given, InputError for a key that is none."""
+    from r2s2r_cli.blind.labels import read_key
+
+    hint = f"r2s2r blind {command} {banks[0]} --verdicts verdicts --key labels.key"
+    if len(banks) != 1:
+        raise UsageError("several banks are put together from their published files", where="BANK", expected="one",
+                         received=str(len(banks)), hint=f"r2s2r blind {command} --published FILE...")  # fmt: skip
+    for name, value in (("--verdicts", verdicts), ("--key", key)):
+        if value is None:
+            if banks[0].is_file():
+                hint = f"r2s2r blind {command} --published {banks[0]}"
+            raise UsageError("a bank is opened with its key and its verdicts", where=name, expected=f"{name} FILE",
+                             received="nothing", hint=hint)  # fmt: skip
+    assert verdicts is not None and key is not None  # noqa: S101 - just looked at
+    return banks[0], verdicts, read_key(key)
+
+
+def _alone(verdicts: Path | None, key: Path | None) -> None:
+    for name, value in (("--verdicts", verdicts), ("--key", key)):
+        if value is not None:
+            raise UsageError("a published file holds its verdicts and opened labels", where=name,
+                             expected="nothing, with --published", received=str(value),
+                             hint="r2s2r blind score --published FILE...")  # fmt: skip

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from r2s2r_cli.commands.blind_follow import follow
 from r2s2r_cli.commands.blind_score import calibrate, publish, score
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import UsageError
@@ -168,6 +169,7 @@ def run(
     console.hint(f"r2s2r blind score {bank} --verdicts {out} --key labels.key")
 
 
+blind_app.command("follow")(follow)
 
 
 blind_app.command("score")(score)

@@ -170,8 +170,6 @@ def run(
 
 
 blind_app.command("follow")(follow)
-
-
 blind_app.command("score")(score)
 blind_app.command("publish")(publish)
 blind_app.command("calibrate")(calibrate)

@@ -9,6 +9,8 @@ import pytest
 
 from r2s2r_cli.blind.index import index_text
 from tests.commands.conftest import invoke
+from tests.support import blind_bank
+from tests.support.blind_folder import Folder
 
 
 @pytest.fixture
@@ -63,3 +65,62 @@ def test_a_score_needs_key_and_verdicts(bank: Path, tmp_path: Path) -> None:
     code, hint = refusal("score", bank, "--verdicts", tmp_path / "none", "--key", tmp_path / "a.key")
     assert code == 4 and hint.startswith("r2s2r blind run")
     assert not list(tmp_path.rglob("*.html"))
+
+
+@pytest.mark.parametrize(
+    ("first", "expected"),
+    [(["--first", "990", "--count", "24"], "0 to 976"), (["--first", "-1"], ""), (["--first", "x"], "")],
+)
+def test_a_bank_ends_somewhere(first: list[str], expected: str, tmp_path: Path) -> None:
+    """A first set that is not there, or no number: exit code 2, said where, and neither key nor folder is made."""
+    bank, key = tmp_path / "bank", tmp_path / "a.key"
+    result = invoke("blind", "make", str(bank), "--key", str(key), "--bank", "regression", *first, "--json")
+    assert result.exit_code == 2 and expected in json.loads(result.stdout)["expected"]
+    assert not bank.exists() and not key.exists()
+
+
+@pytest.fixture
+def judged(tmp_path: Path) -> Folder:
+    """A calibration bank of 24 sets with right verdicts, its key in a file."""
+    made = Folder(tmp_path / "judged", blind_bank.bank(24), blind_bank.right)
+    (tmp_path / "a.key").write_bytes(made.key)
+    checkout = tmp_path / "checkout" / "r2s2r_cli"
+    (checkout / "blind").mkdir(parents=True)
+    (checkout / "__init__.py").write_text("")
+    return made
+
+
+def test_publish_score_and_calibrate(judged: Folder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the bank to a file, and from the file to table, page and calibration without the key."""
+    monkeypatch.chdir(tmp_path)
+    bank, key = str(judged.bank), ("--verdicts", str(judged.verdicts), "--key", "a.key")
+    done = invoke("blind", "publish", bank, *key, "--code", "checkout", "--out", "docs/shard-1.json.gz", "--json")
+    assert done.exit_code == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["sets"] == 24 and told["bytes"] == (tmp_path / "docs" / "shard-1.json.gz").stat().st_size
+    (tmp_path / "a.key").unlink()
+    scored = invoke("blind", "score", "--published", "docs/shard-1.json.gz", "--json")
+    assert scored.exit_code == 0, scored.stderr
+    rows = {row["name"]: row for row in json.loads(scored.stdout)["rows"]}
+    assert rows["top1_clear"]["value"] == 1.0 and json.loads(scored.stdout)["index_sha256"] == judged.own
+    assert (tmp_path / "shard-1-score.html").exists() and len(list(tmp_path.glob("shard-1-score-*.png"))) == 2
+    learned = invoke("blind", "calibrate", "--published", "docs/shard-1.json.gz", "--out", "calibration.json")
+    assert learned.exit_code == 0 and json.loads((tmp_path / "calibration.json").read_text())["sets"] > 12
+    assert invoke("blind", "score", "--published", "docs/shard-1.json.gz", "docs/shard-1.json.gz").exit_code == 4
+
+
+def test_bank_and_files_are_not_mixed(judged: Folder, tmp_path: Path) -> None:
+    """A key beside published files, two banks, a bank without key or verdicts: exit code 2 and what to type."""
+    file = tmp_path / "a.json"
+    file.write_text("{}")
+    for command in (["score"], ["calibrate", "--out", tmp_path / "c.json"]):
+        assert refusal(*command, "--published", file, "--key", tmp_path / "a.key")[0] == 2
+        assert (
+            refusal(*command, judged.bank, judged.bank, "--verdicts", judged.verdicts, "--key", tmp_path / "a.key")[0]
+            == 2
+        )
+        assert refusal(*command, judged.bank, "--key", tmp_path / "a.key")[0] == 2
+        code, hint = refusal(*command, file)
+        assert code == 2 and hint == f"r2s2r blind {command[0]} --published {file}"
+        assert refusal(*command, "--published", file)[0] == 4
+    assert not (tmp_path / "c.json").exists()

@@ -18,6 +18,7 @@ from r2s2r_cli.blind.make.one import make_set
 from r2s2r_cli.blind.make.worlds import Hidden, hidden
 from r2s2r_cli.blind.seam import each, open_executor
 from r2s2r_cli.blind.split import RANGES, Bank, kinds, seeds
+from r2s2r_cli.errors import UsageError
 
 
 @dataclass(frozen=True)
@@ -60,12 +61,13 @@ def worlds(asked: Asked) -> tuple[Hidden, ...]:
 def make(asked: Asked, *, executor: str = "local", workers: int = 1) -> Iterator[str]:
     """Names of the sets as they are done; those that are there already are passed over. The list is written last.
 
-    Raises NumericalError where MuJoCo breaks down.
+    Raises NumericalError where MuJoCo breaks down, UsageError where a set that is there is of another world.
     """
     todo = []
     for number, world in enumerate(worlds(asked)):
         job = (asked, world, labels.set_name(asked.key, number))
         if sealed(asked.out, job[2]).exists():
+            _check_world(asked, world, job[2])
             yield job[2]
         else:
             todo.append(job)
@@ -74,6 +76,20 @@ def make(asked: Asked, *, executor: str = "local", workers: int = 1) -> Iterator
             for (_, _, name), _ in each(pool, _one, todo, at_once=workers):
                 yield name
     close(asked)
+
+
+def _check_world(asked: Asked, world: Hidden, name: str) -> None:
+    """Names come from key and number alone: with another `--first` those of another shard would be taken for done."""
+    path = sealed(asked.out, name)
+    data = path.read_bytes()
+    label = labels.opened(data, asked.key, labels.commitment_of(data, asked.key), where=str(path))
+    there, wanted = (label["seed"], label["observed"]), (world.seed, asked.observed)
+    if there != wanted:
+        raise UsageError(
+            "the folder holds sets of another bank", where=str(path),
+            expected="world {} under noise {}".format(*wanted), received="world {} under noise {}".format(*there),
+            hint=f"r2s2r blind make --key {asked.out.name}-2.key {asked.out}-2   # a shard, a folder, a key",
+        )  # fmt: skip
 
 
 def close(asked: Asked) -> None:

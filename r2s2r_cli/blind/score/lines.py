@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-WIDTH = 240
+WIDTH = 320
 
 
 def text_of(value: Any) -> str:

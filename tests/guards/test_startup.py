@@ -13,24 +13,36 @@ from tests.guards.listing import commands
 
 HEAVY = {"torch", "open3d", "cv2", "h5py", "scipy", "matplotlib", "plotly", "jinja2", "mujoco", "serial", "pandas"}
 
-# Runs the command line as the console script does and leaves the names of all loaded modules in a file.
+# Runs command lines as the console script does, one after the other, and says after each how it ended and which
+# modules were loaded by then. What the first one loads, the later ones find loaded: the first one named is to blame.
 PROBE = """
-import atexit, json, sys
-target, arguments = sys.argv[1], sys.argv[2:]
-atexit.register(lambda: open(target, "w").write(json.dumps(sorted(sys.modules))))
-sys.argv = ["r2s2r", *arguments]
+import io, json, sys
+from contextlib import redirect_stdout
 from r2s2r_cli.__main__ import main
-main()
+answers = []
+for arguments in json.loads(sys.argv[1]):
+    sys.argv = ["r2s2r", *arguments]
+    code = None
+    with redirect_stdout(io.StringIO()) as said:
+        try:
+            code = main()
+        except SystemExit as end:
+            code = end.code
+    answers.append([code or 0, len(said.getvalue()), sorted({name.partition(".")[0] for name in sys.modules})])
+print(json.dumps(answers))
 """
 
 
-def loaded(folder: Path, *arguments: str) -> set[str]:
-    """Top-level modules that are loaded when `r2s2r ARGUMENTS` has ended well in `folder`."""
-    target = folder / "modules.json"
-    probe = [sys.executable, "-c", PROBE, str(target), *arguments]
+def heavy(folder: Path, *lines: str) -> dict[str, set[str]]:
+    """What of HEAVY is loaded in a fresh process in `folder` after each `r2s2r LINE`; each must end well and say
+    something. None, if all is well."""
+    probe = [sys.executable, "-c", PROBE, json.dumps([line.split() for line in lines])]
     done = subprocess.run(probe, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return {module.partition(".")[0] for module in json.loads(target.read_text())}
+    answers = json.loads(done.stdout)
+    assert {line: code for line, (code, _, _) in zip(lines, answers, strict=True) if code} == {}, done.stderr
+    assert all(said for _, said, _ in answers)
+    return {line: found for line, (_, _, names) in zip(lines, answers, strict=True) if (found := HEAVY & set(names))}
 
 
 @pytest.fixture(scope="module")
@@ -51,19 +63,24 @@ def test_import_of_the_app_is_light(tmp_path: Path) -> None:
     assert HEAVY & modules == set()
 
 
-@pytest.mark.parametrize("command", ["", *sorted(commands())])
-def test_help_is_light(command: str, tmp_path: Path) -> None:
+def test_help_is_light(tmp_path: Path) -> None:
     """`r2s2r --help` and `r2s2r COMMAND --help` end well and load nothing heavy."""
-    assert HEAVY & loaded(tmp_path, *command.split(), "--help") == set()
+    assert heavy(tmp_path, *(f"{command} --help" for command in ["", *sorted(commands())])) == {}
 
 
-@pytest.mark.parametrize("arguments", ["--version", "status", "status --json"])
-def test_light_commands_are_light(arguments: str, project: Path) -> None:
+def test_light_commands_are_light(project: Path) -> None:
     """The commands that people run all the time load nothing heavy in a fresh project."""
-    assert HEAVY & loaded(project, *arguments.split()) == set()
+    assert heavy(project, "--version", "status", "status --json") == {}
 
 
 def test_init_is_light(tmp_path: Path) -> None:
     """Making a project loads nothing heavy, and makes it."""
-    assert HEAVY & loaded(tmp_path, "init", "fresh") == set()
+    assert heavy(tmp_path, "init fresh") == {}
     assert (tmp_path / "fresh" / "project.toml").is_file()
+
+
+def test_what_is_heavy_is_noticed(project: Path) -> None:
+    """A command that reads artifacts is found to load what reads them: the guard sees what it guards against."""
+    found = heavy(project, "status", "validate", "status --json")
+    assert list(found) == ["validate", "status --json"]
+    assert "h5py" in found["validate"]

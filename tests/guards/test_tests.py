@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import ast
+from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
-from tests.guards.listing import name, python_files
+from tests.guards.listing import ROOT, name, python_files
 
 MAX_LINES = 400
 UNFINISHED = ["TO" + "DO", "FIX" + "ME", "XX" + "X:", "raise " + "NotImplemented"]
@@ -16,33 +16,46 @@ SOURCE = python_files("r2s2r_cli", "schemas", "tests", "examples")
 TESTS = [path for path in python_files("tests") if path.name.startswith("test_")]
 
 
-def functions_of(path: Path) -> Iterator[ast.FunctionDef]:
+@pytest.fixture(scope="module")
+def trees() -> dict[str, ast.Module]:
+    """Every test file, parsed."""
+    assert TESTS
+    return {name(path): ast.parse(path.read_text()) for path in TESTS}
+
+
+def functions_of(tree: ast.Module) -> Iterator[ast.FunctionDef]:
     """The test functions of a file, also those inside classes."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
             yield node
 
 
-@pytest.mark.parametrize("path", TESTS, ids=name)
-def test_every_test_says_what_it_proves(path: Path) -> None:
+def test_every_test_says_what_it_proves(trees: dict[str, ast.Module]) -> None:
     """Every test function has a docstring."""
-    assert [node.name for node in functions_of(path) if not (ast.get_docstring(node) or "").strip()] == []
+    silent = [
+        (path, node.name)
+        for path, tree in trees.items()
+        for node in functions_of(tree)
+        if not (ast.get_docstring(node) or "").strip()
+    ]
+    assert silent == []
 
 
-@pytest.mark.parametrize("path", TESTS, ids=name)
-def test_a_test_file_has_tests(path: Path) -> None:
+def test_a_test_file_has_tests(trees: dict[str, ast.Module]) -> None:
     """A file that is named as one of tests holds at least one, so that none is lost by a rename."""
-    text = path.read_text()
-    assert list(functions_of(path)) or "RuleBasedStateMachine" in text
+    empty = [path for path, tree in trees.items() if not any(functions_of(tree))]
+    assert [path for path in empty if "RuleBasedStateMachine" not in (ROOT / path).read_text()] == []
 
 
-@pytest.mark.parametrize("path", TESTS, ids=name)
-def test_no_two_functions_of_a_file_share_a_name(path: Path) -> None:
+def test_no_two_functions_of_a_file_share_a_name(trees: dict[str, ast.Module]) -> None:
     """No test hides an earlier one of the same name in the same scope."""
-    for scope in ast.walk(ast.parse(path.read_text())):
-        if isinstance(scope, ast.Module | ast.ClassDef):
-            names = [node.name for node in scope.body if isinstance(node, ast.FunctionDef)]
-            assert len(names) == len(set(names))
+    twice = []
+    for path, tree in trees.items():
+        for scope in ast.walk(tree):
+            if isinstance(scope, ast.Module | ast.ClassDef):
+                names = Counter(node.name for node in scope.body if isinstance(node, ast.FunctionDef))
+                twice += [(path, one) for one, count in names.items() if count > 1]
+    assert twice == []
 
 
 def test_no_file_is_long() -> None:

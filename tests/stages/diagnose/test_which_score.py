@@ -3,76 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from r2s2r_cli.stages.diagnose.which.candidates import Candidate
 from r2s2r_cli.stages.diagnose.which.fit import Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.mixture import ENOUGH, FACTORS, density, minus_log, weight
 from r2s2r_cli.stages.diagnose.which.rivals import chance, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score, gains, scores
 from r2s2r_cli.stages.diagnose.which.screen import Response, screen
-from r2s2r_cli.stages.diagnose.which.white import Kind, White
-
-STRETCHES, EACH = 6, 60
-
-
-class LinearArena:
-    """residual = y - (A z + B x), white; stretches of EACH numbers, two a gait. The model's values are [z | x]. Of the
-    kinds of errors each is FACTORS times as large as the first."""
-
-    def __init__(self, truth: float, *, noise: float = 1.0, seed: int = 0) -> None:
-        rng = np.random.default_rng(seed)
-        M = STRETCHES * EACH
-        self.A, self.B = rng.standard_normal((M, 2)), rng.standard_normal((M, 2))
-        self.y = self.A @ [0.3, -0.2] + self.B[:, 0] * truth + noise * rng.standard_normal(M)
-        self.mean, self.precision = np.zeros(2), np.eye(2)
-        self.lower, self.upper = np.full(2, -10.0), np.full(2, 10.0)
-        self.by_nuisance = _kinds(self.A.T).T
-        self.engine = [0, 1]
-        self.many = tuple(SimpleNamespace(run="a", interval=k + 1) for k in range(STRETCHES))
-        self.whole = self.many
-        self.gait = np.arange(STRETCHES) // 2
-        self.white = [
-            White(tuple(
-                Kind(np.zeros((0, 0, 0)), np.zeros((0, 0)), np.zeros(0),
-                     slice(c * M + k * EACH, c * M + (k + 1) * EACH), 2 * EACH * float(np.log(factor)))
-                for c, factor in enumerate(FACTORS)
-            ), EACH)
-            for k in range(STRETCHES)
-        ]  # fmt: skip
-        self.logdets = np.array([white.logdet for white in self.white])
-        self.sizes = np.full(STRETCHES, float(EACH))
-
-    def values(self, z: np.ndarray) -> np.ndarray:
-        """Off."""
-        return np.concatenate([z, np.zeros((len(z), 2))], axis=1)
-
-    def residuals(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """White under each kind, (k, kind M)."""
-        return _kinds(z @ self.A.T + values[:, 2:] @ self.B.T - self.y)
-
-    def keys(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Key frames of one cap."""
-        return np.zeros((len(z), STRETCHES, 1, 3))
-
-    def squares(self, residual: np.ndarray) -> np.ndarray:
-        """By stretch and kind."""
-        found = (residual.reshape(len(residual), len(FACTORS), STRETCHES, EACH) ** 2).sum(axis=-1)
-        return np.asarray(found.transpose(0, 2, 1))
-
-
-def _kinds(residual: np.ndarray) -> np.ndarray:
-    return np.concatenate([residual / factor for factor in FACTORS], axis=1)
-
-
-def candidate(name: str, place: int) -> Candidate:
-    """Number `place` of B, off at 0."""
-    one = np.ones(1)
-    return Candidate(name, "motor", None, ((2 + place,),), (f"{name}.x",), ("1",), 0 * one, -5 * one, 5 * one, one,
-                     np.array([[0.5], [-0.5], [1.5], [-1.5]]))  # fmt: skip
+from tests.support.linear_arena import EACH, LinearArena, candidate
 
 
 @dataclass

@@ -66,7 +66,7 @@ def follow(
     result = _result(whole, bank, out, blind_follow.write(whole, home, whole.open))
     console.document(result)
     _show(console, result)
-    console.hint(f"r2s2r blind score {bank} --verdicts {verdicts} --key {key}")
+    console.hint(f"r2s2r blind score {bank} --verdicts {verdicts} --key {key} --follow {out}")
 
 
 def _apart(bank: Path, verdicts: Path, out: Path) -> None:

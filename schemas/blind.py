@@ -159,7 +159,8 @@ class BlindPublished(Frozen):
     """`index.json` of the bank, byte for byte."""
     index_sha256: str
     asked: PublishedAsked
-    code: PublishedCode
+    code: tuple[PublishedCode, ...]
+    """What judged, as the verdicts say; several where it changed meanwhile."""
     calibrated: tuple[str, ...]
     """Where the probabilities come from, as the verdicts say."""
     missing: tuple[str, ...]

@@ -102,9 +102,9 @@ class BlindShard(Frozen):
     index_sha256: str
     sets: int
     scored: int
-    commit: str | None
-    """Of the code that judged it; None: not known."""
-    sources_sha256: str | None
+    commits: tuple[str, ...]
+    """Of the code that judged it, as far as it is known."""
+    sources_sha256: tuple[str, ...]
     calibrated: tuple[str, ...]
     """Where its probabilities come from."""
 
@@ -171,8 +171,8 @@ class BlindPublishResult(Frozen):
     """Sets without a verdict."""
     index_sha256: str
     content_sha256: str
-    commit: str | None
-    sources_sha256: str
+    commits: tuple[str, ...]
+    sources_sha256: tuple[str, ...]
     warnings: tuple[str, ...] = ()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 from collections.abc import Iterator
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -17,13 +18,15 @@ BEGIN = ("r2s2r_cli.blind.run", "r2s2r_cli.blind.catalogue")
 LIMIT_S = 30
 
 
+@cache
 def code(root: Path | None = None) -> dict[str, Any]:
-    """Facts of a checkout (`schemas.blind.PublishedCode`). root: its folder; None: where this code lies.
+    """Facts of a checkout (`schemas.blind.PublishedCode`). root: its folder; None: where this code lies. Looked at once
+    a process, which has loaded what it judges with.
 
     Two commits with the same digest judge alike: what differs between them cannot be reached by a diagnosis. Raises
     InputError where the folder holds no r2s2r.
     """
-    home = Path(__file__).resolve().parents[3] if root is None else root.resolve()
+    home = Path(__file__).resolve().parents[2] if root is None else root.resolve()
     if not (home / "r2s2r_cli" / "__init__.py").exists():
         raise InputError("there is no r2s2r", where=str(home), expected="a checkout with r2s2r_cli/", received="none",
                          hint="r2s2r blind publish --code FOLDER")  # fmt: skip

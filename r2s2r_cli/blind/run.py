@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from r2s2r_cli.blind.code import code
 from r2s2r_cli.blind.guard import Guard, Peeked
 from r2s2r_cli.blind.index import digest, read_index
 from r2s2r_cli.blind.seam import each, open_executor
@@ -78,6 +79,7 @@ def one(job: Job) -> dict[str, Any]:
             received=digest(folder), hint="r2s2r blind make bank --key labels.key",
         )  # fmt: skip
     diagnoser = _diagnoser(job.diagnoser)
+    judge = code()  # before the guard stands: it asks git
     guard = _guard(job.bank)
     guard.begin(folder)
     begun, spent = time.monotonic(), time.process_time()
@@ -96,8 +98,8 @@ def one(job: Job) -> dict[str, Any]:
         guard.end()
     verdict = {
         "format": FORMAT, "set": job.name, "index": job.index, "logs": job.logs, **job.asked, "failed": failed,
-        "diagnosis": found, "opened": guard.opened, "refused": guard.refused, "wall_s": time.monotonic() - begun,
-        "cpu_s": time.process_time() - spent,
+        "code": judge, "diagnosis": found, "opened": guard.opened, "refused": guard.refused,
+        "wall_s": time.monotonic() - begun, "cpu_s": time.process_time() - spent,
     }  # fmt: skip
     _write(job.out / f"{job.name}.json", verdict)
     return verdict

@@ -87,7 +87,9 @@ def publish(
     follow: Follow = None,
     code: Annotated[
         Path | None,
-        typer.Option("--code", metavar="DIR", help="Checkout whose code judged; default: the one of this command."),
+        typer.Option(
+            "--code", metavar="DIR", help="Checkout whose code judged, for verdicts that do not say; default: this."
+        ),
     ] = None,
     json: JsonOption = False,
     quiet: QuietOption = False,
@@ -114,12 +116,14 @@ def publish(
     if told.missing:
         warnings.append(f"{len(told.missing)} sets have no verdict; labels that are open tell seeds: judge none of "
                         "them from now on")  # fmt: skip
-    if told.code.changed:
-        warnings.append("the checkout has changes that were not committed: its commit does not say what judged")
+    if any(one.changed for one in told.code):
+        warnings.append("the checkout that judged had changes that were not committed: its commit does not say them")
+    if len({one.sources_sha256 for one in told.code}) > 1:
+        warnings.append("the code of the diagnosis changed between these verdicts")
     result = BlindPublishResult(
         out=str(out), bytes=len(form), sets=len(told.sets), missing=told.missing, index_sha256=told.index_sha256,
-        content_sha256=told.content_sha256, commit=told.code.commit, sources_sha256=told.code.sources_sha256,
-        warnings=tuple(warnings),
+        content_sha256=told.content_sha256, commits=tuple(one.commit for one in told.code if one.commit),
+        sources_sha256=tuple(dict.fromkeys(one.sources_sha256 for one in told.code)), warnings=tuple(warnings),
     )  # fmt: skip
     console.document(result)
     console.data(f"{result.sets} sets in {out}, {result.bytes / 1000 / result.sets:.1f} kB each\n"

@@ -37,8 +37,9 @@ def blind_tables(result: BlindScoreResult) -> Iterator[PageTable]:
         yield PageTable(
             "shards: banks with a key and a list each",
             ["bank", "sets", "judged", "code", "list (SHA-256)"],
-            [[one.where, str(one.sets), str(one.scored), (one.commit or one.sources_sha256 or "not known")[:12],
-              one.index_sha256] for one in result.shards],
+            [[one.where, str(one.sets), str(one.scored),
+              ", ".join(code[:12] for code in one.commits or one.sources_sha256) or "not known", one.index_sha256]
+             for one in result.shards],
         )  # fmt: skip
     if result.misses:
         yield PageTable(

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from r2s2r_cli.blind.score import calibration_published, score_published
+from r2s2r_cli.blind.score import calibration_published, score, score_published
 from r2s2r_cli.blind.score.published import published
 from r2s2r_cli.blind.score.shard import opened
 from r2s2r_cli.errors import InputError
@@ -115,3 +115,15 @@ def test_other_noise_may_be_published_too(tmp_path: Path) -> None:
     other.write_bytes(published(opened(made.bank, made.verdicts, made.key), CODE))
     with pytest.raises(InputError, match="different worlds"):
         score_published([a], again=[other])
+
+
+def test_verdicts_say_which_code_judged(tmp_path: Path) -> None:
+    """What they say goes before what is said of them; code that changed between two of them is told of the bank too."""
+    made = Folder(tmp_path, LABELS[:20], knows_by_number, code=CODE | {"commit": "c3"})
+    made.judge("007", {"code": CODE | {"commit": "c4", "sources_sha256": "f05"}})
+    path = tmp_path / "a.json"
+    path.write_bytes(published(opened(made.bank, made.verdicts, made.key), CODE))
+    of_file, of_bank = score_published([path]), score(made.bank, made.verdicts, made.key)
+    assert of_file.shards[0].commits == ("c3", "c4") and of_file.shards[0].sources_sha256 == ("f00", "f05")
+    assert of_file.warnings == of_bank.warnings and "different code" in of_file.warnings[0]
+    assert of_file.shards[0].model_copy(update={"where": ""}) == of_bank.shards[0].model_copy(update={"where": ""})

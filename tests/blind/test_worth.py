@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from r2s2r_cli.blind.code import code
 from r2s2r_cli.blind.score import score_of
 from r2s2r_cli.blind.score.baselines import baselines
-from r2s2r_cli.blind.score.code import code
 from r2s2r_cli.blind.score.facts import said_of, truth_of
 from r2s2r_cli.errors import InputError
 from tests.support import blind_bank
@@ -96,6 +96,7 @@ def test_code_is_known_by_what_a_diagnosis_can_import(tmp_path: Path) -> None:
     for name in files:
         path = tmp_path / "r2s2r_cli" / name
         path.write_text(files[name] + "\n")
+        code.cache_clear()
         changes[name] = code(tmp_path)["sources_sha256"] != first["sources_sha256"]
         path.write_text(files[name])
     assert {name for name, changed in changes.items() if not changed} == {"views.py", "stages/calibration.json"}

@@ -11,9 +11,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from r2s2r_cli.blind.code import code
 from r2s2r_cli.blind.score.again import same
 from r2s2r_cli.blind.score.calibrate import calibrated, case
-from r2s2r_cli.blind.score.code import code
 from r2s2r_cli.blind.score.facts import Said, Truth, said_of, truth_of
 from r2s2r_cli.blind.score.follow import resolved
 from r2s2r_cli.blind.score.pool import Pool, pooled
@@ -54,10 +54,10 @@ def score_published(
 def publish(
     bank: Path, verdicts: Path, key: bytes, *, judged_by: Path | None = None, follow: Path | None = None
 ) -> bytes:
-    """The file of a bank and its verdicts, for `score_published`. judged_by: the checkout whose code judged; None:
-    this one. Raises InputError as `score` does."""
+    """The file of a bank and its verdicts, for `score_published`. judged_by: the checkout whose code judged verdicts
+    that do not say so themselves; None: this one. Raises InputError as `score` does."""
     shard = opened(bank, verdicts, key, follow=follow)
-    return published(shard, code(judged_by))
+    return published(shard, None if shard.code else code(judged_by))
 
 
 def calibration(bank: Path, verdicts: Path, key: bytes) -> dict[str, Any]:

@@ -87,9 +87,9 @@ def _apart(shards: Sequence[Shard]) -> None:
 
 
 def _facts(shard: Shard) -> BlindShard:
-    code = shard.code or {}
     return BlindShard(where=shard.where, index_sha256=shard.own, sets=len(shard.index["sets"]), scored=len(shard.sets),
-                      commit=code.get("commit"), sources_sha256=code.get("sources_sha256"),
+                      commits=tuple(dict.fromkeys(str(one["commit"]) for one in shard.code if one["commit"])),
+                      sources_sha256=tuple(dict.fromkeys(str(one["sources_sha256"]) for one in shard.code)),
                       calibrated=shard.calibrated)  # fmt: skip
 
 
@@ -98,13 +98,15 @@ def _warnings(shards: Sequence[Shard]) -> list[str]:
     missing = sum(len(one.missing) for one in shards)
     if missing:
         found.append(f"{missing} sets have no verdict: only the others are counted")
-    codes = {(one.code or {}).get("sources_sha256") for one in shards}
-    if len(codes) > 1:
-        commits = sorted({str((one.code or {}).get("commit") or "no checkout")[:12] for one in shards})
-        found.append(f"different code judged these shards ({', '.join(commits)}): one figure mixes them")
-    for one in shards:
-        if (one.code or {}).get("changed"):
-            found.append(f"{one.where}: judged from a checkout with changes that were not committed")
+    judges = [one for shard in shards for one in shard.code]
+    if len({one["sources_sha256"] for one in judges}) > 1:
+        commits = dict.fromkeys(str(one["commit"] or "no checkout")[:12] for one in judges)
+        found.append(f"different code judged these sets ({', '.join(commits)}): one figure mixes it")
+    if any(one["changed"] for one in judges):
+        found.append("sets were judged from a checkout with changes that were not committed")
+    silent = [one.where for one in shards if not one.code]
+    if silent and len(silent) < len(shards):
+        found.append(f"which code judged is not known of {', '.join(silent)}")
     learned = sorted({words for one in shards for words in one.calibrated})
     if len(learned) > 1:
         found.append(f"probabilities come from {len(learned)} calibrations ({'; '.join(learned[:_LISTED])})")

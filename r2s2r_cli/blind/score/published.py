@@ -25,11 +25,13 @@ FINDINGS = 3
 _ELEMENT = ("kind", "index", "xy_m")
 
 
-def published(shard: Shard, code: Mapping[str, Any]) -> bytes:
-    """The file of a shard: the same bytes whenever it is made from the same verdicts and code."""
+def published(shard: Shard, otherwise: Mapping[str, Any] | None = None) -> bytes:
+    """The file of a shard: the same bytes whenever it is made from the same verdicts. otherwise: what judged, where the
+    verdicts do not say."""
+    judges = shard.code or (() if otherwise is None else (dict(otherwise),))
     content = {
         "format": FORMAT, "tier": shard.index["tier"], "bank": shard.index["bank"], "made_by": shard.index["made_by"],
-        "index": shard.text, "index_sha256": shard.own, "asked": shard.asked, "code": dict(code),
+        "index": shard.text, "index_sha256": shard.own, "asked": shard.asked, "code": list(judges),
         "calibrated": list(shard.calibrated), "missing": list(shard.missing),
         "sets": {one.name: _set(one) for one in shard.sets},
     }  # fmt: skip
@@ -72,7 +74,7 @@ def read_published(path: Path) -> Shard:
     judged = tuple(Judged(n, one["label"], one["salt"], one["verdict"], one.get("follow"))
                    for n, one in sorted(sets.items()))  # fmt: skip
     return Shard(judged, tuple(content["missing"]), index, content["index"], own, content["asked"], where,
-                 content["code"])  # fmt: skip
+                 tuple(content["code"]))  # fmt: skip
 
 
 def _read(path: Path) -> dict[str, Any]:

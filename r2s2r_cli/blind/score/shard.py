@@ -31,7 +31,7 @@ class Judged:
 @dataclass(frozen=True)
 class Shard:
     """index: the list; text: as it was published; own: its SHA-256. missing: sets without a verdict. asked: what the
-    verdicts answer. where: file or folder. code: what judged, where that is known."""
+    verdicts answer. where: file or folder. code: what judged, as far as that is known."""
 
     sets: tuple[Judged, ...]
     missing: tuple[str, ...]
@@ -40,7 +40,7 @@ class Shard:
     own: str
     asked: dict[str, Any]
     where: str
-    code: dict[str, Any] | None = None
+    code: tuple[dict[str, Any], ...] = ()
 
     @property
     def calibrated(self) -> tuple[str, ...]:
@@ -80,7 +80,9 @@ def opened(bank: Path, verdicts: Path, key: bytes, *, follow: Path | None = None
         raise InputError("there is no verdict to score", where=str(verdicts), expected="<set>.json of `blind run`",
                          received="none", hint=f"r2s2r blind run {bank} --out {verdicts}")  # fmt: skip
     asked = _asked(found, verdicts)
-    return Shard(tuple(found), tuple(missing), index, data.decode(), own, asked, str(verdicts))
+    said = {json.dumps(one.verdict["code"], sort_keys=True) for one in found if one.verdict.get("code")}
+    return Shard(tuple(found), tuple(missing), index, data.decode(), own, asked, str(verdicts),
+                 tuple(json.loads(text) for text in sorted(said)))  # fmt: skip
 
 
 def followed(path: Path, index: str, logs: str) -> dict[str, Any] | None:

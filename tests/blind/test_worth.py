@@ -7,12 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from r2s2r_cli.blind import run
 from r2s2r_cli.blind.code import code
 from r2s2r_cli.blind.score import score_of
 from r2s2r_cli.blind.score.baselines import baselines
 from r2s2r_cli.blind.score.facts import said_of, truth_of
 from r2s2r_cli.errors import InputError
 from tests.support import blind_bank
+from tests.support.blind_folder import Folder
 
 LABELS = blind_bank.bank(250)
 FOUND = blind_bank.answered(LABELS, blind_bank.right)
@@ -102,3 +104,10 @@ def test_code_is_known_by_what_a_diagnosis_can_import(tmp_path: Path) -> None:
     assert {name for name, changed in changes.items() if not changed} == {"views.py", "stages/calibration.json"}
     with pytest.raises(InputError, match="no r2s2r"):
         code(tmp_path / "stages")
+
+
+def test_a_verdict_says_which_code_judged(tmp_path: Path) -> None:
+    """Also one that broke off, as here where a set has no logs; without it the code of later would be held for it."""
+    made = Folder(tmp_path, LABELS[:1], blind_bank.right)
+    verdict = run.one(run.jobs(made.bank, tmp_path / "out")[0])
+    assert verdict["failed"] and verdict["code"] == code() and len(verdict["code"]["sources_sha256"]) == 64

@@ -110,6 +110,21 @@ def run(whole: Trial, out: Path, todo: tuple[blind_run.Job, ...], **how: Any) ->
         yield verdict
 
 
+def judged_otherwise(whole: Trial, verdict: dict[str, Any]) -> str | None:
+    """In words, what else than one more gait lies between a verdict and the one before: code, or what it learned from
+    a calibration bank. None: nothing that they tell."""
+    before = next(one.verdict for one in whole.open if one.name == verdict["set"])
+    ways = {
+        "other code": lambda one: (one.get("code") or {}).get("sources_sha256"),
+        "another calibration": lambda one: one["diagnosis"].get("calibrated"),
+    }
+    for words, of in ways.items():
+        old, new = of(before), of(verdict)
+        if old is not None and new is not None and old != new:
+            return f"{words} than before: what changes in {verdict['set']} may not be the gait's doing"
+    return None
+
+
 def write(whole: Trial, out: Path, sets: Sequence[Open]) -> tuple[dict[str, Any], ...]:
     """`<set>.json` of each set whose verdicts are both there, or for which nothing was suggested; gives them."""
     found = []

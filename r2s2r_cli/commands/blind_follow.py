@@ -63,6 +63,8 @@ def follow(
             advance(1)
             if verdict["failed"]:
                 console.warn(f"{verdict['set']}: {verdict['failed'].splitlines()[0]}")
+            if words := blind_follow.judged_otherwise(whole, verdict):
+                console.warn(words)
     result = _result(whole, bank, out, blind_follow.write(whole, home, whole.open))
     console.document(result)
     _show(console, result)

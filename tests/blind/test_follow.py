@@ -78,6 +78,19 @@ def test_what_was_said_is_kept_without_a_judgement(tmp_path: Path) -> None:
     assert none["gait"] is None and none["suggested"] is None and none["random"] is None
 
 
+def test_what_else_changed_is_said(tmp_path: Path) -> None:
+    """Code or calibration, where both verdicts tell; verdicts of older versions tell neither."""
+    old = {"code": {"sources_sha256": "1"}, "diagnosis": {**wants(TARGETS), "calibrated": "20 sets"}}
+    whole = follow.trial(*bank_of(tmp_path, {"a": wants(TARGETS)}, **old))
+    same = verdict("a", "1", {**SURE, "calibrated": "20 sets"}, code={"sources_sha256": "1"})
+    assert follow.judged_otherwise(whole, same) is None
+    assert follow.judged_otherwise(whole, verdict("a", "1", {})) is None
+    code = follow.judged_otherwise(whole, {**same, "code": {"sources_sha256": "2"}})
+    learned = follow.judged_otherwise(whole, {**same, "diagnosis": {**SURE, "calibrated": "30 sets"}})
+    assert code is not None and "other code" in code
+    assert learned is not None and "calibration" in learned
+
+
 def test_a_verdict_names_a_gait_of_the_library_of_diagnose(monkeypatch: pytest.MonkeyPatch) -> None:
     """The diagnoser on trial chooses from what `r2s2r diagnose` chooses from."""
     from r2s2r_cli.stages.diagnose import diagnose as stage

@@ -127,3 +127,20 @@ def test_verdicts_say_which_code_judged(tmp_path: Path) -> None:
     assert of_file.shards[0].commits == ("c3", "c4") and of_file.shards[0].sources_sha256 == ("f00", "f05")
     assert of_file.warnings == of_bank.warnings and "different code" in of_file.warnings[0]
     assert of_file.shards[0].model_copy(update={"where": ""}) == of_bank.shards[0].model_copy(update={"where": ""})
+
+
+def test_second_verdicts_are_read_as_carefully(tmp_path: Path) -> None:
+    """A folder that is not there or knows no set has none; one that holds no verdict, or peeked, is refused."""
+    a, folder = shard(tmp_path / "a", slice(0, 20)), tmp_path / "a" / "verdicts"
+    row = next(one for one in score_published([a], again=[folder]).rows if one.name == "same_verdict")
+    assert row.n == 20 and row.value == 1.0
+    with pytest.raises(InputError, match="no second verdict"):
+        score_published([a], again=[tmp_path / "none"])
+    path = folder / f"{NAMES[0]}.json"
+    good = path.read_text()
+    path.write_text(good.replace('"refused": []', '"refused": ["labels"]'))
+    with pytest.raises(InputError, match="reached for"):
+        score_published([a], again=[folder])
+    path.write_text(good[:-9])
+    with pytest.raises(InputError, match="cannot be read"):
+        score_published([a], again=[folder])

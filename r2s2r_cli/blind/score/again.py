@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from r2s2r_cli.blind.score.facts import Said, Truth, said_of
 from r2s2r_cli.blind.score.pool import Pool
 from r2s2r_cli.blind.score.published import read_published
 from r2s2r_cli.blind.score.rows import AGAIN, row
+from r2s2r_cli.blind.score.shard import read_verdict
 from r2s2r_cli.errors import InputError
 from schemas.results_blind import BlindRow
 
@@ -40,9 +40,8 @@ def same(pool: Pool, found: Sequence[tuple[str, Truth, Said]], again: Sequence[P
 
 def _verdicts(path: Path, labels: Mapping[str, dict[str, Any]]) -> dict[str, Mapping[str, Any]]:
     """Second verdicts by name: of a folder of `blind run`, or of a published file, whose worlds can be compared."""
-    if path.is_dir():
-        return {name: json.loads((path / f"{name}.json").read_text(encoding="utf-8")) for name in labels
-                if (path / f"{name}.json").exists()}  # fmt: skip
+    if not path.is_file():
+        return {name: read_verdict(path / f"{name}.json") for name in labels if (path / f"{name}.json").exists()}
     found: dict[str, Mapping[str, Any]] = {}
     for one in read_published(path).sets:
         if one.name in labels:

@@ -67,7 +67,7 @@ def opened(bank: Path, verdicts: Path, key: bytes, *, follow: Path | None = None
         if not (verdicts / f"{name}.json").exists():
             missing.append(name)
             continue
-        verdict = _verdict(verdicts / f"{name}.json", own)
+        verdict = read_verdict(verdicts / f"{name}.json", own)
         if digest(bank / labels.SETS / name) != facts["logs"] or verdict["logs"] != facts["logs"]:
             raise InputError("the logs of a set were changed after the bank was closed", where=f"{labels.SETS}/{name}",
                              expected=facts["logs"], received=verdict["logs"],
@@ -104,7 +104,9 @@ def followed(path: Path, index: str, logs: str) -> dict[str, Any] | None:
     return found
 
 
-def _verdict(path: Path, index: str) -> dict[str, Any]:
+def read_verdict(path: Path, index: str | None = None) -> dict[str, Any]:
+    """A file of `blind run`, with its SHA-256. index: of the bank that it must be of. Raises InputError where it is
+    none, of another bank, or reached for the truth."""
     try:
         data = path.read_bytes()
         verdict: dict[str, Any] = json.loads(data)
@@ -112,9 +114,9 @@ def _verdict(path: Path, index: str) -> dict[str, Any]:
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError("a verdict cannot be read", where=str(path), expected="a file of `blind run`",
                          received=str(error), hint=f"rm {path}") from error  # fmt: skip
-    if of != index:
+    if index not in (None, of):
         raise InputError("a verdict was found on another bank, or on another list of this one", where=str(path),
-                         expected=index, received=str(of), hint="r2s2r blind run bank --out verdicts-2")  # fmt: skip
+                         expected=str(index), received=str(of), hint="r2s2r blind run bank --out verdicts-2")  # fmt: skip
     if verdict.get("refused"):
         raise InputError("a verdict reached for the truth", where=str(path), expected="nothing refused",
                          received=str(verdict["refused"][0]), hint=f"rm {path}")  # fmt: skip

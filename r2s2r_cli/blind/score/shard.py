@@ -116,7 +116,8 @@ def read_verdict(path: Path, index: str | None = None) -> dict[str, Any]:
                          received=str(error), hint=f"rm {path}") from error  # fmt: skip
     if index not in (None, of):
         raise InputError("a verdict was found on another bank, or on another list of this one", where=str(path),
-                         expected=str(index), received=str(of), hint="r2s2r blind run bank --out verdicts-2")  # fmt: skip
+                         expected=str(index), received=str(of),
+                         hint="r2s2r blind run bank --out verdicts-2")  # fmt: skip
     if verdict.get("refused"):
         raise InputError("a verdict reached for the truth", where=str(path), expected="nothing refused",
                          received=str(verdict["refused"][0]), hint=f"rm {path}")  # fmt: skip

@@ -29,6 +29,10 @@ class RankedName(Frozen):
     """Log predictive density over the refit nominal model on gaits that were left out [nats]."""
     elpd_gain_sd: float | None = None
     """Its sd, from how much the left-out parts differ in it; None: one part, or no fit."""
+    parity_nats: float = 0.0
+    """What the parity stage says for it, without a simulator [nats]."""
+    fitted: bool = True
+    """False: the screening left it out, and it counts as gaining nothing."""
     probability: float
     size: dict[str, float] = Field(default_factory=dict)
     """Of its numbers, by name, in `units`."""

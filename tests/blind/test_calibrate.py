@@ -9,7 +9,7 @@ from r2s2r_cli.errors import InputError
 from tests.support import blind_bank
 
 EFFECTS = ("backlash", "payload", "motor_lag", "soft_ground")
-TEMPERATURE, EQUIVALENT, UNKNOWN = 5.0, 8.0, 20.0
+TEMPERATURE, PARITY, EQUIVALENT, UNKNOWN = 5.0, 3.5, 8.0, 20.0
 BIAS = {"soft_ground": -9.0}
 
 
@@ -20,17 +20,23 @@ def planted(count: int, seed: int = 0) -> list[Case]:
     for _ in range(count):
         names = (*EFFECTS, "none", "unknown")
         score = np.array([*rng.normal(12.0, 10.0, len(EFFECTS)), 8.0, rng.uniform(0.0, 45.0)])
+        parity = np.array([*rng.exponential(1.5, len(EFFECTS)), 0.0, 0.0])
         equivalent = bool(rng.random() < 0.3)
-        x = score + np.array([*(BIAS.get(name, 0.0) for name in EFFECTS), EQUIVALENT * equivalent, -UNKNOWN])
+        x = (
+            score
+            + PARITY * parity
+            + np.array([*(BIAS.get(name, 0.0) for name in EFFECTS), EQUIVALENT * equivalent, -UNKNOWN])
+        )
         p = np.exp((x - x.max()) / TEMPERATURE)
-        found.append(Case(names, score, equivalent, names[rng.choice(len(names), p=p / p.sum())]))
+        found.append(Case(names, score, parity, equivalent, names[rng.choice(len(names), p=p / p.sum())]))
     return found
 
 
 def test_planted_numbers_come_back() -> None:
-    """Of 800 sets: temperature, offsets and the effect that wins too easily."""
+    """Of 800 sets: temperature, what the parity stage is worth, offsets and the effect that wins too easily."""
     found = calibrated(planted(800), words="test")
     assert found["temperature"] == pytest.approx(TEMPERATURE, rel=0.2)
+    assert found["parity"] == pytest.approx(PARITY, rel=0.3)
     assert found["unknown"] == pytest.approx(UNKNOWN, abs=3.0)
     assert found["equivalent"] == pytest.approx(EQUIVALENT, abs=3.0)
     assert found["bias"]["soft_ground"] - found["bias"]["payload"] == pytest.approx(-9.0, abs=2.5)
@@ -44,7 +50,9 @@ def test_a_set_of_90_per_cent_holds_the_truth_so_often() -> None:
     for one in fresh:
         bias = np.array([found["bias"].get(name, 0.0) for name in one.names])
         offset = {"none": found["equivalent"] * one.equivalent, "unknown": -found["unknown"]}
-        x = (one.score + bias + [offset.get(name, 0.0) for name in one.names]) / found["temperature"]
+        x = (one.score + found["parity"] * one.parity + bias + [offset.get(name, 0.0) for name in one.names]) / found[
+            "temperature"
+        ]
         p = np.exp(x - x.max())
         p = p / p.sum()
         held += p[one.names.index(one.truth)] >= found["conformal"]
@@ -59,12 +67,13 @@ def test_a_verdict_becomes_a_case() -> None:
     label = {"kind": "single", "effects": [{"id": "payload", "channel": "mass", "element": None, "onset": None}],
              "d": 9.0, "d_each": [9.0], "outside": None}  # fmt: skip
     document = {
-        "ranking": [{"effect": "payload", "elpd_gain": 7.5}, {"effect": "none", "elpd_gain": 0.0},
+        "ranking": [{"effect": "payload", "elpd_gain": 7.5, "parity_nats": 2.5}, {"effect": "none", "elpd_gain": 0.0},
                     {"effect": "unknown", "elpd_gain": 3.0}, {"effect": "backlash", "elpd_gain": -1e9}],
         "chance_nats": 2.0, "refit_upper_m": 0.012, "floor_m": 0.010,
     }  # fmt: skip
     one = case(truth_of(label), document)
     assert one is not None and one.names == ("payload", "none", "unknown") and one.score.tolist() == [7.5, 2.0, 3.0]
+    assert one.parity.tolist() == [2.5, 0.0, 0.0]
     assert one.equivalent and one.truth == "payload"
     pair = next(each for each in blind_bank.bank() if each["kind"] == "pair" and each["d"] > 3)
     assert case(truth_of(pair), document) is None

@@ -1,9 +1,10 @@
 """From verdicts on a calibration bank to the numbers that turn gains into probabilities.
 
-p(name) ~ exp((score + bias) / temperature). The score of an effect is its held-out gain; that of `none` what the best
-of the catalogue gains by chance, and `equivalent` more where the equivalence test finds no gap; that of `unknown` what
-no effect explains, less `unknown`. Linear in 1 / temperature and the products with it, so the fit (a multinomial
-regression, biases drawn to 0) has one optimum. Thresholds come from probabilities of sets left out of the fit.
+p(name) ~ exp((score + bias) / temperature). The score of an effect is its held-out gain and `parity` times what the
+parity stage says for it; that of `none` what the best of the catalogue gains by chance, and `equivalent` more where the
+equivalence test finds no gap; that of `unknown` what no effect explains, less `unknown`. Linear in 1 / temperature and
+the products with it, so the fit (a multinomial regression, biases drawn to 0) has one optimum. Thresholds come from
+probabilities of sets left out of the fit.
 """
 
 from __future__ import annotations
@@ -18,22 +19,27 @@ from r2s2r_cli.blind.score.facts import NONE, UNKNOWN, Truth
 from r2s2r_cli.errors import InputError
 
 LEAST_SETS = 12
+LEARNED = 4
+"""Numbers beside the biases."""
 FOLDS = 10
 COVER = 0.90
 PRECISION = 0.90
 BIAS_SD = 1.0
 """Of a bias over the temperature: how much more often a name wins than its gains say, before anything is learned."""
-SHARPNESS = 1.0 / 8.0
+SHARPNESS = 1.0 / 15.0
 """1 / temperature before anything is learned [1/nats], and the unit in which it is fitted."""
+PARITY, PARITY_SD = 0.7, 0.3
+"""parity / temperature before anything is learned, and how surely: its errors are known better than a simulator's."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """One set. names: what was ranked; score (n,): without the numbers that are learned; equivalent: the test found no
-    gap. truth: the right name, not among `names` where the screening had lost it."""
+    """One set. names: what was ranked; score, parity (n,) [nats]: without the numbers that are learned; equivalent: the
+    test found no gap. truth: the right name, not among `names` where the screening had lost it."""
 
     names: tuple[str, ...]
     score: np.ndarray
+    parity: np.ndarray
     equivalent: bool
     truth: str
 
@@ -47,7 +53,8 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
     score = [chance if row["effect"] == NONE else float(row["elpd_gain"]) for row in rows]
     upper, floor = document.get("refit_upper_m"), document["floor_m"]
     equivalent = upper is not None and float(upper) < 1.25 * float(floor)
-    return Case(tuple(row["effect"] for row in rows), np.array(score), equivalent, truth.right)
+    parity = np.array([float(row.get("parity_nats", 0.0)) for row in rows])
+    return Case(tuple(row["effect"] for row in rows), np.array(score), parity, equivalent, truth.right)
 
 
 def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
@@ -74,9 +81,10 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
     sure = np.array([p[name] for name, (_, p) in zip(first, apart, strict=True)])
     return {
         "temperature": 1.0 / sharp,
-        "equivalent": float(whole[1]) / sharp,
-        "unknown": -float(whole[2]) / sharp,
-        "bias": {name: float(b) / sharp for name, b in zip(effects, whole[3:], strict=True)},
+        "parity": float(whole[1]) / sharp,
+        "equivalent": float(whole[2]) / sharp,
+        "unknown": -float(whole[3]) / sharp,
+        "bias": {name: float(b) / sharp for name, b in zip(effects, whole[4:], strict=True)},
         "commit": _commit(sure, right),
         "conformal": float(held[k - 1]) if k else 0.0,
         "words": words,
@@ -89,32 +97,34 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
 
 
 def _design(one: Case, effects: Sequence[str]) -> np.ndarray:
-    """What multiplies (sharpness, equivalent, unknown, biases) in the exponent of every name, (name, 3 + effect)."""
-    X = np.zeros((len(one.names), 3 + len(effects)))
-    X[:, 0] = one.score * SHARPNESS
+    """What multiplies (sharpness, parity, equivalent, unknown, biases) in the exponent of every name, (name, LEARNED +
+    effect)."""
+    X = np.zeros((len(one.names), LEARNED + len(effects)))
+    X[:, 0], X[:, 1] = one.score * SHARPNESS, one.parity
     for row, name in zip(X, one.names, strict=True):
         if name == NONE:
-            row[1] = float(one.equivalent)
+            row[2] = float(one.equivalent)
         elif name == UNKNOWN:
-            row[2] = 1.0
+            row[3] = 1.0
         else:
-            row[3 + effects.index(name)] = 1.0
+            row[LEARNED + effects.index(name)] = 1.0
     return X
 
 
 def _fit(cases: Sequence[Case], effects: Sequence[str]) -> np.ndarray:
-    """Most probable numbers (3 + effect,): the prior has sharpness about 1, the others about 0."""
+    """Most probable numbers (LEARNED + effect,): the prior has sharpness about 1, parity about PARITY, the others about
+    0."""
     from scipy.optimize import minimize
 
     known = [one for one in cases if one.truth in one.names]
     most = max((len(one.names) for one in known), default=1)
-    X, there = np.zeros((len(known), most, 3 + len(effects))), np.zeros((len(known), most), dtype=bool)
+    X, there = np.zeros((len(known), most, LEARNED + len(effects))), np.zeros((len(known), most), dtype=bool)
     for k, one in enumerate(known):
         X[k, : len(one.names)], there[k, : len(one.names)] = _design(one, effects), True
     right = X[np.arange(len(known)), [one.names.index(one.truth) for one in known]]
-    mean = np.zeros(3 + len(effects))
-    mean[0] = 1.0
-    weight = np.r_[1.0, 0.1, 0.1, np.full(len(effects), 1.0 / BIAS_SD**2)]
+    mean = np.zeros(LEARNED + len(effects))
+    mean[:2] = 1.0, PARITY
+    weight = np.r_[1.0, PARITY_SD**-2.0, 0.1, 0.1, np.full(len(effects), 1.0 / BIAS_SD**2)]
 
     def cost(w: np.ndarray) -> tuple[float, np.ndarray]:
         x = np.where(there, X @ w, -np.inf)
@@ -124,7 +134,7 @@ def _fit(cases: Sequence[Case], effects: Sequence[str]) -> np.ndarray:
         value = 0.5 * float(weight @ (w - mean) ** 2) + float((np.log(total) + top).sum() - (right @ w).sum())
         return value, weight * (w - mean) + np.einsum("kn,knp->p", e / total, X) - right.sum(axis=0)
 
-    bounds = [(1e-3, None), *[(None, None)] * (2 + len(effects))]
+    bounds = [(1e-3, None), (0.0, None), *[(None, None)] * (2 + len(effects))]
     return np.asarray(minimize(cost, mean, jac=True, bounds=bounds, method="L-BFGS-B").x)
 
 

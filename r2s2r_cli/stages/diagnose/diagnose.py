@@ -91,7 +91,7 @@ def diagnose(
     )  # fmt: skip
     compared = compare_effects(
         fitted.arena, fitted.base, floor_m=fitted.floor.rmse, calibration=settings.calibration or calibration(),
-        sizes={} if said is None else said.starts(), suspected=None if said is None else said.suspected(),
+        sizes={} if said is None else said.starts(), told_by=None if said is None else said.nats(),
         effects=settings.effects, seed=settings.seed, told=progress,
         ways=Ways(settings.held_out, settings.with_unknown), healthy=fitted.healthy,
     )  # fmt: skip

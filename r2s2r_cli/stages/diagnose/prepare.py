@@ -42,6 +42,8 @@ robots fall over, two fits of the same runs differ by as much."""
 AGED_NUMERICS = 0.1
 """The same of effects that are nuisances because another engine has a little of them: numerics do not age, and what
 has grown since is the effect."""
+AGELESS = ("stiffness", "sensor_lag")
+"""Other nuisances of that kind: how an engine pulls its cables taut, and what filters and converters take."""
 
 Told = Callable[[str, int, int], None]
 
@@ -229,7 +231,7 @@ def _posterior(arena: Arena, base: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Mean and precision of the nuisances after the healthy runs, a little wider: a robot ages."""
     H, _ = Fits(arena).normal(base)
     n = arena.shared
-    own = np.array([arena.model.numbers[k].kind == "own" for k in arena.engine])
-    share = np.where(np.pad(own, (0, n - len(own))), AGED_NUMERICS, AGED)
+    own = {arena.model.names[k] for k in arena.engine if arena.model.numbers[k].kind == "own"}
+    share = np.array([AGED_NUMERICS if name in own or name in AGELESS else AGED for name in arena.names[:n]])
     aged = np.diag(share**2 / np.diag(arena.precision)[:n])
     return base.z[:n], np.linalg.inv(np.linalg.inv(H)[:n, :n] + aged)

@@ -15,7 +15,8 @@ from r2s2r_cli.stages.segments import Intervals, Segments
 GUESSED_M = 0.005
 """Standard deviation of a hidden cap, along its worst axis, from which on it counts as not observed at all."""
 STILL = 3.0
-"""A run whose smoothed caps move less than this many standard deviations of the noise (all axes) shows no motion."""
+"""A run whose caps, averaged, move less than this many standard deviations of the noise (all axes) shows no motion."""
+AVERAGED_S = 0.5
 
 LEAST_M = 1e-5
 """Noise of a log that has none: its numbers are rounded somewhere."""
@@ -184,8 +185,11 @@ def _require_rows(data: RunData, run: str) -> None:
 
 
 def _require_motion(data: RunData, run: str) -> None:
-    moved = np.linalg.norm(data.p_WE - data.p_WE[0], axis=-1).max(axis=0)
-    noise = np.maximum(np.linalg.norm(data.noise, axis=-1), LEAST_M)
+    # Of means over AVERAGED_S: noise whose errors last is stated as the white noise that is as bad, frame by frame.
+    count = min(len(data.t), max(1, int(np.searchsorted(data.t, data.t[0] + AVERAGED_S))))
+    means = np.diff(np.cumsum(np.pad(data.p_WE, ((1, 0), (0, 0), (0, 0))), axis=0)[::count], axis=0) / count
+    moved = np.linalg.norm(means - means[0], axis=-1).max(axis=0)
+    noise = np.maximum(np.linalg.norm(data.noise, axis=-1) / np.sqrt(count), LEAST_M)
     if (moved < STILL * noise).all():
         cap = int(np.argmax(moved / noise))
         raise InputError(

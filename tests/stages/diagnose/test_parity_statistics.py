@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.parity import parity
-from r2s2r_cli.stages.diagnose.parity.finding import discoveries
+from r2s2r_cli.stages.diagnose.parity.finding import MOST_NATS, discoveries
 from r2s2r_cli.stages.diagnose.parity.series import Measured, combined, regression
 from r2s2r_cli.stages.identify.data import Selection
 from tests.support.parity_log import evidence_of, swaying, with_caps
@@ -108,3 +108,18 @@ def test_nothing_of_judged_intervals_is_looked_at() -> None:
     first, second = parity(split), parity(replace(split, runs=(spoiled,)))
     assert first.findings
     assert first == second
+
+
+def test_what_findings_say_in_nats_is_half_their_square_by_effect_and_element() -> None:
+    """Lost caps speak for `dropout` with half their squared z, and no element; what two findings say of one element is
+    not added, and nothing says more than MOST_NATS."""
+    run = swaying("g", 1)
+    quality = run.caps.quality.copy()
+    quality[::2, :2] = 2
+    found = parity(evidence_of((with_caps(run, quality=quality),)))
+    z = found.of("dropout")[0].z
+    assert found.nats()["dropout"][None] == pytest.approx(min(0.5 * z**2, MOST_NATS))
+    by_sensor = {one.element.index: 0.5 * one.z**2 for one in found.of("sensor_drift")}
+    for index, nats in found.nats()["sensor_bias"].items():
+        assert nats >= 0.8 * min(by_sensor.get(index, 0.0), MOST_NATS)
+        assert nats <= MOST_NATS

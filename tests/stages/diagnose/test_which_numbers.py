@@ -62,3 +62,13 @@ def test_a_patch_is_tried_where_caps_stood(model: Model) -> None:
     patch = next(one for one in candidates(model, None, touched) if any("patch_x_m" in name for name in one.names))
     centres = {tuple(row) for row in patch.tries[:, 1:3].round(6).tolist()}
     assert centres == {(0.1, 0.2), (-0.3, 0.4)}
+
+
+def test_a_share_of_a_size_stays_where_it_is(model: Model) -> None:
+    """Half a patch has half the factor's distance from off, in the same place and as wide."""
+    patch = next(one for one in candidates(model) if any("patch_x_m" in name for name in one.names))
+    size = patch.tries[0]
+    half = patch.share(size, 0.5)
+    assert half[patch.shape].tolist() == size[patch.shape].tolist()
+    assert half[~patch.shape] == pytest.approx(0.5 * (patch.off + size)[~patch.shape])
+    assert patch.shape.sum() == 3

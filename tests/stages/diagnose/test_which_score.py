@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
+from r2s2r_cli.stages.diagnose.parity.finding import Element
 from r2s2r_cli.stages.diagnose.which.fit import Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.mixture import ENOUGH, FACTORS, density, minus_log, weight
 from r2s2r_cli.stages.diagnose.which.rivals import chance, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score, gains, scores
 from r2s2r_cli.stages.diagnose.which.screen import Response, screen
+from r2s2r_cli.stages.diagnose.which.which import FITTED, _picked
 from tests.support.linear_arena import EACH, LinearArena, candidate
 
 
@@ -64,6 +66,34 @@ def test_leaving_a_gait_out_is_fitting_without_it() -> None:
     prior = np.diag([1.0, 1.0, 0.25])
     direct = np.linalg.solve(J.T @ (rows[keep, None] * J) + prior, J.T @ (rows[keep] * arena.y[keep]))
     assert found.scores[1].without[0] == pytest.approx(direct, abs=2e-3)
+
+
+def test_an_effect_far_smaller_than_what_is_tried_is_seen_in_the_screening() -> None:
+    """A third of the least try: at that try it would make everything worse, at a share of it it gains."""
+    found = tried(0.16)
+    right, *_ = screen(found.arena, found.fits[0], [candidate("right", 0), candidate("wrong", 1)])  # type: ignore[arg-type]
+    assert right.candidate.effect == "right"
+    assert right.gain > 1.0
+    assert 0.0 < right.size[0] < 0.5
+
+
+def test_what_parity_speaks_for_is_fitted_at_its_element() -> None:
+    """Beyond the FITTED best of the screening, with parity's element first; a whisper is not heard."""
+    arena = LinearArena(0.0)
+
+    def response(name: str, index: int | None, gain: float) -> Response:
+        one = candidate(name, 0)
+        element = None if index is None else Element("sensor", index)
+        return Response(replace(one, element=element), gain, one.scale, arena.mean, 9.0, 0.0, np.zeros(1))
+
+    many = [response(f"e{k}", None, 50.0 - k) for k in range(FITTED + 2)]
+    sensors = [response("sensor_bias", k, 5.0 - k) for k in range(4)]
+    told = {"sensor_bias": {3: 20.0, 1: 0.3}, f"e{FITTED}": {None: 0.5}}
+    picked = _picked([*many, *sensors], told)
+    names = [one.candidate.effect for one in picked]
+    assert names[:FITTED] == [f"e{k}" for k in range(FITTED)]
+    assert [one.candidate.number for one in picked[FITTED:]] == [3, 0]
+    assert f"e{FITTED}" not in names
 
 
 def test_without_an_effect_chance_is_not_beaten_often() -> None:

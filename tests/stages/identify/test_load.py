@@ -10,7 +10,7 @@ import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.errors import ExitCode, InputError
-from r2s2r_cli.stages.identify.load import STILL, require_two_intervals, run_data
+from r2s2r_cli.stages.identify.load import AVERAGED_S, STILL, require_two_intervals, run_data
 from tests.stages.measures.gait import FRAMES, path, run
 
 SHIFT = 0.004
@@ -149,9 +149,13 @@ def test_nan_in_a_kept_frame_of_the_recording_is_bad_input() -> None:
 
 @pytest.mark.parametrize(("factor", "still"), [(0.99, True), (1.01, False)])
 def test_a_run_that_moves_less_than_its_noise_is_bad_input(factor: float, still: bool) -> None:
-    """One cap moves by just under, or just over, three times the noise of all its axes."""
+    """One cap moves for good by just under, or just over, three times what noise makes of the mean of all its axes over
+    half a second."""
     p_WE = np.tile(path(1)[:1], (36, 1, 1))
-    p_WE[18, 4, 0] += factor * STILL * NOISE * 3**0.5
+    clock = run(6).t
+    averaged = np.count_nonzero(clock < clock[0] + AVERAGED_S)
+    assert averaged > 1
+    p_WE[averaged:, 4, 0] += factor * STILL * NOISE * (3 / averaged) ** 0.5
     recording, estimate = artifacts(p_WE=p_WE)
     if not still:
         assert run_data(recording, estimate, "walk").name == "walk"

@@ -107,6 +107,17 @@ class Parity:
                 found[suspicion.effect] = max(weight, found.get(suspicion.effect, 0.0))
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
+    def nats(self) -> dict[str, dict[int | None, float]]:
+        """What all findings say for each effect, half their squared z times share [nats], the most of each element, by
+        id and index of the element (None: of no element)."""
+        found: dict[str, dict[int | None, float]] = {}
+        for one in self.findings:
+            for suspicion in one.suspicions:
+                nats = suspicion.share * min(0.5 * one.z**2, MOST_NATS)
+                own = found.setdefault(suspicion.effect, {})
+                own[one.element.index] = max(own.get(one.element.index, 0.0), nats)
+        return found
+
     def starts(self) -> dict[str, dict[str, float]]:
         """Start values for fits of effects, by id and own parameter: of the strongest finding that says one."""
         found: dict[str, dict[str, float]] = {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 from r2s2r_cli.stages.diagnose.evidence import Evidence
@@ -16,7 +17,8 @@ from r2s2r_cli.stages.diagnose.parity.suspects import suspicions
 from r2s2r_cli.stages.diagnose.parity.winch_fit import LAWS
 
 SCALED = 4.0
-"""A camera scale this many errors off is taken out before sensors are compared with the camera."""
+"""A camera scale this many errors off is taken out before sensors are compared with the camera; the gain of a sensor,
+before its winch is timed."""
 SOFT_NATS, SOFT_SHARE = 6.0, 0.15
 """Winch laws are look-alikes: one that explains the ramps so many nats worse, and this share of the best gain, is
 suspected e times less."""
@@ -41,6 +43,7 @@ def parity(evidence: Evidence, *, level: float = 0.05) -> Parity:
     scale = _scale(first, base)
     if scale != 1.0:
         first = quantities(runs, robot, speed, lag=lag, scale=scale)
+    first = _by_true_length(first, base, robot.actuated)
     missing += list(first.missing)
     if base is None:
         missing.append("healthy runs: findings are against robot.toml, so what it has wrong counts as well")
@@ -56,6 +59,20 @@ def _scale(found: Quantities, base: Quantities | None) -> float:
     key: Key = ("camera_scale", "camera", None)
     one = _finding(key, found.of[key], base, found)
     return 1.0 if one is None or abs(one.z) < SCALED else one.value / one.expected
+
+
+def _by_true_length(found: Quantities, base: Quantities | None, actuated: Sequence[int]) -> Quantities:
+    """Winding rates, which are read off the sensors, without the gain of a sensor that stands out."""
+    of = dict(found.of)
+    for k, cable in enumerate(actuated):
+        rate, gain = ("winch_rate", "motor", k), ("sensor_gain", "sensor", cable)
+        if rate not in of or gain not in of:
+            continue
+        one = _finding(gain, of[gain], base, found)
+        if one is not None and abs(one.z) >= SCALED:
+            by, sd = math.log1p(one.value) - math.log1p(one.expected), math.hypot(one.sd, one.expected_sd)
+            of[rate] = Measured(of[rate].value - by, math.hypot(of[rate].sd, sd))
+    return replace(found, of=of)
 
 
 def _finding(key: Key, value: Measured, base: Quantities | None, found: Quantities) -> Finding | None:

@@ -15,13 +15,15 @@ FILE = "calibration.json"
 
 @dataclass(frozen=True)
 class Calibration:
-    """temperature [nats]: of the softmax over names. equivalent, unknown [nats]: what `none` gains where the
+    """temperature [nats]: of the softmax over names. parity: nats of gain that a nat of the parity stage is worth: it
+    needs no simulator, so it errs far less. equivalent, unknown [nats]: what `none` gains where the
     equivalence test finds no gap, and what `unknown` must exceed. bias [nats]: of a name, what its gains are short of.
     commit: probability from which one name is given.
     conformal: names whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many
     it rests on, 0 for the defaults."""
 
-    temperature: float = 10.0
+    temperature: float = 15.0
+    parity: float = 10.0
     equivalent: float = 6.0
     unknown: float = 25.0
     commit: float = 0.5

@@ -34,7 +34,8 @@ PARTS = {
 @dataclass(frozen=True)
 class Candidate:
     """One effect at one element. spread: of each of its free numbers the places among those of the model, several where
-    all elements share it. off, lower, upper, scale: (k,). tries: sizes (t, k) at which it is tried first."""
+    all elements share it. off, lower, upper, scale: (k,). tries: sizes (t, k) at which it is tried first. shape (k,):
+    numbers that only say where or how, and nothing while the others are off."""
 
     effect: str
     channel: str
@@ -47,6 +48,16 @@ class Candidate:
     upper: np.ndarray
     scale: np.ndarray
     tries: np.ndarray
+    shape: np.ndarray
+
+    def share(self, size: np.ndarray, share: float) -> np.ndarray:
+        """A size (k,) that share of the way from off, at the same place."""
+        return np.where(self.shape, size, self.off + share * (size - self.off))
+
+    @property
+    def number(self) -> int | None:
+        """Index of its element; None: it has none, or all of the kind."""
+        return None if self.element is None else self.element.index
 
     @property
     def label(self) -> str:
@@ -124,6 +135,7 @@ def _candidate(
         units=tuple(n.unit for n in numbers), off=off, lower=lower, upper=upper, scale=scale,
         tries=_distinct(tries, [k for k, key in enumerate(keys) if not _only_shape(key, keys)], off, lower, upper,
                         scale),
+        shape=np.array([_only_shape(key, keys) for key in keys]),
     )  # fmt: skip
 
 

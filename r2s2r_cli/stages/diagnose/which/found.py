@@ -19,7 +19,8 @@ class Ranked:
     gain: held-out log predictive density over the refit nominal model [nats]. size, ci90: of its numbers, by name, in
     `units`. moved: the fit left its start; on_bound: names of numbers that ended on a bound. rmse: of the caps at the
     ends of stretches left out [m]. misfit: squares over what noise and floor explain, median over stretches.
-    gain_sd: of the gain, from how much what was left out differs in it [nats].
+    gain_sd: of the gain, from how much what was left out differs in it [nats]. parity: what the parity stage says for
+    it [nats]. fitted: False, the screening left it out, and it counts as gaining nothing.
     """
 
     effect: str
@@ -35,6 +36,8 @@ class Ranked:
     rmse: float | None = None
     misfit: float | None = None
     gain_sd: float | None = None
+    parity: float = 0.0
+    fitted: bool = True
     others: tuple[tuple[Element, float], ...] = ()
     """Other elements of the effect that were fitted, with their gains."""
 

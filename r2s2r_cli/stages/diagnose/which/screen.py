@@ -9,22 +9,25 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.candidates import Candidate
-from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
+from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis, unlikely
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
 
 LEAST_RESPONSE = 1.0
 """Whitened length below which a response is nothing: the effect cannot be seen in these gaits."""
 CHUNK = 64
 """Responses kept at a time: whitened residuals of a long evidence are large."""
+SHARES = np.array([1.0, 0.5, 0.2])
+"""Of a response: what is there may be far smaller than what is tried, and its response is then about that share."""
 
 
 @dataclass(frozen=True)
 class Response:
     """One candidate in the screening.
 
-    gain: robust log likelihood over the refit nominal model at its best try, nuisances fitted linearly [nats]; size
-    (k,): of that try; start_z (p + q,): nuisances there. seen: whitened length of its largest response; absorbed:
-    share of its square that the nuisances explain; direction (M,): that response per unit length, nuisances taken off.
+    gain: robust log likelihood over the refit nominal model at its best try or a share of it, nuisances fitted
+    linearly [nats]; size (k,): there; start_z (p + q,): nuisances there. seen: whitened length of its largest response;
+    absorbed: share of its square that the nuisances explain; direction (M,): that response per unit length, nuisances
+    taken off.
     """
 
     candidate: Candidate
@@ -79,14 +82,15 @@ def screen(arena: Arena, base: Fit, candidates: Sequence[Candidate]) -> tuple[Re
             if length > shown.get(i, (0.0, 0.0, residual))[0]:
                 share = 1.0 - (kept / length) ** 2 if length > 0 else 0.0
                 shown[i] = (length, share, left / max(kept, 1e-12))
-            by = -np.linalg.solve(own.normal, own.J.T @ (by_row * residual) + pull)
-            z = np.clip(base.z + by, arena.lower, arena.upper)
-            after = residual + own.J @ (z - base.z)
-            data = float(minus_log(arena.squares(after[None]), arena.logdets, arena.sizes).sum())
-            away = z - arena.mean
-            gain = base.cost - data - 0.5 * float(away @ arena.precision @ away)
-            if i not in best or gain > best[i][0]:
-                best[i] = (gain, size, z)
+            along = base.residual + SHARES[:, None] * (residual - base.residual)
+            pulls = own.J.T @ (by_row * along).T + pull[:, None]
+            z = np.clip(base.z - np.linalg.solve(own.normal, pulls).T, arena.lower, arena.upper)
+            after = along + (z - base.z) @ own.J.T
+            data = minus_log(arena.squares(after), arena.logdets, arena.sizes).sum(axis=1)
+            gains = base.cost - data - unlikely(arena, z)
+            k = int(np.argmax(gains))
+            if i not in best or gains[k] > best[i][0]:
+                best[i] = (float(gains[k]), candidates[i].share(size, float(SHARES[k])), z[k])
     found = []
     for i, one in enumerate(candidates):
         length, share, direction = shown.get(i, (0.0, 0.0, np.zeros(len(base.residual))))

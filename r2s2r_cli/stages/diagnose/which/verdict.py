@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.parity.finding import Element
-from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
+from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked, Screened, Shift, Which
-from r2s2r_cli.stages.diagnose.which.rivals import NoGap
+from r2s2r_cli.stages.diagnose.which.material import Material
 from r2s2r_cli.stages.diagnose.which.score import Score, gain_sds, gains as gains_of
 from r2s2r_cli.stages.diagnose.which.screen import Response
 
@@ -27,47 +27,29 @@ SHIFTED = 1.0
 """Posterior sd by which an effect moves a nuisance before it is worth saying."""
 
 
-@dataclass(frozen=True)
-class Material:
-    """All that was computed. scores: of fits, without their groups; responses: of the screening, best first."""
-
-    arena: Arena
-    base: Fit
-    refit: Score
-    fits: tuple[Fit, ...]
-    scores: tuple[Score, ...]
-    responses: tuple[Response, ...]
-    chance: float
-    no_gap: NoGap
-    wider: float
-    unexplained: float
-    groups: np.ndarray
-    calibration: Calibration
-    chronic: np.ndarray
-    """What of the gain of each fit was there before (`before.chronic`) [nats]."""
-    logged: Mapping[str, float] = field(default_factory=dict)
-    """Gains [nats] of effects that change no prediction, from the logs alone."""
-
-
 def concluded(m: Material) -> Which:
     """The verdict."""
     gains = dict(enumerate((gains_of(m.refit, m.scores) - m.chronic).tolist()))
+    calibration = m.calibration
     order = sorted(gains, key=lambda i: -gains[i])
     singles = [i for i in order if len(m.fits[i].hypothesis.parts) == 1]
+    worth = {i: gains[i] + calibration.parity * m.said(i) for i in singles}
     best: dict[str, int] = {}
-    for i in singles:
+    for i in sorted(singles, key=lambda i: -worth[i]):
         best.setdefault(m.fits[i].hypothesis.effects[0], i)
     names = {name: gains[i] for name, i in best.items()}
-    calibration = m.calibration
+    others = _not_fitted(m, names)
     none = m.chance + (calibration.equivalent if m.no_gap.equivalent else 0.0)
-    table = {**names, **m.logged, NONE: none, UNKNOWN: m.unexplained - calibration.unknown}
+    table = {**{name: worth[i] for name, i in best.items()}, NONE: none, UNKNOWN: m.unexplained - calibration.unknown}
+    table |= {one.effect: one.gain + calibration.parity * one.parity for one in others}
     probability = calibration.probabilities(table)
     sds = gain_sds(m.refit, m.scores, m.groups).tolist() if m.scores else []
     pair = _pair(m, order, gains, best)
     ranking = [
-        replace(_ranked(m, i, gains[i], probability[name], singles, gains), gain_sd=sds[i]) for name, i in best.items()
+        replace(_ranked(m, i, gains[i], probability[name], singles, gains), gain_sd=sds[i], parity=m.said(i))
+        for name, i in best.items()
     ]
-    ranking += [Ranked(name, gain, probability[name], channel=_channel(name)) for name, gain in m.logged.items()]
+    ranking += [replace(one, probability=probability[one.effect]) for one in others]
     ranking += [
         Ranked(NONE, 0.0, probability[NONE], rmse=m.no_gap.rmse, misfit=_misfit(m.refit)),
         Ranked(UNKNOWN, m.unexplained, probability[UNKNOWN]),
@@ -85,6 +67,21 @@ def concluded(m: Material) -> Which:
         not_testable=_not_testable(m.responses), shifts=() if top is None else _shifts(m, m.fits[top]),
         within=_left_out(m), calibrated=calibration.words, warnings=_warnings(m, [best[name] for name in names]),
     )  # fmt: skip
+
+
+def _not_fitted(m: Material, fitted: Mapping[str, float]) -> list[Ranked]:
+    """Effects that the screening left out, and those that change no prediction. They gain nothing, or lose what the
+    screening says; the parity stage may speak for them all the same."""
+    screened: dict[str, float] = {name: 0.0 for name in NO_REPLAY if m.asked is None or name in m.asked}
+    for one in m.responses:
+        if one.testable:
+            name = one.candidate.effect
+            screened[name] = max(screened.get(name, -np.inf), one.gain)
+    return [
+        Ranked(name, min(gain, 0.0), 0.0, channel=_channel(name), fitted=False, parity=m.says(name))
+        for name, gain in screened.items()
+        if name not in fitted
+    ]
 
 
 def _channel(name: str) -> str:

@@ -7,22 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from r2s2r_cli.stages.diagnose.parity.finding import MOST_NATS
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.before import Healthy, chronic
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
-from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY, candidates
+from r2s2r_cli.stages.diagnose.which.candidates import candidates
 from r2s2r_cli.stages.diagnose.which.fit import DAMPING, Fit, Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.found import Which
+from r2s2r_cli.stages.diagnose.which.material import Material
 from r2s2r_cli.stages.diagnose.which.rivals import WIDER, chance, no_gap
 from r2s2r_cli.stages.diagnose.which.score import ENOUGH, Score, gains, groups_of, scores
 from r2s2r_cli.stages.diagnose.which.screen import Response, screen
-from r2s2r_cli.stages.diagnose.which.verdict import Material, concluded
+from r2s2r_cli.stages.diagnose.which.verdict import concluded
 
-FITTED = 6
+FITTED = 8
 """Effects that are fitted, of those that the screening ranks highest."""
 ELEMENTS = 2
 """Elements of each that are fitted."""
+SUSPECTED, LEAST_SAID = 3, 2.0
+"""Effects that are fitted because the parity stage speaks for them, with so many nats at least."""
 PLACES = 8
 """Of a patch on the floor, to begin with."""
 LOOKED_AT = 4
@@ -35,6 +37,8 @@ SECOND = 3
 """Iterations after the floor was widened."""
 
 Told = Callable[[str, int, int], None]
+Said = Mapping[str, Mapping[int | None, float]]
+"""Nats of the parity stage, by effect and element (`Parity.nats`)."""
 
 
 @dataclass(frozen=True)
@@ -60,14 +64,15 @@ class Compared:
 
 def compare_effects(
     arena: Arena, base: Fit, *, floor_m: float, calibration: Calibration, sizes: Mapping[str, Mapping[str, float]],
-    suspected: Mapping[str, float] | None = None, effects: Sequence[str] | None = None, seed: int = 0, told: Told,
+    told_by: Said | None = None, effects: Sequence[str] | None = None, seed: int = 0, told: Told,
     ways: Ways | None = None, healthy: Healthy | None = None,
 ) -> Compared:  # fmt: skip
     """All effects against the refit nominal model `base` of this arena. floor_m: key-frame RMSE with nothing wrong.
     healthy: the runs of before; an effect that helps there as well makes up for the simulator.
 
-    sizes, suspected: of the parity stage: sizes to begin with, and how surely (in sd) it suspects an effect: the first
-    are fitted whatever the screening says. effects: only these. Raises NumericalError where nothing can be simulated.
+    sizes, told_by: of the parity stage: sizes to begin with, and the nats that it says for an effect at an element: the
+    first SUSPECTED are fitted whatever the screening says. effects: only these. Raises NumericalError where nothing
+    can be simulated.
     """
     ways = ways or Ways()
     known = [one for one in candidates(arena.model, sizes, touched(arena)) if effects is None or one.effect in effects]
@@ -75,8 +80,7 @@ def compare_effects(
     responses = screen(arena, base, known)
     told("screening", 1, 1)
     groups = groups_of(arena)
-    suspected = {name: sd for name, sd in (suspected or {}).items() if effects is None or name in effects}
-    picked = _picked(responses, tuple(suspected))
+    picked = _picked(responses, told_by or {})
     base, fits = _fitted(arena, base, picked, told)
     wider, unexplained = _widened(arena, [base, *fits[:LOOKED_AT]]) if ways.unknown else (1.0, 0.0)
     if wider > 1.0:
@@ -95,7 +99,7 @@ def compare_effects(
         chance=chance(arena, responses, groups, seed=seed), no_gap=no_gap(refit, floor_m), wider=wider,
         unexplained=unexplained if ways.unknown else -np.inf, groups=groups, calibration=calibration,
         chronic=old,
-        logged={name: min(0.5 * suspected[name] ** 2, MOST_NATS) for name in NO_REPLAY if name in suspected},
+        asked=None if effects is None else tuple(effects), parity=told_by or {},
     )  # fmt: skip
     which = concluded(material)
     order = np.argsort(old - gains(refit, own), kind="stable")
@@ -116,14 +120,19 @@ def touched(arena: Arena) -> np.ndarray:
     return np.array(kept)
 
 
-def _picked(responses: Sequence[Response], suspected: Sequence[str]) -> list[Response]:
-    """The best elements of the best effects, and of those that were suspected."""
+def _picked(responses: Sequence[Response], told_by: Said) -> list[Response]:
+    """The best elements of the best effects, and of those that the parity stage speaks for, its own element first."""
     testable = [one for one in responses if one.testable]
     best = list(dict.fromkeys(one.candidate.effect for one in testable))
-    names = [*best[:FITTED], *(name for name in suspected[:2] if name in best[FITTED:])]
+    said = {name: max(told_by.get(name, {None: 0.0}).values()) for name in best}
+    suspected = sorted((name for name in best if said[name] >= LEAST_SAID), key=lambda name: -said[name])
     found: list[Response] = []
-    for name in names:
-        found += [one for one in testable if one.candidate.effect == name][:ELEMENTS]
+    for name in dict.fromkeys([*best[:FITTED], *suspected[:SUSPECTED]]):
+        rows = [one for one in testable if one.candidate.effect == name]
+        if name in suspected:
+            first = max(rows, key=lambda one: told_by[name].get(one.candidate.number, 0.0))
+            rows = [first, *(one for one in rows if one is not first)]
+        found += rows[:ELEMENTS]
     return found
 
 
@@ -135,7 +144,7 @@ def _fitted(arena: Arena, base: Fit, picked: Sequence[Response], told: Told) -> 
     for response in picked:
         one = response.candidate
         for share in (1.0, 0.3, -1.0):
-            x = np.clip(one.off + share * (response.size - one.off), one.lower, one.upper)
+            x = np.clip(one.share(response.size, share), one.lower, one.upper)
             if share == 1.0 or np.any(np.abs(x - one.off) > 1e-6):
                 points.append((Hypothesis((one,)), response.start_z if share == 1.0 else base.z, x))
     begun = _begun(arena, fits, points)

@@ -13,7 +13,7 @@ from r2s2r_cli.blind import follow, labels
 from r2s2r_cli.blind.guard import Peeked
 from r2s2r_cli.blind.index import digest
 from r2s2r_cli.blind.make.again import world_of
-from r2s2r_cli.blind.make.bank import Asked, make
+from r2s2r_cli.blind.make.bank import Asked, make, sealed, write_set
 from r2s2r_cli.blind.make.follow import drive_later
 from r2s2r_cli.blind.make.one import label, make_set
 from r2s2r_cli.blind.make.worlds import Hidden, hidden
@@ -60,6 +60,25 @@ def test_a_world_comes_back_from_its_label(asked: dict[str, Any]) -> None:
     assert np.array_equal(again.day, world.day) and replace(again, day=world.day) == world
     with pytest.raises(InputError, match="cannot be made again"):
         world_of({**said, "friction": said["friction"] + 1e-9}, where="a label")
+
+
+def test_a_set_is_there_as_a_whole_or_not_at_all(tmp_path: Path) -> None:
+    """A maker that breaks off leaves neither set nor label, and what it left half written is gone the next time."""
+    key = labels.new_key(tmp_path / "a.key")
+
+    def makes(folder: Path, broken: bool = False) -> dict[str, Any]:
+        folder.mkdir(parents=True)
+        (folder / ("half" if broken else "whole")).write_text("")
+        if broken:
+            raise KeyboardInterrupt
+        return {"kind": "none"}
+
+    with pytest.raises(KeyboardInterrupt):
+        write_set(tmp_path, "a", key, lambda folder: makes(folder, broken=True))
+    assert not (tmp_path / "sets" / "a").exists() and not sealed(tmp_path, "a").exists()
+    write_set(tmp_path, "a", key, makes)
+    assert sealed(tmp_path, "a").exists()
+    assert [one.relative_to(tmp_path / "sets").as_posix() for one in (tmp_path / "sets").rglob("*")] == ["a", "a/whole"]
 
 
 def log(folder: Path, world: Hidden, which: str, seed: int = 0) -> bytes:

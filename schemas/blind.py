@@ -43,6 +43,8 @@ class PublishedRank(Frozen):
     effect: str
     elpd_gain: float
     elpd_gain_sd: float | None = None
+    parity_nats: float = 0.0
+    fitted: bool = True
     probability: float
     size: dict[str, float] = Field(default_factory=dict)
     channel: str | None = None

@@ -16,6 +16,7 @@ from r2s2r_cli.blind.score.lines import WIDTH, text_of
 from r2s2r_cli.blind.score.published import published, read_published, write_form
 from r2s2r_cli.blind.score.shard import opened
 from r2s2r_cli.errors import InputError
+from schemas import blind as models, results_diagnose as said
 from schemas.results_blind import BlindScoreResult
 from tests.guards.listing import ROOT
 from tests.support import blind_bank
@@ -162,3 +163,23 @@ def test_short_text_says_the_same(value: object) -> None:
     assert json.loads(text) == value and text.endswith("\n") and text_of(json.loads(text)) == text
     if isinstance(value, dict):
         assert list(json.loads(text)) == sorted(value)
+
+
+LEFT_OUT = {
+    ("PublishedRank", "RankedName"): {"ci90", "units", "on_bound"},
+    ("PublishedWhere", "WhereFound"): {"segments", "onset"},
+    ("PublishedShrinkage", "ShrinkageFound"): {"metric", "judged_on", "within_run"},
+    ("PublishedNext", "NextGaitFound"): {"file", "targets"},
+    ("PublishedDiagnosis", "DiagnoseReport"): {
+        "robot", "floor_from", "floor_given", "left_out", "segments", "hidden", "missing", "refit", "refit_units",
+        "rollouts", "within_run", "wall_s", "seconds", "warnings",
+    },
+}  # fmt: skip
+"""Of what a diagnosis says, by the model of the published file: nothing that is scored, calibrated or asked about."""
+
+
+@pytest.mark.parametrize("pair", LEFT_OUT, ids="-".join)
+def test_what_is_left_out_was_decided(pair: tuple[str, str]) -> None:
+    """A new field of a diagnosis is published, or named here: a calibration that reads it must find it in the file."""
+    mine, theirs = (getattr(module, name).model_fields for module, name in zip((models, said), pair, strict=True))
+    assert set(mine) | LEFT_OUT[pair] == set(theirs) and not set(mine) & LEFT_OUT[pair]

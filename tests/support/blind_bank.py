@@ -87,7 +87,8 @@ def document(verdict: str, effects: list[str], probability: dict[str, float]) ->
     order = sorted(probability, key=lambda name: -probability[name])
     return {
         "verdict": verdict, "effects": effects, "probability": probability[order[0]], "set90": order[:2],
-        "ranking": [{"effect": name, "elpd_gain": 0.0, "probability": probability[name]} for name in order],
+        "ranking": [{"effect": name, "elpd_gain": 0.0, "probability": probability[name], "parity_nats": 2.0 * rank}
+                    for rank, name in enumerate(order)],
         "where": {"channel": "contact", "element": {"kind": "place", "index": None, "xy_m": [0.1, 0.3]}},
         "shrinkage": {"own_share": 0.7, "predicted": 0.65}, "chance_nats": 2.0, "floor_m": 0.01, "refit_upper_m": 0.02,
         "calibrated": "by hand",

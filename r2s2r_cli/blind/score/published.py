@@ -23,6 +23,8 @@ FORMAT = "r2s2r blind published 1"
 FINDINGS = 3
 """Of the parity stage, strongest first."""
 _ELEMENT = ("kind", "index", "xy_m")
+_USUAL = (("moved", True), ("fitted", True), ("parity_nats", 0.0), ("size", {}))
+"""Of a ranked name, left out."""
 
 
 def published(shard: Shard, otherwise: Mapping[str, Any] | None = None) -> bytes:
@@ -123,7 +125,7 @@ def _diagnosis(document: Mapping[str, Any]) -> dict[str, Any]:
 
 def _rank(row: Mapping[str, Any]) -> dict[str, Any]:
     found = _part(row, PublishedRank) | _element(row)
-    return {name: value for name, value in found.items() if (name, value) not in (("moved", True), ("size", {}))}
+    return {name: value for name, value in found.items() if (name, value) not in _USUAL}
 
 
 def _element(holder: Mapping[str, Any]) -> dict[str, Any]:

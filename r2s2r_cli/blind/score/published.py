@@ -119,13 +119,22 @@ def _diagnosis(document: Mapping[str, Any]) -> dict[str, Any]:
         found["shrinkage"] = _part(shrinkage, PublishedShrinkage)
     if (one := document.get("next_gait")) is not None:
         found["next_gait"] = {name: one[name] for name in ("name", "nats", "now") if one.get(name) is not None}
+    found["confusable"] = [[a, b, _short(nats)] for a, b, nats in document.get("confusable") or ()]
     found["parity"] = list(document.get("parity") or ())[:FINDINGS]
     return found
 
 
 def _rank(row: Mapping[str, Any]) -> dict[str, Any]:
     found = _part(row, PublishedRank) | _element(row)
+    found["size"] = {name: _short(value) for name, value in row.get("size", {}).items()}
+    if "elpd_gain_sd" in found:
+        found["elpd_gain_sd"] = _short(found["elpd_gain_sd"])
     return {name: value for name, value in found.items() if (name, value) not in _USUAL}
+
+
+def _short(value: float) -> float:
+    """Of what is read and not scored, six digits."""
+    return float(f"{value:.6g}")
 
 
 def _element(holder: Mapping[str, Any]) -> dict[str, Any]:

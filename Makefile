@@ -21,6 +21,8 @@ else
 PYTHON ?= python3
 VENV   := .venv
 PY     := $(VENV)/bin/python
+# Compiled Python is kept, whatever the shell says: the suite starts some hundred processes, and rewrites every test file.
+unexport PYTHONDONTWRITEBYTECODE
 # Two workers on the two cores; `make test PYTEST_FLAGS=` runs in one process, `PYTEST_FLAGS="-k store"` a part.
 PYTEST_FLAGS ?= -n auto --dist loadfile
 DEMO   ?= demo

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -20,3 +24,23 @@ def real_dir() -> Path:
     if not REAL.is_dir():
         pytest.skip("the real measurements (../shared/real) are not on this machine")
     return REAL
+
+
+@pytest.fixture(scope="session", autouse=True)
+def kernels(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """A simulator that keeps its machine code nowhere finds and leaves it in a folder of this session, for all workers:
+    the same kernel is compiled once, not in every file."""
+    rollout = sys.modules.get("r2s2r_cli.engine.rollout")  # where no test needs the engine, torch is not loaded
+    if rollout is None:
+        yield
+        return
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "kernels"
+    init = rollout.Simulator.__init__
+
+    def shared(self: Any, structure: Any, *, cache_dir: Path | None = None, **how: Any) -> None:
+        init(self, structure, cache_dir=cache_dir or folder, **how)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rollout.Simulator, "__init__", shared)
+        yield

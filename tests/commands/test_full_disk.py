@@ -56,7 +56,8 @@ def test_a_command_that_finds_no_space_harms_nothing(disk: SmallDisk, command: s
     disk.empty()
     shutil.rmtree(disk.path / "another", ignore_errors=True)
     shutil.rmtree(disk.path / "out", ignore_errors=True)
-    again = invoke(*WRITERS[command])
+    drawn = free > 0 or command.startswith(("init", "export"))  # pictures take longest, and once shows that they come
+    again = invoke(*WRITERS[command], *(() if drawn else ("--no-draw",)))
     assert again.exit_code == 0, again.stderr
 
 

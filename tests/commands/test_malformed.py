@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,16 @@ from tests.support.malformed import Malformed, csv_cases, json_cases, mutated, s
 REFUSED = (3, 4)
 
 
+@cache
+def robot_text() -> str:
+    """robot.toml of that robot."""
+    return tomlkit.dumps(sample_robot().model_dump(mode="json", exclude_none=True))
+
+
 @pytest.fixture
 def here(project: Path) -> Path:
     """A project of the robot that the malformed logs were made from, with a good log."""
-    values = sample_robot().model_dump(mode="json", exclude_none=True)
-    (project / "robot.toml").write_text(tomlkit.dumps(values))
+    (project / "robot.toml").write_text(robot_text())
     (project / "log.csv").write_text(small_csv())
     (project / "log.toml").write_text(SIDECAR)
     return project

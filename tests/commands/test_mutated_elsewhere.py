@@ -74,8 +74,8 @@ def check_commands(folder: Path, count: int, seed: int, *commands: tuple[str, ..
 
 
 def test_reading_mutants(tmp_path: Path) -> None:
-    """Forty mutants of all kinds."""
-    check_reading(tmp_path, 40, seed=11)
+    """Twenty mutants of all kinds."""
+    check_reading(tmp_path, 20, seed=11)
 
 
 @pytest.mark.slow
@@ -86,8 +86,8 @@ def test_reading_a_thousand_mutants(tmp_path: Path, seed: int) -> None:
 
 
 def test_inspecting_and_exporting_mutants(tmp_path: Path) -> None:
-    """Eight mutants of all kinds."""
-    check_commands(tmp_path, 8, 12, ("inspect",), ("export", "--to", "npz"))
+    """Four mutants of all kinds."""
+    check_commands(tmp_path, 4, 12, ("inspect",), ("export", "--to", "npz"))
 
 
 @pytest.mark.slow

@@ -241,19 +241,35 @@ def test_pages_are_self_contained(estimated: Path) -> None:
 
 def test_the_real_crawl(project: Path, real_dir: Path) -> None:
     """The published figures of the real crawl: 11 intervals, a third duplicates, 1-4 mm noise, 4 mm ground offset."""
-    report = document("import", str(real_dir / "tribar_crawl" / "crawl.csv"))["report"]["runs"][0]
+    crawl = real_dir / "tribar_crawl" / "crawl.csv"
+    report = document("import", str(crawl), "--no-draw")["report"]["runs"][0]
     assert report["intervals"] == 11
     assert 0.30 < report["dropped"]["duplicate"] / report["rows"] < 0.40
     assert 0.5e-3 < report["noise"]["low_m"] < report["noise"]["high_m"] < 4.5e-3
     assert 3e-3 < report["ground_offset_m"] < 5e-3
-    assert document("estimate")["state"] == "done"
+    assert document("estimate", "--no-draw")["state"] == "done"
 
 
 def test_the_real_calibrations(project: Path, real_dir: Path) -> None:
     """The straight-line residuals of the three real sets are 1.2, 1.6 and 1.9 mm; failed fits are flagged."""
     folder = real_dir / "tribar_calibration"
     points, history = folder / "length_capacitance_points.csv", folder / "calibration_history_2025.json"
-    report = document("calibrate", "--points", str(points), "--history", str(history))["report"]
+    report = document("calibrate", "--points", str(points), "--history", str(history), "--no-draw")["report"]
     assert sorted(round(1e3 * fitted["rms_m"], 1) for fitted in report["sets"]) == [1.2, 1.6, 1.9]
     dead = [f for f in report["history"]["failed"] if "zero" in f["state"]]
     assert {(f["date"][:10], f["sensor"]) for f in dead} >= {("2025-01-14", 6), ("2025-01-14", 7), ("2025-01-14", 8)}
+
+
+@pytest.mark.slow
+def test_the_real_measurements_are_drawn(project: Path, real_dir: Path) -> None:
+    """The pictures and pages of the real crawl and of the real calibrations: all that the commands name is there."""
+    folder = real_dir / "tribar_calibration"
+    points, history = folder / "length_capacitance_points.csv", folder / "calibration_history_2025.json"
+    for words in (
+        ("import", str(real_dir / "tribar_crawl" / "crawl.csv")),
+        ("estimate",),
+        ("calibrate", "--points", str(points), "--history", str(history)),
+    ):
+        drawings = document(*words)["drawings"]
+        assert {Path(name).suffix for name in drawings} == {".png", ".html"}
+        assert all((project / name).stat().st_size > 10_000 for name in drawings)

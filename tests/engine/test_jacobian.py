@@ -37,11 +37,11 @@ def robot(detach: Detach = Detach.NONE) -> tuple[Structure, Parameters, State]:
 
 
 @lru_cache
-def growth(detach: Detach = Detach.NONE) -> tuple[Tensor, Tensor]:
-    """Largest |d position / d log parameter| [m], (GAITS, SECONDS), and largest |d position / d start position| [1] of
+def growth(detach: Detach = Detach.NONE, seconds: int = SECONDS) -> tuple[Tensor, Tensor]:
+    """Largest |d position / d log parameter| [m], (GAITS, seconds), and largest |d position / d start position| [1] of
     rod 0 moved along x, y and z, same shape."""
     structure, theta, start = robot(detach)
-    u = random_gait(2 * SECONDS, 6, batch=GAITS, seed=7)
+    u = random_gait(2 * SECONDS, 6, batch=GAITS, seed=7)[:, : 2 * seconds]
     shift = torch.zeros(sum(slot.size for slot in state_slots(structure).values()), 3, dtype=torch.float64)
     shift[:3] = torch.eye(3, dtype=torch.float64)
     sim = simulator(structure)
@@ -52,16 +52,17 @@ def growth(detach: Detach = Detach.NONE) -> tuple[Tensor, Tensor]:
     return tuple(x[:, 1:, places].abs().amax((2, 3)) for x in (by_parameter, by_start))
 
 
-def test_derivatives_over_ten_seconds_stay_bounded() -> None:
+@pytest.mark.parametrize("seconds", [4, pytest.param(SECONDS, marks=pytest.mark.slow)])
+def test_derivatives_over_many_seconds_stay_bounded(seconds: int) -> None:
     """8 random gaits: position per logarithm of a parameter is below 0.5 m in the median, 2000 m at worst, position per
-    start position below 5 and 1000 (tips), and the median does not grow tenfold from 5 s to 10 s."""
-    by_parameter, by_start = growth()
+    start position below 5 and 1000 (tips), and the median does not grow tenfold in the second half."""
+    by_parameter, by_start = growth(seconds=seconds)
     assert bool(torch.isfinite(by_parameter).all() and torch.isfinite(by_start).all())
     assert float(by_parameter[:, -1].median()) < 0.5
     assert float(by_parameter.max()) < 2000.0
     assert float(by_start[:, -1].median()) < 5.0
     assert float(by_start.max()) < 1000.0
-    assert float(by_parameter[:, -1].median() / by_parameter[:, 4].median()) < 10.0
+    assert float(by_parameter[:, -1].median() / by_parameter[:, seconds // 2 - 1].median()) < 10.0
 
 
 @pytest.mark.slow

@@ -101,7 +101,10 @@ def _options(text: str) -> set[str] | None:
 
 def _mentions(path: Path) -> Iterator[tuple[int, str]]:
     """Line and text from `r2s2r` on, to the end of the line or code, of every string; what is filled in is left out."""
-    tree = ast.parse(path.read_text())
+    source = path.read_text()
+    if "r2s2r " not in source:
+        return
+    tree = ast.parse(source)
     parts = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr | ast.Constant) and id(node) not in parts:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from r2s2r_cli.stages.estimate.smooth import (
     MISSING,
     OBSERVED,
     OUTLIER,
+    Tracks,
     _breaks,
     chi2_quantile,
     smooth,
@@ -23,7 +25,7 @@ from r2s2r_cli.stages.estimate.smooth import (
 from r2s2r_cli.stages.frames import noise_sd
 from tests.stages.estimate.builders import real_crawl
 from tests.stages.estimate.dense import compare
-from tests.stages.estimate.planted import CALIBRATION_SEEDS, JUDGING_SEEDS, planted
+from tests.stages.estimate.planted import CALIBRATION_SEEDS, JUDGING_SEEDS, Planted, planted
 
 LIMIT = chi2_quantile(0.95)
 
@@ -31,6 +33,13 @@ LIMIT = chi2_quantile(0.95)
 def inside(error: np.ndarray, cov: np.ndarray) -> float:
     """Share of errors (frame, cap, 3) inside their 95 % ellipsoid."""
     return float(np.mean(np.einsum("tci,tcij,tcj->tc", error, np.linalg.inv(cov), error) < LIMIT))
+
+
+@cache
+def clean_run(seed: int) -> tuple[Planted, Tracks]:
+    """A planted run without any fault, and its tracks: what a fault is compared with. Nobody changes either."""
+    sample = planted(seed)
+    return sample, smooth(sample.t, sample.observed, sample.noise_sd)
 
 
 def switches(first: np.ndarray) -> np.ndarray:
@@ -110,8 +119,7 @@ def test_time_can_run_backwards() -> None:
 
 def test_an_isolated_outlier_is_marked_and_not_used() -> None:
     """One frame 5 cm off is flagged, at that cap and frame only, and hardly moves the track."""
-    sample = planted(JUDGING_SEEDS[3])
-    clean = smooth(sample.t, sample.observed, sample.noise_sd)
+    sample, clean = clean_run(JUDGING_SEEDS[3])
     broken = sample.observed.copy()
     broken[60, 3] += [0.05, 0.0, 0.0]
     tracks = smooth(sample.t, broken, sample.noise_sd)
@@ -123,8 +131,7 @@ def test_an_isolated_outlier_is_marked_and_not_used() -> None:
 
 def test_a_jump_is_marked_and_not_smoothed_over() -> None:
     """A track that jumps by 6 cm and stays there: marked at the first frame after, positions follow on both sides."""
-    sample = planted(JUDGING_SEEDS[4])
-    clean = smooth(sample.t, sample.observed, sample.noise_sd)
+    sample, clean = clean_run(JUDGING_SEEDS[4])
     broken = sample.observed.copy()
     broken[70:, 1] += [0.0, 0.06, 0.0]
     tracks = smooth(sample.t, broken, sample.noise_sd)
@@ -222,8 +229,7 @@ def test_wild_data_are_refused() -> None:
 @pytest.mark.parametrize("frame", [0, 60, -1])
 def test_an_outlier_of_any_size_is_marked(size: float, frame: int) -> None:
     """One cap in one frame, half a metre or a hundred off: marked there and nowhere else, process noise as without."""
-    sample = planted(JUDGING_SEEDS[3])
-    clean = smooth(sample.t, sample.observed, sample.noise_sd)
+    sample, clean = clean_run(JUDGING_SEEDS[3])
     broken = sample.observed.copy()
     broken[frame, 3] += [size, 0.0, 0.0]
     tracks = smooth(sample.t, broken, sample.noise_sd)
@@ -235,8 +241,7 @@ def test_an_outlier_of_any_size_is_marked(size: float, frame: int) -> None:
 @pytest.mark.parametrize("size", [0.5, 3.0, 100.0])
 def test_a_jump_of_the_whole_robot_is_marked(size: float) -> None:
     """A tracker that finds all caps elsewhere from one frame on: six jumps, states that follow on both sides."""
-    sample = planted(JUDGING_SEEDS[3])
-    clean = smooth(sample.t, sample.observed, sample.noise_sd)
+    sample, clean = clean_run(JUDGING_SEEDS[3])
     broken = sample.observed.copy()
     broken[70:] += [size, 0.0, 0.0]
     tracks = smooth(sample.t, broken, sample.noise_sd)
@@ -264,8 +269,7 @@ def test_the_size_of_a_jump_is_free() -> None:
 @pytest.mark.parametrize("frame", [0, -1])
 def test_a_fault_at_an_end_is_an_outlier(seed: int, frame: int) -> None:
     """First or last frame off: outlier or jump cannot be told apart, and the one that claims less is marked."""
-    sample = planted(seed)
-    clean = smooth(sample.t, sample.observed, sample.noise_sd)
+    sample, clean = clean_run(seed)
     broken = sample.observed.copy()
     broken[frame, 2] += [0.0, 0.05, 0.0]
     tracks = smooth(sample.t, broken, sample.noise_sd)

@@ -13,27 +13,31 @@ from tests.stages.estimate.builders import recording, threebar
 from tests.stages.estimate.planted import planted
 
 
-def test_every_run_is_drawn_and_the_drawing_is_repeatable() -> None:
+@pytest.fixture(scope="module")
+def estimated() -> ArtifactData:
+    """A planted run; nobody changes it."""
+    return estimate(recording(planted(100)), threebar(), EstimateSettings())[0]
+
+
+def test_every_run_is_drawn_and_the_drawing_is_repeatable(estimated: ArtifactData) -> None:
     """One PNG a run, the same bytes for the same values."""
-    data, _ = estimate(recording(planted(100)), threebar(), EstimateSettings())
+    data = estimated
     first, second = (list(draw_estimate(data, threebar())) for _ in range(2))
     assert [run for run, _ in first] == ["planted"]
     assert first[0][1].startswith(b"\x89PNG")
     assert first == second
 
 
-def test_a_run_without_commands_is_drawn() -> None:
+def test_a_run_without_commands_is_drawn(estimated: ArtifactData) -> None:
     """Intervals, segments and commands are optional in an estimate, so also in its picture."""
-    data, _ = estimate(recording(planted(101)), threebar(), EstimateSettings())
-    keep = ("intervals", "segments", "commands")
-    bare = ArtifactData("estimate", {k: g for k, g in data.groups.items() if not k.endswith(keep)})
+    left_out = ("intervals", "segments", "commands")
+    bare = ArtifactData("estimate", {k: g for k, g in estimated.groups.items() if not k.endswith(left_out)})
     assert len(dict(draw_estimate(bare, threebar()))["planted"]) > 10_000
 
 
-def test_centre_of_mass_of_symmetric_rods_is_their_middle() -> None:
+def test_centre_of_mass_of_symmetric_rods_is_their_middle(estimated: ArtifactData) -> None:
     """Rods whose parts lie symmetrically have their centre of mass in the middle; a heavy odd end pulls it there."""
-    data, _ = estimate(recording(planted(102)), threebar(), EstimateSettings())
-    frames, robot = data.groups["runs/planted/frames"], threebar()
+    frames, robot = estimated.groups["runs/planted/frames"], threebar()
     assert centre_of_mass(frames, robot) == pytest.approx(np.mean(frames["p_WR"], axis=1), abs=1e-4)
     rods = list(robot.rods)
     parts = rods[0].parts

@@ -40,12 +40,16 @@ def test_a_subject_at_the_edge_passes(edge: Edge) -> None:
     assert entry.run(subject, "a.h5") == []
 
 
-@pytest.mark.parametrize("entry", CHECKS, ids=lambda entry: entry.name)
 @pytest.mark.parametrize("sound", SOUND.values(), ids=SOUND.keys())
-def test_a_sound_subject_passes(entry: Check, sound: Callable[[], object]) -> None:
+def test_a_sound_subject_passes(sound: Callable[[], object]) -> None:
     """A subject that has every stream, and nothing wrong with it, passes every check."""
-    subject = sound()
-    assert not entry.looks_at(subject) or entry.run(subject, "a.h5") == []
+    looking = 0
+    for entry in CHECKS:
+        subject = sound()
+        if entry.looks_at(subject):
+            looking += 1
+            assert entry.run(subject, "a.h5") == [], entry.name
+    assert looking
 
 
 @pytest.mark.parametrize("entry", CHECKS, ids=lambda entry: entry.name)

@@ -236,7 +236,7 @@ def sidecar_cases() -> list[Malformed]:
         Malformed("missing_equals", _toml(tolerance="tolerance 0.1")),
         Malformed("control_character", raw.replace(b"sample", b"sam\x01ple")),
         Malformed("deep_array", b"x = " + b"[" * 5000 + b"]" * 5000 + b"\n" + raw),
-        Malformed("deep_keys", b"a" + b".a" * 5000 + b" = 1\n" + raw),
+        Malformed("deep_keys", b"a" + b".a" * 2000 + b" = 1\n" + raw),
         Malformed("huge_integer", _toml(tolerance="tolerance = " + "9" * 6000)),
         Malformed("huge_exponent", _toml(tolerance="tolerance = 1e999")),
         Malformed("no_robot", _toml(robot="")),

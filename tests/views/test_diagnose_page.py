@@ -85,10 +85,11 @@ def test_rivals_and_numbers_say_what_they_are() -> None:
 )
 def test_what_to_run_next_is_said_beside_what_was_run(nats: float, now: float | None, words: str) -> None:
     """With the command; a gait that is worth less than the runs so far is not praised."""
-    one = NextGaitFound(name="ramps", file="iterations/001/70-diagnose-next.toml", targets=((1.0,),), nats=nats, now=now)
+    file = "iterations/001/70-diagnose-next.toml"
+    one = NextGaitFound(name="ramps", file=file, targets=((1.0,),), nats=nats, now=now)
     made = report().model_copy(update={"next_gait": one})
     rows = [row for table in diagnose_tables(made) for row in table.rows if row[0] == "run next"]
-    assert rows == [["run next", f"{words}: r2s2r record iterations/001/70-diagnose-next.toml"]]
+    assert rows == [["run next", f"{words}: r2s2r record {file}"]]
 
 
 @pytest.mark.parametrize(

@@ -119,14 +119,12 @@ def test_swapping_the_bodies_of_two_artifacts_is_noticed(golden: Copy) -> None:
     assert refused(one).what
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_flipped_bits_of_the_body_are_noticed_or_unread(golden: Copy, reader: IsolatedReader, kind: str) -> None:
-    """Forty bits spread over the body: each is refused, or warned about with every value unchanged."""
-    path = golden(kind)
+def check_flips(path: Path, reader: IsolatedReader, count: int, seed: int) -> None:
+    """Each of `count` bits spread over the body: refused, or warned about with every value unchanged."""
     original, (_, before) = path.read_bytes(), read_artifact(path, blobs=True)
     start = read_header(path).body_offset
     refusals = 0
-    for offset in np.random.default_rng(0).integers(start, len(original), 40).tolist():
+    for offset in np.random.default_rng(seed).integers(start, len(original), count).tolist():
         damaged = bytearray(original)
         damaged[offset] ^= 1 << offset % 8
         path.write_bytes(damaged)
@@ -140,3 +138,16 @@ def test_flipped_bits_of_the_body_are_noticed_or_unread(golden: Copy, reader: Is
                 continue
         assert same(before, load(path, header, blobs=True))
     assert refusals
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_flipped_bits_of_the_body_are_noticed_or_unread(golden: Copy, reader: IsolatedReader, kind: str) -> None:
+    """Sixteen bits of every kind."""
+    check_flips(golden(kind), reader, 16, seed=0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_many_flipped_bits_of_the_body_are_noticed_or_unread(golden: Copy, reader: IsolatedReader, kind: str) -> None:
+    """The same of forty others."""
+    check_flips(golden(kind), reader, 40, seed=1)

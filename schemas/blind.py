@@ -43,6 +43,7 @@ class PublishedRank(Frozen):
     effect: str
     elpd_gain: float
     elpd_gain_sd: float | None = None
+    linear_gain: float = 0.0
     parity_nats: float = 0.0
     fitted: bool = True
     probability: float

@@ -6,11 +6,24 @@ import pytest
 from r2s2r_cli.blind.score.calibrate import Case, calibrated, case
 from r2s2r_cli.blind.score.facts import truth_of
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from tests.support import blind_bank
 
 EFFECTS = ("backlash", "payload", "motor_lag", "soft_ground")
-TEMPERATURE, PARITY, EQUIVALENT, UNKNOWN = 5.0, 3.5, 8.0, 20.0
-BIAS = {"soft_ground": -9.0}
+TRUE = Calibration(
+    temperature=20.0, linear=1.5, parity=14.0, none=9.0, equivalent=16.0, unknown=20.0, unknown_share=0.7,
+    bias={"soft_ground": -27.0},
+)  # fmt: skip
+
+
+def scores(
+    by: Calibration, names: tuple[str, ...], score: np.ndarray, linear: np.ndarray, parity: np.ndarray, equivalent: bool
+) -> dict[str, float]:
+    """What a diagnosis makes of the evidence of a set."""
+    return {
+        name: by.score(name, float(a), linear=float(b), parity=float(c), equivalent=equivalent)
+        for name, a, b, c in zip(names, score, linear, parity, strict=True)
+    }
 
 
 def planted(count: int, seed: int = 0) -> list[Case]:
@@ -19,45 +32,41 @@ def planted(count: int, seed: int = 0) -> list[Case]:
     found = []
     for _ in range(count):
         names = (*EFFECTS, "none", "unknown")
-        score = np.array([*rng.normal(12.0, 10.0, len(EFFECTS)), 8.0, rng.uniform(0.0, 45.0)])
+        score = np.array([*rng.normal(30.0, 25.0, len(EFFECTS)), 90.0, rng.uniform(0.0, 300.0)])
+        linear = np.array([*rng.normal(25.0, 25.0, len(EFFECTS)), 0.0, 0.0])
         parity = np.array([*rng.exponential(1.5, len(EFFECTS)), 0.0, 0.0])
         equivalent = bool(rng.random() < 0.3)
-        x = (
-            score
-            + PARITY * parity
-            + np.array([*(BIAS.get(name, 0.0) for name in EFFECTS), EQUIVALENT * equivalent, -UNKNOWN])
-        )
-        p = np.exp((x - x.max()) / TEMPERATURE)
-        found.append(Case(names, score, parity, equivalent, names[rng.choice(len(names), p=p / p.sum())]))
+        p = np.array(list(TRUE.probabilities(scores(TRUE, names, score, linear, parity, equivalent)).values()))
+        found.append(Case(names, score, linear, parity, equivalent, names[rng.choice(len(names), p=p)]))
     return found
 
 
 def test_planted_numbers_come_back() -> None:
-    """Of 800 sets: temperature, what the parity stage is worth, offsets and the effect that wins too easily."""
-    found = calibrated(planted(800), words="test")
-    assert found["temperature"] == pytest.approx(TEMPERATURE, rel=0.2)
-    assert found["parity"] == pytest.approx(PARITY, rel=0.3)
-    assert found["unknown"] == pytest.approx(UNKNOWN, abs=3.0)
-    assert found["equivalent"] == pytest.approx(EQUIVALENT, abs=3.0)
-    assert found["bias"]["soft_ground"] - found["bias"]["payload"] == pytest.approx(-9.0, abs=2.5)
+    """Of 2000 sets: temperature, what each kind of evidence is worth, offsets and the effect that wins too easily."""
+    found = calibrated(planted(2000), words="test")
+    assert found["temperature"] == pytest.approx(TRUE.temperature, rel=0.15)
+    assert found["linear"] == pytest.approx(TRUE.linear, rel=0.15)
+    assert found["parity"] == pytest.approx(TRUE.parity, rel=0.15)
+    assert found["unknown_share"] == pytest.approx(TRUE.unknown_share, abs=0.15)
+    middle = found["unknown_share"] * 150.0 - found["unknown"]  # where `unknown` has a chance
+    assert middle == pytest.approx(TRUE.unknown_share * 150.0 - TRUE.unknown, abs=8.0)
+    assert found["none"] == pytest.approx(TRUE.none, abs=10.0)
+    assert found["equivalent"] == pytest.approx(TRUE.equivalent, abs=8.0)
+    assert found["bias"]["soft_ground"] - found["bias"]["payload"] == pytest.approx(-27.0, abs=7.0)
 
 
 def test_a_set_of_90_per_cent_holds_the_truth_so_often() -> None:
     """On sets that no number was learned from, with thresholds from 300 others."""
-    found = calibrated(planted(300), words="test")
+    made = calibrated(planted(300), words="test")
+    found = Calibration(**{name: made[name] for name in Calibration.__dataclass_fields__ if name in made})
     held = sure = named = 0
     fresh = planted(1500, seed=1)
     for one in fresh:
-        bias = np.array([found["bias"].get(name, 0.0) for name in one.names])
-        offset = {"none": found["equivalent"] * one.equivalent, "unknown": -found["unknown"]}
-        x = (one.score + found["parity"] * one.parity + bias + [offset.get(name, 0.0) for name in one.names]) / found[
-            "temperature"
-        ]
-        p = np.exp(x - x.max())
-        p = p / p.sum()
-        held += p[one.names.index(one.truth)] >= found["conformal"]
-        sure += p.max() >= found["commit"]
-        named += p.max() >= found["commit"] and one.names[int(p.argmax())] == one.truth
+        told = scores(found, one.names, one.score, one.linear, one.parity, one.equivalent)
+        p = np.array(list(found.probabilities(told).values()))
+        held += p[one.names.index(one.truth)] >= found.conformal
+        sure += p.max() >= found.commit
+        named += p.max() >= found.commit and one.names[int(p.argmax())] == one.truth
     assert 0.85 < held / len(fresh) < 0.95
     assert named / sure > 0.85
 
@@ -67,13 +76,14 @@ def test_a_verdict_becomes_a_case() -> None:
     label = {"kind": "single", "effects": [{"id": "payload", "channel": "mass", "element": None, "onset": None}],
              "d": 9.0, "d_each": [9.0], "outside": None}  # fmt: skip
     document = {
-        "ranking": [{"effect": "payload", "elpd_gain": 7.5, "parity_nats": 2.5}, {"effect": "none", "elpd_gain": 0.0},
+        "ranking": [{"effect": "payload", "elpd_gain": 7.5, "linear_gain": 4.0, "parity_nats": 2.5},
+                    {"effect": "none", "elpd_gain": 0.0},
                     {"effect": "unknown", "elpd_gain": 3.0}, {"effect": "backlash", "elpd_gain": -1e9}],
         "chance_nats": 2.0, "refit_upper_m": 0.012, "floor_m": 0.010,
     }  # fmt: skip
     one = case(truth_of(label), document)
     assert one is not None and one.names == ("payload", "none", "unknown") and one.score.tolist() == [7.5, 2.0, 3.0]
-    assert one.parity.tolist() == [2.5, 0.0, 0.0]
+    assert one.linear.tolist() == [4.0, 0.0, 0.0] and one.parity.tolist() == [2.5, 0.0, 0.0]
     assert one.equivalent and one.truth == "payload"
     pair = next(each for each in blind_bank.bank() if each["kind"] == "pair" and each["d"] > 3)
     assert case(truth_of(pair), document) is None

@@ -66,4 +66,4 @@ def candidate(name: str, place: int) -> Candidate:
     """Number `place` of B, off at 0; -2 and -1: the nuisances themselves, which it then sets."""
     one = np.ones(1)
     return Candidate(name, "motor", None, ((2 + place,),), (f"{name}.x",), ("1",), 0 * one, -5 * one, 5 * one, one,
-                     np.array([[0.5], [-0.5], [1.5], [-1.5]]), np.zeros(1, dtype=bool))  # fmt: skip
+                     np.array([[0.5], [-0.5], [1.5], [-1.5]]), np.zeros(1, dtype=bool), 0 * one)  # fmt: skip

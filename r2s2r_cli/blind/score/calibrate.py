@@ -1,10 +1,11 @@
 """From verdicts on a calibration bank to the numbers that turn gains into probabilities.
 
-p(name) ~ exp((score + bias) / temperature). The score of an effect is its held-out gain and `parity` times what the
-parity stage says for it; that of `none` what the best of the catalogue gains by chance, and `equivalent` more where the
-equivalence test finds no gap; that of `unknown` what no effect explains, less `unknown`. Linear in 1 / temperature and
-the products with it, so the fit (a multinomial regression, biases drawn to 0) has one optimum. Thresholds come from
-probabilities of sets left out of the fit.
+p(name) ~ exp((score + bias) / temperature). The score of an effect is its held-out gain, `linear` times that of the
+linearised problem, and `parity` times what the parity stage says for it; that of `none` what the best of the catalogue
+gains by chance, and `none`, and `equivalent` more where the equivalence test finds no gap; that of `unknown` a share
+(`unknown_share`) of what no effect explains, less `unknown`. Linear in 1 / temperature and the products with it, so the
+fit (a multinomial regression, biases drawn to 0) has one optimum. Thresholds come from probabilities of sets left out
+of the fit.
 """
 
 from __future__ import annotations
@@ -19,8 +20,12 @@ from r2s2r_cli.blind.score.facts import NONE, UNKNOWN, Truth
 from r2s2r_cli.errors import InputError
 
 LEAST_SETS = 12
-LEARNED = 4
-"""Numbers beside the biases."""
+LEARNED = ("sharpness", "linear", "parity", "none", "equivalent", "unknown", "unknown_share")
+"""Numbers beside the biases, in the order of the columns; all of them in the exponent."""
+BEFORE = (0.5, 0.5, 0.7, 0.0, 0.0, -1.0, 0.3)
+"""What they are before anything is learned, gains in the unit of SHARPNESS."""
+BEFORE_SD = (0.5, 0.5, 0.3, 2.0, 1.0, 2.0, 0.3)
+POSITIVE = ("sharpness", "linear", "parity", "unknown_share")
 FOLDS = 10
 COVER = 0.90
 PRECISION = 0.90
@@ -28,17 +33,16 @@ BIAS_SD = 1.0
 """Of a bias over the temperature: how much more often a name wins than its gains say, before anything is learned."""
 SHARPNESS = 1.0 / 15.0
 """1 / temperature before anything is learned [1/nats], and the unit in which it is fitted."""
-PARITY, PARITY_SD = 0.7, 0.3
-"""parity / temperature before anything is learned, and how surely: its errors are known better than a simulator's."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """One set. names: what was ranked; score, parity (n,) [nats]: without the numbers that are learned; equivalent: the
-    test found no gap. truth: the right name, not among `names` where the screening had lost it."""
+    """One set. names: what was ranked; score, linear, parity (n,) [nats]: without the numbers that are learned;
+    equivalent: the test found no gap. truth: the right name, not among `names` where the screening had lost it."""
 
     names: tuple[str, ...]
     score: np.ndarray
+    linear: np.ndarray
     parity: np.ndarray
     equivalent: bool
     truth: str
@@ -53,8 +57,8 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
     score = [chance if row["effect"] == NONE else float(row["elpd_gain"]) for row in rows]
     upper, floor = document.get("refit_upper_m"), document["floor_m"]
     equivalent = upper is not None and float(upper) < 1.25 * float(floor)
-    parity = np.array([float(row.get("parity_nats", 0.0)) for row in rows])
-    return Case(tuple(row["effect"] for row in rows), np.array(score), parity, equivalent, truth.right)
+    linear, parity = (np.array([float(row.get(key, 0.0)) for row in rows]) for key in ("linear_gain", "parity_nats"))
+    return Case(tuple(row["effect"] for row in rows), np.array(score), linear, parity, equivalent, truth.right)
 
 
 def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
@@ -75,16 +79,20 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
     held = np.sort([p.get(one.truth, 0.0) for one, p in apart])
     # Split conformal: with the k-th smallest as threshold at least COVER of new sets keep their truth.
     k = int(np.floor((len(held) + 1) * (1.0 - COVER)))
-    sharp = max(float(whole[0]) * SHARPNESS, 1e-6)
+    learned = dict(zip(LEARNED, whole.tolist(), strict=False))
+    sharp = max(learned["sharpness"] * SHARPNESS, 1e-6)
     first = [max(p, key=lambda name: p[name]) for _, p in apart]
     right = np.array([name == one.truth for name, (one, _) in zip(first, apart, strict=True)])
     sure = np.array([p[name] for name, (_, p) in zip(first, apart, strict=True)])
     return {
         "temperature": 1.0 / sharp,
-        "parity": float(whole[1]) / sharp,
-        "equivalent": float(whole[2]) / sharp,
-        "unknown": -float(whole[3]) / sharp,
-        "bias": {name: float(b) / sharp for name, b in zip(effects, whole[4:], strict=True)},
+        "linear": learned["linear"] * SHARPNESS / sharp,
+        "parity": learned["parity"] / sharp,
+        "none": learned["none"] / sharp,
+        "equivalent": learned["equivalent"] / sharp,
+        "unknown": -learned["unknown"] / sharp,
+        "unknown_share": learned["unknown_share"] * SHARPNESS / sharp,
+        "bias": {name: float(b) / sharp for name, b in zip(effects, whole[len(LEARNED) :], strict=True)},
         "commit": _commit(sure, right),
         "conformal": float(held[k - 1]) if k else 0.0,
         "words": words,
@@ -97,34 +105,31 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
 
 
 def _design(one: Case, effects: Sequence[str]) -> np.ndarray:
-    """What multiplies (sharpness, parity, equivalent, unknown, biases) in the exponent of every name, (name, LEARNED +
-    effect)."""
-    X = np.zeros((len(one.names), LEARNED + len(effects)))
-    X[:, 0], X[:, 1] = one.score * SHARPNESS, one.parity
-    for row, name in zip(X, one.names, strict=True):
-        if name == NONE:
-            row[2] = float(one.equivalent)
-        elif name == UNKNOWN:
-            row[3] = 1.0
+    """What multiplies LEARNED and the biases in the exponent of every name, (name, LEARNED + effect)."""
+    X = np.zeros((len(one.names), len(LEARNED) + len(effects)))
+    for row, name, score, linear, parity in zip(X, one.names, one.score, one.linear, one.parity, strict=True):
+        if name == UNKNOWN:
+            row[5:7] = 1.0, score * SHARPNESS
+        elif name == NONE:
+            row[[0, 3, 4]] = score * SHARPNESS, 1.0, float(one.equivalent)
         else:
-            row[LEARNED + effects.index(name)] = 1.0
+            row[:3] = score * SHARPNESS, linear * SHARPNESS, parity
+            row[len(LEARNED) + effects.index(name)] = 1.0
     return X
 
 
 def _fit(cases: Sequence[Case], effects: Sequence[str]) -> np.ndarray:
-    """Most probable numbers (LEARNED + effect,): the prior has sharpness about 1, parity about PARITY, the others about
-    0."""
+    """Most probable numbers (LEARNED + effect,) after BEFORE and the biases' BIAS_SD."""
     from scipy.optimize import minimize
 
     known = [one for one in cases if one.truth in one.names]
     most = max((len(one.names) for one in known), default=1)
-    X, there = np.zeros((len(known), most, LEARNED + len(effects))), np.zeros((len(known), most), dtype=bool)
+    X, there = np.zeros((len(known), most, len(LEARNED) + len(effects))), np.zeros((len(known), most), dtype=bool)
     for k, one in enumerate(known):
         X[k, : len(one.names)], there[k, : len(one.names)] = _design(one, effects), True
     right = X[np.arange(len(known)), [one.names.index(one.truth) for one in known]]
-    mean = np.zeros(LEARNED + len(effects))
-    mean[:2] = 1.0, PARITY
-    weight = np.r_[1.0, PARITY_SD**-2.0, 0.1, 0.1, np.full(len(effects), 1.0 / BIAS_SD**2)]
+    mean = np.r_[BEFORE, np.zeros(len(effects))]
+    weight = np.r_[np.array(BEFORE_SD) ** -2.0, np.full(len(effects), 1.0 / BIAS_SD**2)]
 
     def cost(w: np.ndarray) -> tuple[float, np.ndarray]:
         x = np.where(there, X @ w, -np.inf)
@@ -134,7 +139,7 @@ def _fit(cases: Sequence[Case], effects: Sequence[str]) -> np.ndarray:
         value = 0.5 * float(weight @ (w - mean) ** 2) + float((np.log(total) + top).sum() - (right @ w).sum())
         return value, weight * (w - mean) + np.einsum("kn,knp->p", e / total, X) - right.sum(axis=0)
 
-    bounds = [(1e-3, None), (0.0, None), *[(None, None)] * (2 + len(effects))]
+    bounds = [(1e-3, None) if name in POSITIVE else (None, None) for name in LEARNED] + [(None, None)] * len(effects)
     return np.asarray(minimize(cost, mean, jac=True, bounds=bounds, method="L-BFGS-B").x)
 
 

@@ -23,7 +23,13 @@ FORMAT = "r2s2r blind published 1"
 FINDINGS = 3
 """Of the parity stage, strongest first."""
 _ELEMENT = ("kind", "index", "xy_m")
-_USUAL: tuple[tuple[str, object], ...] = (("moved", True), ("fitted", True), ("parity_nats", 0.0), ("size", {}))
+_USUAL: tuple[tuple[str, object], ...] = (
+    ("moved", True),
+    ("fitted", True),
+    ("parity_nats", 0.0),
+    ("linear_gain", 0.0),
+    ("size", {}),
+)
 """Of a ranked name, left out."""
 
 

@@ -75,7 +75,8 @@ def _ranked(one: Ranked) -> RankedName:
     return RankedName(
         effect=one.effect, elpd_gain=_finite(one.gain, -1e9),
         elpd_gain_sd=one.gain_sd if one.gain_sd is not None and math.isfinite(one.gain_sd) else None,
-        parity_nats=one.parity, fitted=one.fitted, probability=one.probability, size=dict(one.size),
+        linear_gain=_finite(one.linear, -1e9), parity_nats=one.parity, fitted=one.fitted, probability=one.probability,
+        size=dict(one.size),
         ci90=dict(one.ci90), units=dict(one.units), channel=one.channel,
         element=None if one.element is None else _element(one.element),
         rmse_m=None if one.rmse is None or not math.isfinite(one.rmse) else one.rmse, moved=one.moved,

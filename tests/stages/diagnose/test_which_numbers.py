@@ -8,6 +8,8 @@ import torch
 
 from r2s2r_cli.effects import CATALOGUE
 from r2s2r_cli.engine.flat import pack_parameters
+from r2s2r_cli.stages.diagnose.parity.expected import EXPECTED
+from r2s2r_cli.stages.diagnose.parity.suspects import suspicions
 from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY, candidates
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.identified import nominal
@@ -70,5 +72,28 @@ def test_a_share_of_a_size_stays_where_it_is(model: Model) -> None:
     size = patch.tries[0]
     half = patch.share(size, 0.5)
     assert half[patch.shape].tolist() == size[patch.shape].tolist()
-    assert half[~patch.shape] == pytest.approx(0.5 * (patch.off + size)[~patch.shape])
+    assert half[~patch.shape] == pytest.approx(0.5 * (patch.origin + size)[~patch.shape])
     assert patch.shape.sum() == 3
+
+
+def test_what_is_a_nuisance_too_is_tried_from_where_the_refit_has_it(model: Model) -> None:
+    """The camera of another engine is 20 ms early: tries lie about that, and what parity measured is added to it."""
+    values = model.values0.copy()
+    values[model.place["camera_delay.tau_s"]] = -0.02
+    made = {one.effect: one for one in candidates(model, {"camera_delay": {"tau_s": 0.06}}, values=values)}
+    late = made["camera_delay"]
+    assert late.off.tolist() == [0.0] and late.origin.tolist() == [-0.02]
+    assert late.tries[0] == pytest.approx([0.04])
+    assert sorted((late.tries[1:, 0] + 0.02).tolist()) == pytest.approx(sorted((-late.tries[1:, 0] - 0.02).tolist()))
+    assert late.share(late.tries[0], 0.5) == pytest.approx([0.01])
+    assert made["payload"].origin.tolist() == made["payload"].off.tolist()
+
+
+def test_parity_speaks_of_numbers_that_effects_have() -> None:
+    """A size under a name that no effect has would be lost without a word."""
+    own = {effect.name: {one.name for one in effect.own} for effect in CATALOGUE}
+    for check in EXPECTED:
+        for difference in (0.1, -0.1):
+            for index in (None, 0):
+                for one in suspicions(check, difference, index):
+                    assert {name.split(".")[0] for name in one.size} <= own[one.effect], (check, one)

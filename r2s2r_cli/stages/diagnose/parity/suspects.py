@@ -26,17 +26,17 @@ def _indexed(name: str, index: int | None, value: float) -> dict[str, float]:
 _OF: dict[str, Sizes] = {
     "camera_scale": lambda d, k: (Suspicion("camera_scale", {"factor": 1 + d}),),
     "rod_length": lambda d, k: (Suspicion("camera_scale", {"factor": 1 + d}, 0.3), Suspicion("dropout", {}, 0.3)),
-    "dropout": lambda d, k: (Suspicion("dropout", {"share": d}),),
-    "camera_delay": lambda d, k: (Suspicion("camera_delay", {"delay_s": d}),),
+    "dropout": lambda d, k: (Suspicion("dropout", {"lost": d}),),
+    "camera_delay": lambda d, k: (Suspicion("camera_delay", {"tau_s": d}),),
     "sensor_bias": lambda d, k: (Suspicion("sensor_bias", _indexed("bias_m", k, d)),
                                  Suspicion("sensor_gain", {}, 0.3)),
-    "sensor_gain": lambda d, k: (Suspicion("sensor_gain", _indexed("factor", k, 1 + d)),
+    "sensor_gain": lambda d, k: (Suspicion("sensor_gain", _indexed("gain", k, 1 + d)),
                                  Suspicion("sensor_bias", {}, 0.3)),
     "sensor_drift": lambda d, k: (Suspicion("sensor_bias", {}, 0.8),),
     "slope_x": lambda d, k: (Suspicion("ground_slope", {"angle_x_rad": d}), Suspicion("camera_pose", {}, 0.7)),
     "slope_y": lambda d, k: (Suspicion("ground_slope", {"angle_y_rad": d}), Suspicion("camera_pose", {}, 0.7)),
     "slope_change": lambda d, k: (Suspicion("camera_pose", {}), Suspicion("ground_slope", {}, 0.3)),
-    "cap_height": lambda d, k: (Suspicion("cap_radius", _indexed("by_m", k, 1.5 * d)),),
+    "cap_height": lambda d, k: (Suspicion("cap_radius", _indexed("change_m", k, 1.5 * d)),),
     "winch_speed": lambda d, k: (
         # Wound cable makes winches faster than they were; batteries and loads make them slower.
         (Suspicion("spool_buildup", {}, 0.6),) if d > 0 else

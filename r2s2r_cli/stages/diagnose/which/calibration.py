@@ -9,28 +9,47 @@ from importlib import resources
 
 import numpy as np
 
+from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN
+
 FILE = "calibration.json"
 """Beside this module; made by the calibration run of the blind trials, and frozen before any blind set exists."""
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """temperature [nats]: of the softmax over names. parity: nats of gain that a nat of the parity stage is worth: it
-    needs no simulator, so it errs far less. equivalent, unknown [nats]: what `none` gains where the
-    equivalence test finds no gap, and what `unknown` must exceed. bias [nats]: of a name, what its gains are short of.
-    commit: probability from which one name is given.
-    conformal: names whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many
-    it rests on, 0 for the defaults."""
+    """What turns evidence into probabilities.
 
-    temperature: float = 15.0
-    parity: float = 10.0
+    temperature [nats]: of the softmax over names. linear: nats of gain that a nat of a linear gain is worth; parity:
+    the same of the parity stage, which needs no simulator and errs far less. none, equivalent [nats]: what `none`
+    gains, and more where the equivalence test finds no gap. unknown_share, unknown [nats]: what `unknown` has of what
+    no effect explains, and what that must exceed. bias [nats]: of a name, what its gains are short of. commit:
+    probability from which one name is given. conformal: names whose probability is at least this are in the 90 % set.
+    words: where it comes from; sets: how many it rests on, 0 for the defaults.
+    """
+
+    temperature: float = 25.0
+    linear: float = 1.0
+    parity: float = 15.0
+    none: float = 20.0
     equivalent: float = 6.0
     unknown: float = 25.0
+    unknown_share: float = 0.3
     commit: float = 0.5
     conformal: float = 0.05
     bias: Mapping[str, float] = field(default_factory=dict)
     words: str = "uncalibrated: a temperature by hand"
     sets: int = 0
+
+    def score(
+        self, name: str, gain: float, *, linear: float = 0.0, parity: float = 0.0, equivalent: bool = False
+    ) -> float:
+        """What a name is worth without its bias [nats]. gain: held out; of `none` what chance reaches, of `unknown`
+        what no effect explains. equivalent: the equivalence test found no gap."""
+        if name == NONE:
+            return gain + self.none + (self.equivalent if equivalent else 0.0)
+        if name == UNKNOWN:
+            return self.unknown_share * gain - self.unknown
+        return gain + self.linear * linear + self.parity * parity
 
     def probabilities(self, scores: Mapping[str, float]) -> dict[str, float]:
         """Softmax of scores [nats] by name."""

@@ -35,7 +35,8 @@ PARTS = {
 class Candidate:
     """One effect at one element. spread: of each of its free numbers the places among those of the model, several where
     all elements share it. off, lower, upper, scale: (k,). tries: sizes (t, k) at which it is tried first. shape (k,):
-    numbers that only say where or how, and nothing while the others are off."""
+    numbers that only say where or how, and nothing while the others are off. origin (k,): where the refit nominal model
+    has it, off unless it is a nuisance as well."""
 
     effect: str
     channel: str
@@ -49,10 +50,11 @@ class Candidate:
     scale: np.ndarray
     tries: np.ndarray
     shape: np.ndarray
+    origin: np.ndarray
 
     def share(self, size: np.ndarray, share: float) -> np.ndarray:
-        """A size (k,) that share of the way from off, at the same place."""
-        return np.where(self.shape, size, self.off + share * (size - self.off))
+        """A size (k,) that share of the way from the origin, at the same place."""
+        return np.where(self.shape, size, self.origin + share * (size - self.origin))
 
     @property
     def number(self) -> int | None:
@@ -67,11 +69,17 @@ class Candidate:
 
 
 def candidates(
-    model: Model, starts: Mapping[str, Mapping[str, float]] | None = None, places: np.ndarray | None = None
+    model: Model,
+    starts: Mapping[str, Mapping[str, float]] | None = None,
+    places: np.ndarray | None = None,
+    values: np.ndarray | None = None,
 ) -> tuple[Candidate, ...]:
-    """All of them, in the order of the catalogue. starts: sizes that other stages suspect, by effect and own parameter
-    (`Parity.starts`), tried as well. places (n, 2) [m]: where caps touched the ground; what sits somewhere is tried
-    there. Effects that the nominal simulator has already are left out."""
+    """All of them, in the order of the catalogue. Effects that the nominal simulator has already are left out.
+
+    starts: sizes that other stages suspect, by effect and own parameter (`Parity.starts`), tried as well. places (n, 2)
+    [m]: where caps touched the ground; what sits somewhere is tried there. values (n,): of the refit nominal model;
+    None: effects are off there.
+    """
     touched = np.zeros((1, 2)) if places is None or not len(places) else places
     found: list[Candidate] = []
     for effect in model.effects:
@@ -86,7 +94,7 @@ def candidates(
         for names in parts:
             fields = {name: by_field[name] for name in names}
             for element, spread in _elements(model, effect, fields):
-                found.append(_candidate(model, effect, element, spread, suggested, touched))
+                found.append(_candidate(model, effect, element, spread, suggested, touched, values))
     return tuple(found)
 
 
@@ -113,7 +121,7 @@ def _elements(
 
 def _candidate(
     model: Model, effect: Hooks, element: Element | None, spread: tuple[tuple[int, ...], ...],
-    suggested: Mapping[str, float], touched: np.ndarray,
+    suggested: Mapping[str, float], touched: np.ndarray, values: np.ndarray | None,
 ) -> Candidate:  # fmt: skip
     numbers = [model.numbers[places[0]] for places in spread]
     keys = [number.field.split(".", 1)[1] for number in numbers]
@@ -122,37 +130,38 @@ def _candidate(
     off, lower, upper, scale = (
         np.array([getattr(n, key) for n in numbers]) for key in ("off", "lower", "upper", "scale")
     )
-    tries = _tries(keys, off, scale, touched)
+    origin = off if values is None else values[[places[0] for places in spread]]
+    tries = _tries(keys, origin, scale, touched)
     known = {name.split(".", 1)[1]: k for k, name in enumerate(names)}
     given = [(known[name], value) for name, value in suggested.items() if name in known]
     if given:
-        row = off.copy()
+        row = origin.copy()
         for k, value in given:
-            row[k] = value
+            row[k] = origin[k] + value - off[k]
         tries.insert(0, row)
     return Candidate(
         effect=effect.name, channel=str(effect.channel), element=element, spread=spread, names=names,  # type: ignore[attr-defined]
         units=tuple(n.unit for n in numbers), off=off, lower=lower, upper=upper, scale=scale,
-        tries=_distinct(tries, [k for k, key in enumerate(keys) if not _only_shape(key, keys)], off, lower, upper,
+        tries=_distinct(tries, [k for k, key in enumerate(keys) if not _only_shape(key, keys)], origin, lower, upper,
                         scale),
-        shape=np.array([_only_shape(key, keys) for key in keys]),
+        shape=np.array([_only_shape(key, keys) for key in keys]), origin=origin,
     )  # fmt: skip
 
 
-def _tries(keys: Sequence[str], off: np.ndarray, scale: np.ndarray, touched: np.ndarray) -> list[np.ndarray]:
+def _tries(keys: Sequence[str], origin: np.ndarray, scale: np.ndarray, touched: np.ndarray) -> list[np.ndarray]:
     """Sizes: the numbers that do something alone, to both sides; with them, those that only say where or how."""
     shape = [k for k, key in enumerate(keys) if _only_shape(key, keys)]
     sizes = [k for k in range(len(keys)) if k not in shape]
-    rows = [off + sign * step * scale * axis for k in sizes for axis in [np.eye(len(off))[k]]
+    rows = [origin + sign * step * scale * axis for k in sizes for axis in [np.eye(len(origin))[k]]
             for step in STEPS for sign in (1.0, -1.0)]  # fmt: skip
     if 1 < len(sizes) <= 3:
         for signs in product((1.0, -1.0), repeat=len(sizes)):
-            row = off.copy()
+            row = origin.copy()
             row[sizes] += np.array(signs) * scale[sizes]
             rows.append(row)
     placed: list[np.ndarray] = []
     for row in rows if shape else ():
-        placed += _shaped(row, keys, shape, off, scale, touched)
+        placed += _shaped(row, keys, shape, origin, scale, touched)
     return [*(() if _has_place(keys) else rows), *placed]
 
 

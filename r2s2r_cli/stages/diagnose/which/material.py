@@ -35,6 +35,8 @@ class Material:
     """What of the gain of each fit was there before (`before.chronic`) [nats]."""
     asked: tuple[str, ...] | None = None
     """Ids of the effects that may be named; None: all."""
+    linear: Mapping[str, Mapping[int | None, float]] = field(default_factory=dict)
+    """Held-out gains of the linearised problem (`linear_gains`), by effect and element [nats]."""
     parity: Mapping[str, Mapping[int | None, float]] = field(default_factory=dict)
     """What the parity stage says for effects, by element (`Parity.nats`) [nats]."""
 
@@ -47,3 +49,8 @@ class Material:
         """The same of an effect at an element; of one without number the most of any."""
         own = self.parity.get(effect, {})
         return max([own.get(None, 0.0), *((own.get(index, 0.0),) if index is not None else own.values())])
+
+    def foretold(self, i: int) -> float:
+        """The linear gain of the fit i [nats]."""
+        one = self.fits[i].hypothesis.parts[0]
+        return self.linear.get(one.effect, {}).get(one.number, 0.0)

@@ -33,20 +33,31 @@ def concluded(m: Material) -> Which:
     calibration = m.calibration
     order = sorted(gains, key=lambda i: -gains[i])
     singles = [i for i in order if len(m.fits[i].hypothesis.parts) == 1]
-    worth = {i: gains[i] + calibration.parity * m.said(i) for i in singles}
+    worth = {
+        i: calibration.score(m.fits[i].hypothesis.effects[0], gains[i], linear=m.foretold(i), parity=m.said(i))
+        for i in singles
+    }
     best: dict[str, int] = {}
     for i in sorted(singles, key=lambda i: -worth[i]):
         best.setdefault(m.fits[i].hypothesis.effects[0], i)
     names = {name: gains[i] for name, i in best.items()}
     others = _not_fitted(m, names)
-    none = m.chance + (calibration.equivalent if m.no_gap.equivalent else 0.0)
-    table = {**{name: worth[i] for name, i in best.items()}, NONE: none, UNKNOWN: m.unexplained - calibration.unknown}
-    table |= {one.effect: one.gain + calibration.parity * one.parity for one in others}
+    table = {name: worth[i] for name, i in best.items()}
+    table |= {
+        one.effect: calibration.score(one.effect, one.gain, linear=one.linear, parity=one.parity) for one in others
+    }
+    table[NONE] = calibration.score(NONE, m.chance, equivalent=m.no_gap.equivalent)
+    table[UNKNOWN] = calibration.score(UNKNOWN, m.unexplained)
     probability = calibration.probabilities(table)
     sds = gain_sds(m.refit, m.scores, m.groups).tolist() if m.scores else []
     pair = _pair(m, order, gains, best)
     ranking = [
-        replace(_ranked(m, i, gains[i], probability[name], singles, gains), gain_sd=sds[i], parity=m.said(i))
+        replace(
+            _ranked(m, i, gains[i], probability[name], singles, gains),
+            gain_sd=sds[i],
+            linear=m.foretold(i),
+            parity=m.said(i),
+        )
         for name, i in best.items()
     ]
     ranking += [replace(one, probability=probability[one.effect]) for one in others]
@@ -78,7 +89,15 @@ def _not_fitted(m: Material, fitted: Mapping[str, float]) -> list[Ranked]:
             name = one.candidate.effect
             screened[name] = max(screened.get(name, -np.inf), one.gain)
     return [
-        Ranked(name, min(gain, 0.0), 0.0, channel=_channel(name), fitted=False, parity=m.says(name))
+        Ranked(
+            name,
+            min(gain, 0.0),
+            0.0,
+            channel=_channel(name),
+            fitted=False,
+            parity=m.says(name),
+            linear=max(m.linear.get(name, {None: 0.0}).values()),
+        )
         for name, gain in screened.items()
         if name not in fitted
     ]

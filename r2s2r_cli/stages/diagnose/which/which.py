@@ -13,14 +13,15 @@ from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.candidates import candidates
 from r2s2r_cli.stages.diagnose.which.fit import DAMPING, Fit, Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.found import Which
+from r2s2r_cli.stages.diagnose.which.linear import by_element, linear_gains
 from r2s2r_cli.stages.diagnose.which.material import Material
 from r2s2r_cli.stages.diagnose.which.rivals import WIDER, chance, no_gap
 from r2s2r_cli.stages.diagnose.which.score import ENOUGH, Score, gains, groups_of, scores
 from r2s2r_cli.stages.diagnose.which.screen import Response, screen
 from r2s2r_cli.stages.diagnose.which.verdict import concluded
 
-FITTED = 8
-"""Effects that are fitted, of those that the screening ranks highest."""
+FITTED = 6
+"""Effects that are fitted, of those with the highest linear gains."""
 ELEMENTS = 2
 """Elements of each that are fitted."""
 SUSPECTED, LEAST_SAID = 3, 2.0
@@ -75,11 +76,15 @@ def compare_effects(
     can be simulated.
     """
     ways = ways or Ways()
-    known = [one for one in candidates(arena.model, sizes, touched(arena)) if effects is None or one.effect in effects]
+    made = candidates(arena.model, sizes, touched(arena), arena.values(base.z[None])[0])
+    known = [one for one in made if effects is None or one.effect in effects]
     told("screening", 0, 1)
     responses = screen(arena, base, known)
     told("screening", 1, 1)
     groups = groups_of(arena)
+    nats = linear_gains(arena, base, responses, groups)
+    responses = tuple(responses[i] for i in np.argsort(-nats, kind="stable"))
+    linear = by_element(responses, np.sort(nats)[::-1])
     picked = _picked(responses, told_by or {})
     base, fits = _fitted(arena, base, picked, told)
     wider, unexplained = _widened(arena, [base, *fits[:LOOKED_AT]]) if ways.unknown else (1.0, 0.0)
@@ -99,7 +104,7 @@ def compare_effects(
         chance=chance(arena, responses, groups, seed=seed), no_gap=no_gap(refit, floor_m), wider=wider,
         unexplained=unexplained if ways.unknown else -np.inf, groups=groups, calibration=calibration,
         chronic=old,
-        asked=None if effects is None else tuple(effects), parity=told_by or {},
+        asked=None if effects is None else tuple(effects), parity=told_by or {}, linear=linear,
     )  # fmt: skip
     which = concluded(material)
     order = np.argsort(old - gains(refit, own), kind="stable")
@@ -145,7 +150,7 @@ def _fitted(arena: Arena, base: Fit, picked: Sequence[Response], told: Told) -> 
         one = response.candidate
         for share in (1.0, 0.3, -1.0):
             x = np.clip(one.share(response.size, share), one.lower, one.upper)
-            if share == 1.0 or np.any(np.abs(x - one.off) > 1e-6):
+            if share == 1.0 or np.any(np.abs(x - one.origin) > 1e-6):
                 points.append((Hypothesis((one,)), response.start_z if share == 1.0 else base.z, x))
     begun = _begun(arena, fits, points)
     told("fits", 0, 1)

@@ -12,6 +12,9 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
+# One worker a core: threads of a linear algebra would only wait for each other. Before anything imports numpy or torch.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 # A loaded machine is slow, which is no fault of the code under test: no test here asserts a time.
 settings.register_profile("loaded", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("loaded")

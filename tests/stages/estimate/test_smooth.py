@@ -225,7 +225,7 @@ def test_wild_data_are_refused() -> None:
         smooth(np.arange(30) * 0.1, 1e4 * rng.standard_normal((30, 6, 3)), np.full((6, 3), 0.002))
 
 
-@pytest.mark.parametrize("size", [0.5, 1.0, 5.0, 100.0])
+@pytest.mark.parametrize("size", [0.5, *(pytest.param(size, marks=pytest.mark.slow) for size in (1.0, 5.0)), 100.0])
 @pytest.mark.parametrize("frame", [0, 60, -1])
 def test_an_outlier_of_any_size_is_marked(size: float, frame: int) -> None:
     """One cap in one frame, half a metre or a hundred off: marked there and nowhere else, process noise as without."""
@@ -238,7 +238,7 @@ def test_an_outlier_of_any_size_is_marked(size: float, frame: int) -> None:
     assert np.abs(np.log10(tracks.density / clean.density)) == pytest.approx(0.0, abs=0.1)
 
 
-@pytest.mark.parametrize("size", [0.5, 3.0, 100.0])
+@pytest.mark.parametrize("size", [0.5, pytest.param(3.0, marks=pytest.mark.slow), 100.0])
 def test_a_jump_of_the_whole_robot_is_marked(size: float) -> None:
     """A tracker that finds all caps elsewhere from one frame on: six jumps, states that follow on both sides."""
     sample, clean = clean_run(JUDGING_SEEDS[3])

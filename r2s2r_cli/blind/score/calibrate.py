@@ -29,7 +29,7 @@ POSITIVE = ("sharpness", "linear", "parity", "unknown_share")
 FOLDS = 10
 COVER = 0.90
 PRECISION = 0.90
-BIAS_SD = 1.0
+BIAS_SD = 0.5
 """Of a bias over the temperature: how much more often a name wins than its gains say, before anything is learned."""
 SHARPNESS = 1.0 / 15.0
 """1 / temperature before anything is learned [1/nats], and the unit in which it is fitted."""

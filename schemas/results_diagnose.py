@@ -85,10 +85,11 @@ class ShrinkageFound(Frozen):
 
 
 class NextGaitFound(Frozen):
-    """What to run next, as `record --policy` takes it."""
+    """What to run next."""
 
     name: str
     file: str | None
+    """A policy file for `r2s2r record FILE`; None with --no-draw: it is written beside the pictures."""
     targets: tuple[tuple[float, ...], ...]
     nats: float
     """By which it separates the two candidates that are nearest to each other."""

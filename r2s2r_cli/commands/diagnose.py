@@ -113,7 +113,7 @@ def diagnose(
     again = [word for word in sys.argv[1:] if word != "--resume"]
     with resumable(checkpoint, here.relative(unfinished), again, done="simulated"):
         result, report = run.run(
-            lambda: _compute(asked, settings, checkpoint, console), _draw if draw else None,
+            lambda: _compute(asked, settings, checkpoint, console, draw), _draw if draw else None,
             lambda said: checkpoint.clear(),
         )  # fmt: skip
     show_outcome(_answer(result, report), console)
@@ -130,7 +130,7 @@ def _require_effects(names: tuple[str, ...]) -> None:
 
 
 def _compute(
-    asked: Asked, settings: DiagnoseSettings, checkpoint: ArrayCheckpoint, console: Console
+    asked: Asked, settings: DiagnoseSettings, checkpoint: ArrayCheckpoint, console: Console, draw: bool
 ) -> tuple[ArtifactData, DiagnoseReport]:
     from r2s2r_cli.commands.interrupts import loaded
 
@@ -143,7 +143,7 @@ def _compute(
             evidence, settings, seed=asked.seed, effects=asked.effects or None, policies=asked.policies(),
             cache_dir=asked.project.cache, progress=progress, checkpoint=checkpoint,
         )  # fmt: skip
-    if report.next_gait is not None:
+    if report.next_gait is not None and draw:  # the policy is a file beside the pictures
         target = asked.project.artifact("diagnosis", asked.iteration)
         file = asked.project.relative(target.with_name(target.stem + NEXT))
         report = report.model_copy(update={"next_gait": report.next_gait.model_copy(update={"file": file})})

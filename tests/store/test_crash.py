@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -25,8 +26,6 @@ from tests.support.versions import current, write_toy
 
 Check = Callable[[Path, dict], None]
 MANY, FEW = 200, 12
-LONGEST_S = {"write": 0.25, "record": 0.06, "seal": 0.12}
-"""Of the random delays: about how long the job takes, so that kills fall into all of its parts."""
 ROWS = 300
 
 
@@ -112,13 +111,26 @@ def prepare(job: str, folder: Path, template: Path) -> Path:
 CHECKS: dict[str, Check] = {"write": check_write, "record": check_record, "seal": check_seal}
 
 
+def lasting(nursery: Nursery, tmp_path: Path, job: str) -> float:
+    """How long `job` takes here and now [s], the shorter of two runs, so that kills fall into all of its parts."""
+    taken = []
+    for number in range(2):
+        folder = prepare(job, tmp_path / f"whole{number}", tmp_path / "template.journal")
+        begun = time.monotonic()
+        assert nursery.run(job, folder)["finished"]
+        taken.append(time.monotonic() - begun)
+        shutil.rmtree(folder)
+    return min(taken)
+
+
 def kill_at_random(nursery: Nursery, tmp_path: Path, job: str, count: int) -> None:
     """Kill `job` at `count` seeded random moments, and check what is left each time."""
     random = Random(job)
     killed = 0
+    longest = lasting(nursery, tmp_path, job)
     for number in range(count):
         folder = prepare(job, tmp_path / str(number), tmp_path / "template.journal")
-        answer = nursery.run(job, folder, delay=random.uniform(0, LONGEST_S[job]))
+        answer = nursery.run(job, folder, delay=random.uniform(0, longest))
         killed += not answer["finished"]
         CHECKS[job](folder, answer)
         shutil.rmtree(folder)

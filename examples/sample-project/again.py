@@ -169,6 +169,8 @@ def _difference(old: np.ndarray, new: np.ndarray, rule: Rule | None) -> str | No
         old, new = old[: len(new)], new[: len(old)]
     if rule is None:
         return None
+    if old.dtype.kind not in "biuf":
+        return None if np.array_equal(old, new) else "other words"
     a, b = old.astype(float), new.astype(float)
     if (np.isnan(a) != np.isnan(b)).any():
         return "other values are missing"

@@ -66,6 +66,10 @@ class Finding:
     what: str
     suspicions: tuple[Suspicion, ...] = ()
 
+    def nats(self, suspicion: Suspicion) -> float:
+        """What it says for one of its suspicions: half its squared z times the share, MOST_NATS at most [nats]."""
+        return suspicion.share * min(0.5 * self.z**2, MOST_NATS)
+
 
 @dataclass(frozen=True)
 class Mismatch:
@@ -108,14 +112,13 @@ class Parity:
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
     def nats(self) -> dict[str, dict[int | None, float]]:
-        """What all findings say for each effect, half their squared z times share [nats], the most of each element, by
-        id and index of the element (None: of no element)."""
+        """What all findings say for each effect (`Finding.nats`), the most of each element, by id and index of the
+        element (None: of no element)."""
         found: dict[str, dict[int | None, float]] = {}
         for one in self.findings:
             for suspicion in one.suspicions:
-                nats = suspicion.share * min(0.5 * one.z**2, MOST_NATS)
                 own = found.setdefault(suspicion.effect, {})
-                own[one.element.index] = max(own.get(one.element.index, 0.0), nats)
+                own[one.element.index] = max(own.get(one.element.index, 0.0), one.nats(suspicion))
         return found
 
     def starts(self) -> dict[str, dict[str, float]]:

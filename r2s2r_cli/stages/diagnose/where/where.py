@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Evidence
-from r2s2r_cli.stages.diagnose.parity.finding import MOST_NATS, Element, Parity, discoveries
+from r2s2r_cli.stages.diagnose.parity.finding import Element, Parity, discoveries
 from r2s2r_cli.stages.diagnose.where.channels import ENOUGH_NATS, explained, fitted, gains, held_out, sizes
 from r2s2r_cli.stages.diagnose.where.columns import Design, design
 from r2s2r_cli.stages.diagnose.where.found import Onset, PlaceMap, ProbeGain, SegmentGap, Where
@@ -185,7 +185,7 @@ def _said(found: Parity | None) -> dict[str, tuple[float, Element | None]]:
     for one in () if found is None else found.significant:
         for suspicion in one.suspicions:
             own = channel.get(suspicion.effect, "")
-            nats = suspicion.share * min(0.5 * one.z**2, MOST_NATS)
+            nats = one.nats(suspicion)
             if nats > made.get(own, (0.0, None))[0]:
                 made[own] = (nats, one.element)
     return made

@@ -32,14 +32,14 @@ def linear_gains(arena: Arena, base: Fit, responses: Sequence[Response], groups:
     names = np.unique(groups)
     pull = arena.precision @ (base.z - arena.mean)
     plain = _Problem(J, base.residual, weights, group, names, arena.precision, pull)
-    nominal = _costs(arena, base, plain, groups, names)
+    nominal = _costs(arena, plain, groups, names)
     found = np.zeros(len(responses))
     for k, one in enumerate(responses):
         held = solver.overruled(Hypothesis((one.candidate,)))
         own = plain if not held else _Problem(
             _without(J, held), base.residual, weights, group, names, arena.precision, pull
         )  # fmt: skip
-        costs = _costs(arena, base, own.beside(one.change.astype(float)), groups, names)
+        costs = _costs(arena, own.beside(one.change.astype(float)), groups, names)
         found[k] = float(np.clip(nominal - costs, -ENOUGH, ENOUGH).sum())
     return found
 
@@ -61,7 +61,7 @@ class _Problem:
         self, J: np.ndarray, residual: np.ndarray, weights: np.ndarray, group: np.ndarray, names: np.ndarray,
         precision: np.ndarray, pull: np.ndarray,
     ) -> None:  # fmt: skip
-        self.J, self.residual, self.weights, self.group, self.names = J, residual, weights, group, names
+        self.J, self.residual, self.weights = J, residual, weights
         self.precision, self.pull = precision, pull
         self._rows = [np.flatnonzero(group == name) for name in names]
         self.H = np.array([(J[rows] * weights[rows, None]).T @ J[rows] for rows in self._rows])
@@ -70,11 +70,11 @@ class _Problem:
     def beside(self, change: np.ndarray) -> _Problem:
         """The same with the amplitude of one more column (M,)."""
         found = object.__new__(_Problem)
-        found.residual, found.weights, found.group, found.names = self.residual, self.weights, self.group, self.names
+        found.residual, found.weights = self.residual, self.weights
         found.J = np.concatenate([self.J, change[:, None]], axis=1)
         found._rows = self._rows
         n = self.J.shape[1]
-        found.H, found.g = np.zeros((len(self.names), n + 1, n + 1)), np.zeros((len(self.names), n + 1))
+        found.H, found.g = np.zeros((len(self.H), n + 1, n + 1)), np.zeros((len(self.H), n + 1))
         found.H[:, :n, :n], found.g[:, :n] = self.H, self.g
         for k, rows in enumerate(self._rows):
             own = self.weights[rows] * change[rows]
@@ -91,7 +91,7 @@ class _Problem:
         return np.asarray(self.residual - self.J @ np.linalg.solve(H, self.g.sum(axis=0) - self.g[k] + self.pull))
 
 
-def _costs(arena: Arena, base: Fit, problem: _Problem, groups: np.ndarray, names: np.ndarray) -> np.ndarray:
+def _costs(arena: Arena, problem: _Problem, groups: np.ndarray, names: np.ndarray) -> np.ndarray:
     """-log density of every stretch without its group, (stretch,)."""
     after = np.array([problem.without(k) for k in range(len(names))])
     costs = minus_log(arena.squares(after), arena.logdets, arena.sizes)

@@ -95,9 +95,9 @@ def screen(arena: Arena, base: Fit, candidates: Sequence[Candidate]) -> tuple[Re
                 change = (along[k] - base.residual).astype(np.float32)
                 best[i] = (float(gains[k]), candidates[i].share(size, float(SHARES[k])), z[k], change)
     found = []
+    nothing = np.zeros(len(base.residual), dtype=np.float32)
     for i, one in enumerate(candidates):
         length, share, direction = shown.get(i, (0.0, 0.0, np.zeros(len(base.residual))))
-        nothing = np.zeros(len(base.residual), dtype=np.float32)
         gain, size, z, change = best.get(i, (-np.inf, one.off, base.z, nothing))
         found.append(Response(one, gain, size, z, length, share, direction.astype(np.float32), change))
     return tuple(sorted(found, key=lambda one: -one.gain))

@@ -44,8 +44,8 @@ class Range:
 
 
 RANGES = {
-    Bank.CALIBRATION: Range(range(100_000, 200_000), 0.16, 1.1, (0.03, 0.14)),
-    Bank.BLIND: Range(range(500_000, 900_000), 0.14, 1.4, (0.025, 0.16)),
+    Bank.CALIBRATION: Range(range(100_000, 200_000), 0.35, 1.6, (0.03, 0.14)),
+    Bank.BLIND: Range(range(500_000, 900_000), 0.3, 1.8, (0.025, 0.16)),
     Bank.REGRESSION: Range(range(1_000, 2_000), 0.8, 1.3),
 }
 FAINT = 0.25

@@ -113,7 +113,6 @@ def _again(project: Project, path: Path, say: Callable[[str], None]) -> Iterator
         say(f"{name}: the pictures it was made from are not kept")
         return
     words = [*shlex.split(command_again(made, path, force=True))[1:], "--no-draw"]
-    words += ["--of", "execute"] if path.name.startswith("51-") else []
     failed = _must(words, project.root, say)
     if failed:
         yield failed

@@ -105,8 +105,8 @@ def execute(
         project=here, iteration=place, robot=robot, runs=runs, settings=settings, port=port or "",
         protocol=protocol.value, camera=camera, simulated=simulated, overrides=overrides,
         flags={
-            "policies": policies or [], "port": port, "protocol": protocol.value, "camera": camera, "repeats": repeats,
-            "simulated": simulated, "model": None if numbers is None else here.relative(numbers),
+            "policies": _stored(here, policies or ()), "port": port, "protocol": protocol.value, "camera": camera,
+            "repeats": repeats, "simulated": simulated, "model": None if numbers is None else here.relative(numbers),
         },
         seed=None, draw=draw, force=force, stage="execute", inputs=inputs,
     )  # fmt: skip
@@ -130,7 +130,7 @@ def _chosen(project: Project, place: Iteration, names: Sequence[str]) -> tuple[l
     from r2s2r_cli.stages.simulate.policies import sequence
 
     plan = place.artifact("plan")
-    files = [text for text in names if Path(text).suffix in (".toml", ".h5") or ".h5:" in text]
+    files = [text for text in names if _is_file(text)]
     if not names or len(files) < len(names):
         require_input(plan, f"r2s2r plan --iteration {place.number}")
         _require_fresh(project, place, plan)
@@ -141,6 +141,18 @@ def _chosen(project: Project, place: Iteration, names: Sequence[str]) -> tuple[l
     for policy in found:
         sequence(policy, project.robot())
     return found, Asked(project, place, tuple(texts), None, 0, (), None).refs()
+
+
+def _is_file(text: str) -> bool:
+    """Whether this names a file with policies; else it is a policy of the plan."""
+    return Path(text).suffix in (".toml", ".h5") or ".h5:" in text
+
+
+def _stored(project: Project, names: Sequence[str]) -> list[str]:
+    """The policies as typed here, for the provenance."""
+    from r2s2r_cli.commands.simulate_inputs import stored_names
+
+    return [word for text in names for word in (stored_names(project, [text]) if _is_file(text) else [text])]
 
 
 def _require_fresh_file(project: Project, path: Path) -> None:

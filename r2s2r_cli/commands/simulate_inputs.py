@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -38,9 +38,8 @@ class Asked:
 
     def flags(self) -> dict[str, Any]:
         """What else than settings and inputs decides the result, for the provenance."""
-        places = [split_name(text) for text in self.policies]
         return {
-            "policies": [self.project.relative(path) + (f":{name}" if name else "") for path, name in places],
+            "policies": stored_names(self.project, self.policies),
             "random": self.random,
             "seed": None if self.random is None else self.seed,
             "replay": list(self.replay),
@@ -150,6 +149,11 @@ def split_name(text: str) -> tuple[Path, str]:
     if Path(text).exists() or not colon or Path(head).suffix != ARTIFACT:
         return Path(text), ""
     return Path(head), name
+
+
+def stored_names(project: Project, texts: Sequence[str]) -> list[str]:
+    """Policies as typed here, for the provenance: as they would be typed in the project's directory."""
+    return [project.relative(path) + (f":{name}" if name else "") for path, name in map(split_name, texts)]
 
 
 def read_policies(text: str) -> Iterator[PolicyFile]:

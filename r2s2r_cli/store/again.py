@@ -2,54 +2,85 @@
 
 from __future__ import annotations
 
+import json
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from r2s2r_cli.store.project import ITERATIONS
 from schemas.header import Provenance
+from schemas.versions import KINDS, STAGE_VERSIONS
 
-_PARTS = ("points", "history", "tendons", "masses")
+_ROBOT = (("port", "port", None), ("protocol", "protocol", "checked"), ("camera", "camera", None),
+          ("repeats", "repeats", 1), ("simulated", "simulated", False))  # fmt: skip
+_RUNS = (("train", "train", None), ("test", "test", None), ("also", "also", None), ("seed", "seed", 0))
+OPTIONS: dict[str, tuple[tuple[str, str, Any], ...]] = {
+    "import": (("format", "format", "auto"), ("depth-scale", "depth_scale", None)),
+    "calibrate": (("points", "points", None), ("history", "history", None), ("tendons", "tendons", None),
+                  ("masses", "masses", None), ("use", "use", None)),
+    "record": (("random", "random", None), ("levels", "levels", 2), ("seed", "seed", 0), ("excite", "excite", None),
+               *_ROBOT),
+    "estimate": (("of", "of", "record"),),
+    "identify": (*_RUNS, ("free", "free", None), ("fix", "fix", None), ("with-effect", "effects", None),
+                 ("method", "method", "default"), ("drive", "drive", "command-replay"),
+                 ("discrepancy", "discrepancy", True), ("online", "online", False)),
+    "plan": (("behaviour", "behaviours", None), ("to", "to", None), ("seed", "seed", 0)),
+    "execute": (("model", "model", None), *_ROBOT),
+    "simulate": (("random", "random", None), ("seed", "seed", 0), ("replay", "replay", None), ("from", "from", None),
+                 ("model", "model", None)),
+    "compare": (("model", "models", None), ("of", "of", None), ("own", "own", False)),
+    "floor": (("iteration", "iterations", None), ("by", "by", "pose"), ("numerics", "numerics", 0)),
+    "diagnose": (*_RUNS, ("healthy", "healthy", None), ("effect", "effects", None), ("model", "model", None)),
+}  # fmt: skip
+"""Of every stage the options that change its result: name, name among the flags that its provenance has, and the value
+that need not be typed. A list is an option for each entry, a table one NAME=VALUE for each."""
 
 
 def command_again(made: Provenance, artifact: Path, *, force: bool = False) -> str:
-    """The command line, to be pasted in the project's directory; with --force where what lies there looks fresh."""
-    flags: dict[str, Any] = made.settings.get("flags", {})
+    """The command line, to be pasted in the project's directory; with --force where what lies there looks fresh.
+
+    What no stage made has the command line of the program that did.
+    """
+    if made.stage not in STAGE_VERSIONS:
+        return shlex.join(made.argv)
+    flags = _flags(made, artifact)
     words = ["r2s2r", made.stage]
     if made.stage == "import":
         words += [ref.path for ref in made.inputs if ref.kind in ("file", "folder")]
-        for option in ("format", "depth_scale"):
-            if flags.get(option) not in (None, "auto"):
-                words += [f"--{option.replace('_', '-')}", str(flags[option])]
-    elif made.stage == "calibrate":
-        words += [word for part in _PARTS for path in flags.get(part, ()) for word in (f"--{part}", path)]
-        words += ["--use", flags["use"]] if "use" in flags else []
-    elif made.stage == "simulate":
-        words += flags.get("policies", ())
-        words += [word for option in ("random", "seed", "from", "model") if flags.get(option) is not None
-                  for word in (f"--{option}", str(flags[option]))]  # fmt: skip
-        words += [word for run in flags.get("replay", ()) for word in ("--replay", run)]
-    elif made.stage == "compare":
-        words += [word for name, path in flags.get("models", {}).items() for word in ("--model", f"{name}={path}")]
-        words += ["--of", flags.get("of", "record")]
-    elif made.stage == "floor":
-        words += [word for number in flags.get("iterations", ()) for word in ("--iteration", str(number))]
-        words += ["--by", flags["by"]] if flags.get("by", "pose") != "pose" else []
-        words += ["--numerics", str(flags["numerics"])] if flags.get("numerics") else []
-    elif made.stage == "identify":
-        words += _identify(flags)
-    if artifact.parent.name.isdigit():
-        words += ["--iteration", str(int(artifact.parent.name))]
+    words += flags.get("policies", ())
+    words += [word for option, key, usual in OPTIONS[made.stage] for word in _typed(option, flags.get(key), usual)]
+    words += [word for key, value in made.overrides.items() for word in ("--set", f"{key}={_toml(value)}")]
+    folder = artifact.resolve().parent
+    if folder.parent.name == ITERATIONS and folder.name.isdigit():
+        words += ["--iteration", str(int(folder.name))]
     return shlex.join([*words, "--force"] if force else words)
 
 
-def _identify(flags: dict[str, Any]) -> list[str]:
-    """Options that differ from their defaults."""
-    repeated = (("train", "train"), ("test", "test"), ("free", "free"), ("fix", "fix"), ("with-effect", "effects"),
-                ("also", "also"))  # fmt: skip
-    words = [word for option, key in repeated for value in flags.get(key, ()) for word in (f"--{option}", str(value))]
-    if flags.get("method", "default") != "default":
-        words += ["--method", flags["method"]]
-    if flags.get("drive") == "closed loop":
-        words += ["--drive", "closed-loop"]
-    words += ["--online"] if flags.get("online") else []
-    return words + (["--seed", str(flags["seed"])] if flags.get("seed") else [])
+def _flags(made: Provenance, artifact: Path) -> dict[str, Any]:
+    """What was asked for beside the settings, with what stands elsewhere: the seed of a recording, runs by the name of
+    the file, the model of a diagnosis by its inputs."""
+    flags: dict[str, Any] = {"seed": made.seed, **made.settings.get("flags", {})}
+    if made.stage == "estimate" and artifact.name == KINDS["estimate"].executed:
+        flags["of"] = "execute"
+    if made.stage == "identify" and "drive" in flags:
+        flags["drive"] = flags["drive"].replace(" ", "-")
+    if made.stage == "diagnose":
+        own = f"{ITERATIONS}/{artifact.resolve().parent.name}/{KINDS['identification'].filename}"
+        flags["model"] = next((r.path for r in made.inputs if r.kind == "identification" and r.path != own), None)
+    return flags
+
+
+def _typed(option: str, value: Any, usual: Any) -> list[str]:
+    """The option as typed; nothing for the usual value, and where the provenance knows nothing of it."""
+    if value is None or value == usual:
+        return []
+    if isinstance(value, bool):
+        return [f"--{option}" if value else f"--no-{option}"]
+    many = [f"{name}={item}" for name, item in value.items()] if isinstance(value, Mapping) else value
+    return [word for one in (many if isinstance(many, list) else [many]) for word in (f"--{option}", str(one))]
+
+
+def _toml(value: Any) -> str:
+    """The value of a setting as `--set` reads it: of numbers, truth values, texts and lists of them JSON is TOML."""
+    return json.dumps(value, ensure_ascii=False)

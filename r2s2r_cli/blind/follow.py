@@ -14,6 +14,7 @@ from typing import Any
 
 from r2s2r_cli.blind import run as blind_run
 from r2s2r_cli.blind.index import read_index
+from r2s2r_cli.blind.verdict import read_verdict, unreadable, write_document
 from r2s2r_cli.errors import InputError
 
 FORMAT = "r2s2r blind follow 1"
@@ -138,7 +139,7 @@ def write(whole: Trial, out: Path, sets: Sequence[Open]) -> tuple[dict[str, Any]
         seed = json.loads((out / ASKED).read_text(encoding="utf-8"))["seed"]
         document = {"format": FORMAT, "set": one.name, "index": whole.index, "logs": one.verdict["logs"], "seed": seed,
                     "gait": gait, "before": _said(one.verdict), **after}  # fmt: skip
-        blind_run._write(out / f"{one.name}.json", document)
+        write_document(out / f"{one.name}.json", document)
         found.append(document)
     return tuple(found)
 
@@ -164,16 +165,13 @@ def _said(verdict: dict[str, Any]) -> dict[str, Any]:
 
 
 def _verdict(path: Path, index: str) -> dict[str, Any]:
-    try:
-        verdict: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        of, control, _ = verdict["index"], verdict["shuffled"], _said(verdict)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError("a verdict cannot be read", where=str(path), expected="a file of `blind run`",
-                         received=str(error), hint=f"rm {path}") from error  # fmt: skip
-    if of != index:
-        raise InputError("a verdict was found on another bank, or on another list of this one", where=str(path),
-                         expected=index, received=str(of), hint="r2s2r blind run bank --out verdicts-2")  # fmt: skip
-    if control is not None:
+    """A verdict that can be followed up."""
+    verdict = read_verdict(path, index)
+    if verdict["shuffled"] is not None:
         raise InputError("a negative control is not followed up", where=str(path), expected="shuffled: null",
-                         received=str(control), hint="r2s2r blind run bank --out verdicts")  # fmt: skip
+                         received=str(verdict["shuffled"]), hint="r2s2r blind run bank --out verdicts")  # fmt: skip
+    try:
+        _said(verdict)
+    except (KeyError, TypeError, ValueError) as error:
+        raise unreadable(path, error) from error
     return verdict

@@ -21,13 +21,13 @@ from r2s2r_cli.blind.guard import Guard, Peeked
 from r2s2r_cli.blind.index import digest, read_index
 from r2s2r_cli.blind.seam import each, open_executor
 from r2s2r_cli.blind.sets import read_set
+from r2s2r_cli.blind.verdict import FORMAT, unreadable, write_document
 from r2s2r_cli.errors import InputError, R2S2RError
 from r2s2r_cli.stages.diagnose.evidence import Evidence
 
 Diagnoser = Callable[[Evidence, dict[str, Any]], dict[str, Any]]
 """Evidence and settings in, the document of `diagnose --json` out."""
 DEFAULT = "r2s2r_cli.blind.catalogue:diagnosed"
-FORMAT = "r2s2r blind verdict 1"
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def one(job: Job) -> dict[str, Any]:
         "code": judge, "diagnosis": found, "opened": guard.opened, "refused": guard.refused,
         "wall_s": time.monotonic() - begun, "cpu_s": time.process_time() - spent,
     }  # fmt: skip
-    _write(job.out / f"{job.name}.json", verdict)
+    write_document(job.out / f"{job.name}.json", verdict)
     return verdict
 
 
@@ -114,9 +114,7 @@ def _is_done(job: Job) -> bool:
         same = {"index": job.index, "logs": job.logs, **job.asked}
         wrong = [key for key, value in same.items() if found[key] != value]
     except (ValueError, KeyError, TypeError) as error:
-        raise InputError(
-            "a verdict cannot be read", where=str(path), expected=FORMAT, received=str(error), hint=f"rm {path}"
-        ) from error
+        raise unreadable(path, error) from error
     if wrong:
         raise InputError(
             "a verdict is there that answers another question", where=f"{path}: {wrong[0]}",
@@ -124,13 +122,6 @@ def _is_done(job: Job) -> bool:
             hint="r2s2r blind run bank --out verdicts-2",
         )  # fmt: skip
     return True
-
-
-def _write(path: Path, verdict: dict[str, Any]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(f".part{os.getpid()}")
-    part.write_text(json.dumps(verdict, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-    part.replace(path)
 
 
 def _diagnoser(name: str) -> Diagnoser:

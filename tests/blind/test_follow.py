@@ -39,9 +39,11 @@ def test_the_maker_is_told_the_targets_alone(tmp_path: Path) -> None:
         follow.begin(whole, tmp_path / "out", seed=4)
 
 
-@pytest.mark.parametrize("changed", [{"index": "0"}, {"shuffled": 1}, {"diagnosis": {"verdict": "ambiguous"}}])
+@pytest.mark.parametrize(
+    "changed", [{"index": "0"}, {"shuffled": 1}, {"diagnosis": {"verdict": "ambiguous"}}, {"refused": ["labels/a"]}]
+)
 def test_verdicts_of_something_else_are_refused(tmp_path: Path, changed: dict[str, Any]) -> None:
-    """Of another bank, of a negative control, or with a part missing."""
+    """Of another bank, of a negative control, with a part missing, or that reached for the truth."""
     with pytest.raises(InputError):
         follow.trial(*bank_of(tmp_path, {"a": wants(TARGETS)}, **changed))
 

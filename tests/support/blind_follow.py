@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from r2s2r_cli.blind.index import index_text, read_index
-from r2s2r_cli.blind.run import FORMAT
+from r2s2r_cli.blind.verdict import FORMAT
 from r2s2r_cli.stages.diagnose.evidence import Evidence
 from tests.support.blind_bank import document
 

@@ -11,7 +11,7 @@ from r2s2r_cli.blind.score.facts import Said, Truth, said_of
 from r2s2r_cli.blind.score.pool import Pool
 from r2s2r_cli.blind.score.published import read_published
 from r2s2r_cli.blind.score.rows import AGAIN, row
-from r2s2r_cli.blind.score.shard import read_verdict
+from r2s2r_cli.blind.verdict import read_verdict
 from r2s2r_cli.errors import InputError
 from schemas.results_blind import BlindRow
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from r2s2r_cli.blind import labels
 from r2s2r_cli.blind.index import digest, index_of
+from r2s2r_cli.blind.verdict import read_verdict
 from r2s2r_cli.errors import InputError
 
 PLACES = ("cache", "threads")
@@ -102,26 +102,6 @@ def followed(path: Path, index: str, logs: str) -> dict[str, Any] | None:
         raise InputError("one more gait was run for another bank, or for other logs", where=str(path),
                          expected=f"{index}, {logs}", received=", ".join(map(str, of)), hint=f"rm {path}")  # fmt: skip
     return found
-
-
-def read_verdict(path: Path, index: str | None = None) -> dict[str, Any]:
-    """A file of `blind run`, with its SHA-256. index: of the bank that it must be of. Raises InputError where it is
-    none, of another bank, or reached for the truth."""
-    try:
-        data = path.read_bytes()
-        verdict: dict[str, Any] = json.loads(data)
-        of, _, _ = verdict["index"], verdict["logs"], verdict["shuffled"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError("a verdict cannot be read", where=str(path), expected="a file of `blind run`",
-                         received=str(error), hint=f"rm {path}") from error  # fmt: skip
-    if index not in (None, of):
-        raise InputError("a verdict was found on another bank, or on another list of this one", where=str(path),
-                         expected=str(index), received=str(of),
-                         hint="r2s2r blind run bank --out verdicts-2")  # fmt: skip
-    if verdict.get("refused"):
-        raise InputError("a verdict reached for the truth", where=str(path), expected="nothing refused",
-                         received=str(verdict["refused"][0]), hint=f"rm {path}")  # fmt: skip
-    return {**verdict, "sha256": sha256(data).hexdigest()}
 
 
 def _asked(found: list[Judged], verdicts: Path) -> dict[str, Any]:

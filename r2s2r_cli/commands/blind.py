@@ -92,6 +92,7 @@ def make(
 
     Example: r2s2r blind make --count 24 --key labels.key bank
     """
+    from r2s2r_cli.commands.blind_maker import make_sets
     from schemas.results_blind import BlindMakeResult
 
     console = Console(json=json, quiet=quiet)
@@ -106,7 +107,7 @@ def make(
              *([] if first is None else ["--first", str(first)]),
              *(["--gaits", str(gaits)] if gaits else []), *([] if oracle else ["--no-oracle"])]  # fmt: skip
     with console.progress("blind sets", count) as advance:
-        _maker(asked, advance)
+        make_sets(asked, advance)
     from r2s2r_cli.blind.index import read_index
 
     index, own = read_index(out / "index.json")
@@ -212,35 +213,3 @@ def _settings(items: list[str] | None, without: str | None) -> dict[str, object]
                              received=without, hint="r2s2r effects")  # fmt: skip
         found["effects"] = [one for one in ids if one != without]
     return found
-
-
-def _maker(asked: list[str], advance: object) -> None:
-    """The maker's process; its errors are ours."""
-    import importlib.util
-    import json
-    import subprocess
-    import sys
-
-    from r2s2r_cli.errors import InputError, NumericalError
-
-    for module, extra in (("mujoco", "rig"), ("cryptography", "blind")):
-        if importlib.util.find_spec(module) is None:
-            raise UsageError(f"{module} is not installed", where="r2s2r blind make", expected=f"the extra `{extra}`",
-                             received="no such module", hint="pip install 'r2s2r[blind]'")  # fmt: skip
-    command = [sys.executable, "-m", "r2s2r_cli.blind.make", *asked]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as maker:
-        assert maker.stdout is not None and maker.stderr is not None  # noqa: S101 - both are pipes
-        done = 0
-        for line in maker.stdout:
-            now = int(json.loads(line)["done"])
-            advance(now - done)  # type: ignore[operator]
-            done = now
-        words = maker.stderr.read().strip()
-        code = maker.wait()
-    if code == 130:
-        raise KeyboardInterrupt
-    if code:
-        kind = NumericalError if code == 6 else UsageError if code == 2 else InputError
-        raise kind("the maker of blind sets broke off", where="r2s2r blind make", expected="exit code 0",
-                   received=words or f"exit code {code}",
-                   hint="r2s2r blind make --count 4 --key try.key try")  # fmt: skip

@@ -51,11 +51,11 @@ def follow(
     blind_follow.write(whole, home, [one for one in whole.open if not one.targets])
     runs = len(blind_follow.BANKS) * len(whole.targets)
     if runs:
-        from r2s2r_cli.commands.blind import _maker
+        from r2s2r_cli.commands.blind_maker import make_sets
 
         with console.progress("gaits", runs) as advance:
-            _maker(["follow", "--bank", str(whole.bank), "--key", str(key.resolve()), "--asked", str(asked),
-                    "--out", str(home), "--executor", executor, "--workers", str(workers)], advance)  # fmt: skip
+            make_sets(["follow", "--bank", str(whole.bank), "--key", str(key.resolve()), "--asked", str(asked),
+                       "--out", str(home), "--executor", executor, "--workers", str(workers)], advance)  # fmt: skip
     todo = blind_run.left(blind_follow.jobs(whole, home))
     with console.progress("verdicts", runs) as advance:
         advance(runs - len(todo))

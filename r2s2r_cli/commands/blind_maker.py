@@ -1,0 +1,40 @@
+"""The process that makes blind sets: who runs it is told how far it is, and never what is in them."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+
+from r2s2r_cli.errors import InputError, NumericalError, UsageError
+
+
+def make_sets(asked: Sequence[str], advance: Callable[[int], None]) -> None:
+    """Run the maker with these words and wait for it. advance: told how many sets are new.
+
+    Its errors are ours: UsageError where a package is missing or the words are wrong, InputError, NumericalError;
+    KeyboardInterrupt where it was interrupted.
+    """
+    for module, extra in (("mujoco", "rig"), ("cryptography", "blind")):
+        if importlib.util.find_spec(module) is None:
+            raise UsageError(f"{module} is not installed", where="r2s2r blind make", expected=f"the extra `{extra}`",
+                             received="no such module", hint="pip install 'r2s2r[blind]'")  # fmt: skip
+    command = [sys.executable, "-m", "r2s2r_cli.blind.make", *asked]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as maker:
+        assert maker.stdout is not None and maker.stderr is not None  # noqa: S101 - both are pipes
+        done = 0
+        for line in maker.stdout:
+            now = int(json.loads(line)["done"])
+            advance(now - done)
+            done = now
+        words = maker.stderr.read().strip()
+        code = maker.wait()
+    if code == 130:
+        raise KeyboardInterrupt
+    if code:
+        kind = NumericalError if code == 6 else UsageError if code == 2 else InputError
+        raise kind("the maker of blind sets broke off", where="r2s2r blind make", expected="exit code 0",
+                   received=words or f"exit code {code}",
+                   hint="r2s2r blind make --count 4 --key try.key try")  # fmt: skip

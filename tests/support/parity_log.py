@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Evidence, Run
+from r2s2r_cli.stages.diagnose.parity import Parity
 from r2s2r_cli.stages.floor.runs import SensedRun
 from r2s2r_cli.stages.identified import nominal
 from r2s2r_cli.stages.identify.data import RunData, Selection
@@ -125,3 +126,9 @@ def evidence_of(runs: tuple[Run, ...], healthy: tuple[Run, ...] = (), *, robot: 
 def with_caps(run: Run, **changed: np.ndarray) -> Run:
     """The run with other arrays of its caps and commands."""
     return replace(run, caps=replace(run.caps, **changed))
+
+
+def foremost(found: Parity) -> tuple[str, int | None]:
+    """The effect, and the index of its element, that the findings say most for [nats]."""
+    nats = {(effect, index): said for effect, own in found.nats().items() for index, said in own.items()}
+    return max(nats, key=lambda one: nats[one])

@@ -11,7 +11,7 @@ from r2s2r_cli.stages.diagnose.parity import Finding, Parity, parity
 from r2s2r_cli.stages.diagnose.parity.lengths import sensor_parity
 from r2s2r_cli.stages.diagnose.parity.series import series
 from tests.support.engine import threebar
-from tests.support.parity_log import Faults, evidence_of, swaying
+from tests.support.parity_log import Faults, evidence_of, foremost, swaying
 
 
 def _parity(faults: Faults | None) -> Parity:
@@ -33,7 +33,7 @@ def test_a_planted_bias_is_measured_and_leads_to_its_effect() -> None:
     assert abs(one.value - 0.008) < min(4 * one.sd, 1e-3)
     assert found.findings[0] is one
     assert found.differential
-    assert next(iter(found.suspected())) == "sensor_bias"
+    assert foremost(found) == ("sensor_bias", 3)
     assert abs(found.starts()["sensor_bias"]["bias_m.3"] - 0.008) < 1e-3
     assert [f.element.index for f in found.significant if f.check == "sensor_bias"] == [3]
 
@@ -54,7 +54,9 @@ def test_late_stamps_are_measured_to_a_tenth_of_a_frame() -> None:
     one = _one(found, "camera_delay", None)
     assert abs(one.value + 0.08) < 0.004
     assert found.findings[0] is one
-    assert next(iter(found.suspected())) == "camera_delay"
+    assert one in found.significant
+    assert foremost(found) == ("camera_delay", None)
+    assert abs(found.starts()["camera_delay"]["tau_s"] + 0.08) < 0.004
 
 
 def test_a_scale_is_not_taken_for_nine_wrong_sensors() -> None:

@@ -11,7 +11,7 @@ from r2s2r_cli.stages.diagnose.parity import parity
 from r2s2r_cli.stages.diagnose.parity.finding import MOST_NATS, discoveries
 from r2s2r_cli.stages.diagnose.parity.series import Measured, combined, regression
 from r2s2r_cli.stages.identify.data import Selection
-from tests.support.parity_log import evidence_of, swaying, with_caps
+from tests.support.parity_log import evidence_of, foremost, swaying, with_caps
 
 
 def test_false_discoveries_stay_below_the_level() -> None:
@@ -88,7 +88,9 @@ def test_caps_that_were_lost_half_of_the_time_are_counted() -> None:
     quality[::2, :2] = 2
     found = parity(evidence_of((with_caps(run, quality=quality),)))
     assert abs(found.of("dropout")[0].value - 1 / 6) < 0.01
-    assert next(iter(found.suspected())) == "dropout"
+    assert found.of("dropout")[0] in found.significant
+    assert foremost(found) == ("dropout", None)
+    assert abs(found.starts()["dropout"]["lost"] - 1 / 6) < 0.01
 
 
 def test_nothing_of_judged_intervals_is_looked_at() -> None:

@@ -101,16 +101,6 @@ class Parity:
         kept = discoveries(np.array([one.p for one in self.findings]), self.level)
         return tuple(one for one, keep in zip(self.findings, kept, strict=True) if keep)
 
-    def suspected(self) -> dict[str, float]:
-        """How strongly the significant findings speak for each effect, |z| times share, the strongest finding of each;
-        effects without one are not there. Strongest first."""
-        found: dict[str, float] = {}
-        for one in self.significant:
-            for suspicion in one.suspicions:
-                weight = abs(one.z) * suspicion.share
-                found[suspicion.effect] = max(weight, found.get(suspicion.effect, 0.0))
-        return dict(sorted(found.items(), key=lambda item: -item[1]))
-
     def nats(self) -> dict[str, dict[int | None, float]]:
         """What all findings say for each effect (`Finding.nats`), the most of each element, by id and index of the
         element (None: of no element)."""

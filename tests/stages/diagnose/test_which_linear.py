@@ -30,7 +30,7 @@ def test_a_planted_effect_gains_and_another_one_does_not() -> None:
     """Without any fit of it."""
     arena = LinearArena(0.8)
     base, responses = begun(arena)
-    right, wrong = linear_gains(arena, base, responses, arena.gait)  # type: ignore[arg-type]
+    right, wrong = linear_gains(arena, base, responses)  # type: ignore[arg-type]
     assert right > 20
     assert wrong < 3
 
@@ -61,7 +61,7 @@ def test_the_gain_is_that_of_a_fit_without_the_gait() -> None:
     J = np.concatenate([arena.A, one.change[:M, None].astype(float)], axis=1)
     beside = cost(J, np.diag([1.0, 1.0, AMPLITUDE_SD**-2.0]), np.append(z, 0.0))
     expected = np.clip(plain - beside, -ENOUGH, ENOUGH).sum()
-    assert linear_gains(arena, base, [one], arena.gait)[0] == pytest.approx(expected, rel=1e-3)  # type: ignore[arg-type]
+    assert linear_gains(arena, base, [one])[0] == pytest.approx(expected, rel=1e-3)  # type: ignore[arg-type]
 
 
 def test_gains_are_kept_by_element_and_the_unseen_have_none() -> None:

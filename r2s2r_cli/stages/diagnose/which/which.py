@@ -53,7 +53,8 @@ class Ways:
 
 @dataclass(frozen=True)
 class Compared:
-    """What the later stages go on from: the arena, the refit nominal model, the fits best first, their scores."""
+    """What the later stages go on from: the arena, the refit nominal model, the fits in the order of the ranking, their
+    scores."""
 
     arena: Arena
     base: Fit
@@ -82,7 +83,7 @@ def compare_effects(
     responses = screen(arena, base, known)
     told("screening", 1, 1)
     groups = groups_of(arena)
-    nats = linear_gains(arena, base, responses, groups)
+    nats = linear_gains(arena, base, responses, healthy)
     responses = tuple(responses[i] for i in np.argsort(-nats, kind="stable"))
     linear = by_element(responses, np.sort(nats)[::-1])
     picked = _picked(responses, told_by or {})
@@ -107,8 +108,22 @@ def compare_effects(
         asked=None if effects is None else tuple(effects), parity=told_by or {}, linear=linear,
     )  # fmt: skip
     which = concluded(material)
-    order = np.argsort(old - gains(refit, own), kind="stable")
+    order = _in_order(which, fits, gains(refit, own) - old)
     return Compared(arena, base, tuple(fits[i] for i in order), refit, tuple(own[i] for i in order), which)
+
+
+def _in_order(which: Which, fits: Sequence[Fit], gained: np.ndarray) -> list[int]:
+    """Places of the fits: what is committed to, then as the ranking has it with its elements, two effects after the
+    better of them."""
+    place = {one.effect: k for k, one in enumerate(which.ranking)}
+    seats = {one.effect: one.element for one in which.ranking}
+
+    def key(i: int) -> tuple[bool, int, int, bool, float]:
+        parts, own = fits[i].hypothesis.parts, fits[i].hypothesis.effects
+        elsewhere = any(one.element not in (None, seats[one.effect]) for one in parts)
+        return own != which.effects, min(place[name] for name in own), len(own), elsewhere, -float(gained[i])
+
+    return sorted(range(len(fits)), key=key)
 
 
 def touched(arena: Arena) -> np.ndarray:

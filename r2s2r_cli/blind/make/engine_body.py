@@ -6,6 +6,7 @@ numbers, once or every 20 ms. A check of the algorithm: who shares the engine wi
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -99,6 +100,16 @@ class EngineBody:
         """Another one's state."""
         self._state, rest, acting, angle = state
         self.winches.rest, self.winches.acting, self.winches.angle = rest.copy(), acting.copy(), angle.copy()
+
+    def push(self, velocity: np.ndarray, rate: np.ndarray) -> None:
+        """Add to the rods' velocities [m/s] and rates [rad/s], (rod, 3)."""
+        import torch
+
+        state = self._state
+        self._state = replace(
+            state, v_WB=state.v_WB + torch.as_tensor(velocity @ self._R).reshape(state.v_WB.shape),
+            w_R=state.w_R + torch.as_tensor(rate).reshape(state.w_R.shape),
+        )  # fmt: skip
 
     def _working(self, hidden: Hidden, gait: int) -> tuple[Law, ...]:
         # These laws ask their scene for the winches' radii and for chance alone: there is no MuJoCo here.

@@ -4,9 +4,11 @@ projected off.
 Every target interval of every gait is simulated again without what is wrong, from the true state at its start and under
 the recorded duties (command replay). The difference of end caps and sensor lengths is whitened with the noise and the
 floor, and projected on the complement of the rig's own sensitivities to friction, motor speed (both common to the set)
-and start pose (x, y and heading of every interval: exact, the floor is the same everywhere). d is the length of what is
-left: with d >= 8 no test would miss it. No interval counts for more than MOST: one tip-over that happens in one world
-and not in the other is worth more than all the rest together, and says nothing about which effect it was.
+and start pose (x, y and heading of every interval: exact, the floor is the same everywhere). The floor has the robot's
+repeatability in it: every interval is simulated a few times more from a start that was pushed a little, and what that
+changes, a fall that comes earlier, is no effect's. d is the length of what is left: with d >= 8 no test would miss it.
+No interval counts for more than MOST: one tip-over that happens in one world and not in the other is worth more than
+all the rest together, and says nothing about which effect it was.
 """
 
 from __future__ import annotations
@@ -30,6 +32,11 @@ LOOK_S = 0.1
 """Between two instants that are compared."""
 STEP = 0.05
 """Relative change of friction and speed for their sensitivities."""
+PUSHES = 3
+"""Of every interval's start, for the robot's repeatability."""
+PUSH_M_PER_S, PUSH_RAD_PER_S = 0.02, 0.1
+"""Sd of a push in every coordinate of a rod: cables stop it within a twentieth of a second, a millimetre or a third of
+a degree away."""
 MOST = 10.0
 """Of one interval: what happens once can be clear, and no more than that."""
 WEAK, CLEAR = 3.0, 8.0
@@ -66,7 +73,9 @@ def detectability(robot: Robot, hidden: Hidden, runs: list[Driven]) -> Detectabl
     base = [_replayed(robot, plain, run, g) for g, run in enumerate(runs)]
     rub = [_replayed(robot, replace(plain, friction=plain.friction * (1 + STEP)), run, g) for g, run in enumerate(runs)]
     fast = [_replayed(robot, replace(plain, speed=plain.speed * (1 + STEP)), run, g) for g, run in enumerate(runs)]
-    told = _Told(hidden, base, (rub, fast))
+    rng = np.random.default_rng([hidden.seed, 17])
+    pushed = [[_replayed(robot, plain, run, g, rng) for g, run in enumerate(runs)] for _ in range(PUSHES)]
+    told = _Told(hidden, base, (rub, fast), pushed)
     whole = [_recorded(hidden, run, g) for g, run in enumerate(runs)]
     d, gap = told(whole)
     d = float(np.hypot(d, _lost(hidden, runs)))
@@ -89,8 +98,14 @@ def _lost(hidden: Hidden, runs: list[Driven]) -> float:
 class _Told:
     """The length of a difference from `base` off the nuisances."""
 
-    def __init__(self, hidden: Hidden, base: list[list[_Looks]], varied: tuple[list[list[_Looks]], ...]) -> None:
+    def __init__(
+        self, hidden: Hidden, base: list[list[_Looks]], varied: tuple[list[list[_Looks]], ...],
+        pushed: list[list[list[_Looks]]],
+    ) -> None:  # fmt: skip
         self._hidden, self._base = hidden, base
+        again = [self._white(one) for one in pushed]
+        self._repeats = [np.column_stack(parts) / np.sqrt(len(again)) for parts in zip(
+            *([part for part, _ in one] for one in again), strict=True)]  # fmt: skip
         common = [self._white(one) for one in varied]
         self._common = np.column_stack([np.concatenate([part for part, _ in one]) for one in common])
         self._own = [_poses(looks) for run in base for looks in run]
@@ -99,20 +114,26 @@ class _Told:
         """d, and the root mean square at key frames [m]."""
         white = self._white(other)
         r = np.concatenate([part for part, _ in white])
-        nuisances, begins, at = [], [], 0
-        for pose, (part, cap_rows) in zip(self._own, white, strict=True):
-            columns = np.zeros((len(r), 3))
-            columns[at : at + cap_rows] = self._caps_white(pose)
-            nuisances.append(columns)
+        nuisances, repeats, begins, at = [], [], [], 0
+        for pose, again, (part, cap_rows) in zip(self._own, self._repeats, white, strict=True):
+            columns = np.zeros((len(r), 3 + again.shape[1]))
+            columns[at : at + cap_rows, :3] = self._caps_white(pose)
+            columns[at : at + len(part), 3:] = again
+            nuisances.append(columns[:, :3])
+            repeats.append(columns[:, 3:])
             begins.append(at)
             at += len(part)
-        J = np.column_stack([self._common, *nuisances])
+        free, known = np.column_stack([self._common, *nuisances]), np.column_stack(repeats)
         # Columns differ by orders of magnitude: scaled before the rank is decided.
-        J = J / np.maximum(np.linalg.norm(J, axis=0), 1e-12)
-        left = r - J @ np.linalg.lstsq(J, r, rcond=1e-9)[0]
+        free = free / np.maximum(np.linalg.norm(free, axis=0), 1e-12)
+        # A start's pushes have a size, the other nuisances none.
+        J = np.block([[free, known], [np.zeros((known.shape[1], free.shape[1])), np.eye(known.shape[1])]])
+        padded = np.concatenate([r, np.zeros(known.shape[1])])
+        left = padded - J @ np.linalg.lstsq(J, padded, rcond=1e-9)[0]
+        of_pushes = (left[len(r) :] ** 2).reshape(len(white), -1).sum(axis=1)
         last = [(b.p[-1] - a.p[-1]).ravel() for x, y in zip(self._base, other, strict=True)
                 for a, b in zip(x, y, strict=True)]  # fmt: skip
-        each = np.minimum(np.add.reduceat(left**2, begins), MOST**2)
+        each = np.minimum(np.add.reduceat(left[: len(r)] ** 2, begins) + of_pushes, MOST**2)
         return float(np.sqrt(each.sum())), float(np.sqrt(3 * np.mean(np.concatenate(last) ** 2)))
 
     def _white(self, other: list[list[_Looks]]) -> list[tuple[np.ndarray, int]]:
@@ -162,14 +183,22 @@ def _recorded(hidden: Hidden, run: Driven, gait: int) -> list[_Looks]:
     return found
 
 
-def _replayed(robot: Robot, hidden: Hidden, run: Driven, gait: int) -> list[_Looks]:
-    """Every interval of a run in another world, from its true start under its duties."""
+def _replayed(
+    robot: Robot, hidden: Hidden, run: Driven, gait: int, pushes: np.random.Generator | None = None
+) -> list[_Looks]:
+    """Every interval of a run in another world, from its true start under its duties. pushes: draws what a start is
+    pushed by."""
     body = body_of(robot, hidden, gait, run.gait.position, run.gait.heading)
     world = hidden.world(gait, run.gait.position, run.gait.heading)
     camera, late = world.seen(), world.seen().clock.stamp_delay_s
     found = []
     for t, moment, first in zip(_times(run), run.moments, run.starts, strict=True):
         body.restore(moment)
+        if pushes is not None:
+            rods = run.caps.shape[1] // 2
+            body.push(
+                PUSH_M_PER_S * pushes.standard_normal((rods, 3)), PUSH_RAD_PER_S * pushes.standard_normal((rods, 3))
+            )
         k, now = int(first), float(run.t[first])
         p, length = [], []
         for due in t:

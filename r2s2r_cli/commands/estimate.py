@@ -75,6 +75,8 @@ def estimate(
     executed = of is Of.EXECUTE
     source = place.artifact("recording", executed=executed)
     first = "r2s2r execute" if executed else "r2s2r import run.csv"
+    if not executed and place.artifact("recording", executed=True).exists():  # an iteration after the first
+        first = "r2s2r estimate --of execute"
     require_input(source, f"{first} --iteration {place.number}")
     header = whole_header(source)
     for reason in reasons(here, header, wanted_again(here, place, header.provenance)):

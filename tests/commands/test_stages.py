@@ -209,6 +209,15 @@ def test_a_wrong_override_names_the_right_one(estimated: Path, override: str, wo
     assert words in result.stderr
 
 
+def test_an_iteration_with_executed_runs_alone_is_told_of_them(project: Path) -> None:
+    """Nothing was recorded there, but its plan was executed: those runs are what can be estimated."""
+    (project / "iterations/002").mkdir(parents=True)
+    (project / "iterations/002/50-execute.h5").touch()
+    result = invoke("estimate")
+    assert result.exit_code == 4
+    assert "hint: r2s2r estimate --of execute --iteration 2" in result.stderr
+
+
 def test_an_override_is_remembered(estimated: Path) -> None:
     """What was made with --set is not stale for it, and is made again without it."""
     assert document("estimate", "--set", "estimate.contact_clearance_m=0.004", "--no-draw")["state"] == "done"

@@ -141,7 +141,7 @@ def boards_of(robot: Robot, body: Body, hidden: Hidden, gait: int) -> Boards:
     """The electronics of a body."""
     if isinstance(body, RigBody):
         return RigBoards(robot, body)
-    from r2s2r_cli.blind.make.engine_body import EngineBoards
+    from r2s2r_cli.blind.make.engine_boards import EngineBoards
 
     return EngineBoards(body, np.random.default_rng([hidden.seed, 15, gait]), len(robot.motors))
 

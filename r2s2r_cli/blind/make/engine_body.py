@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from r2s2r_cli.blind.make.engine_numbers import REEL_M_PER_S, engine_numbers
 from r2s2r_cli.blind.make.worlds import Hidden
 from r2s2r_cli.rig.effects.base import Law, Scene, overrides
 from r2s2r_cli.rig.model.frames import rotation
@@ -21,18 +22,16 @@ from schemas.robot import Robot
 if TYPE_CHECKING:
     import torch
 
-    from r2s2r_cli.blind.make.body import Body
     from r2s2r_cli.engine import Parameters
 
 STEP_S, HOLD = 5e-4, 2
 """Of the engine [s]; a winch turns every HOLD steps."""
-REEL_M_PER_S = 0.5
-"""What the engine's winches are told to be able to do: the rig's winches decide."""
-NOISE_SD_M = 0.0005
-"""Of a length reading."""
 SETTLE_S = 2.0
 CREEP_S = (0.6, 5.0)
-_HOOKS = ("command", "volts", "turn", "radius", "rest", "sense")
+_WINCH_AND_SENSE = frozenset({
+    "motor_dead_zone", "command_latency", "motor_lag", "motor_speed_mismatch", "battery_sag", "load_droop",
+    "spool_buildup", "backlash", "sensor_bias", "sensor_gain",
+})  # fmt: skip
 
 
 class EngineBody:
@@ -44,7 +43,7 @@ class EngineBody:
 
         self._robot, self._world, self._hidden = robot, world, hidden
         self._sim = _simulator(structure_of(robot), Simulator)
-        self._theta = _numbers(robot, hidden, world)
+        self._theta = engine_numbers(robot, hidden, world)
         self._mu = self._theta.friction
         self._rest0 = self._theta.rest
         self.winches = Winches(robot)
@@ -178,101 +177,10 @@ class EngineBody:
         return np.asarray(theta.stiffness[0].numpy()[winched] * np.maximum(stretch, 0.0))
 
 
-class EngineBoards:
-    """One board without a clock of its own: every reading is of now, with white noise."""
-
-    def __init__(self, body: Body, rng: np.random.Generator, motors: int) -> None:
-        self._body, self._rng, self._duty, self._t = body, rng, np.zeros(motors), 0.0
-
-    @property
-    def duty(self) -> np.ndarray:
-        """What the drivers have, (motor,)."""
-        return self._duty.copy()
-
-    def hear(self, t: float) -> None:
-        """Go on to t [s]."""
-        if t > self._t:
-            self._body.advance(t - self._t, self._duty)
-            self._t = t
-
-    def length(self) -> np.ndarray:
-        """Read now [m], (cable,)."""
-        length = self._body.sensed()
-        return length + NOISE_SD_M * self._rng.standard_normal(len(length))
-
-    def command(self, duty: np.ndarray) -> None:
-        """Set the drivers."""
-        self._duty = np.clip(duty, -1.0, 1.0)
-
-
-_WINCH_AND_SENSE = frozenset({
-    "motor_dead_zone", "command_latency", "motor_lag", "motor_speed_mismatch", "battery_sag", "load_droop",
-    "spool_buildup", "backlash", "sensor_bias", "sensor_gain",
-})  # fmt: skip
-
-
 def _simulator(structure: Any, kind: Any, kept: dict[Any, Any] = {}) -> Any:  # noqa: B006 - one a process, compiled once
     if structure not in kept:
         kept[structure] = kind(structure)
     return kept[structure]
-
-
-def _numbers(robot: Robot, hidden: Hidden, world: World) -> Parameters:
-    """The engine's numbers of the world: friction, and effects that are constant numbers."""
-    import torch
-
-    from r2s2r_cli.stages.model import parameters_of
-
-    theta = parameters_of(robot)
-    x = {name: getattr(theta, name).clone() for name in ("mass", "inertia", "p_BE", "p_BS", "cap_radius", "friction",
-                                                         "stiffness", "rest", "gravity")}  # fmt: skip
-    x["friction"] = torch.full_like(x["friction"], hidden.friction)
-    x["speed_in"] = x["speed_out"] = torch.full_like(theta.speed_in, REEL_M_PER_S)
-    x["rest_min"], x["rest_max"] = torch.full_like(theta.rest_min, 1e-3), torch.full_like(theta.rest_max, 1.0)
-    rods = torch.as_tensor(np.array([cable.caps for cable in robot.cables]) // 2)
-    effects = world.effects
-
-    def moved(rod: int, by: torch.Tensor) -> None:
-        """The centre of mass of a rod, frame R: points of the body are seen from it."""
-        x["p_BE"][0, rod] -= by
-        x["p_BS"][0][rods == rod] -= by
-
-    if effects.com_offset is not None:
-        moved(effects.com_offset.rod, torch.tensor(effects.com_offset.by_m, dtype=torch.float64))
-    if effects.payload is not None:
-        p = effects.payload
-        m, M = float(x["mass"][0, p.rod]), p.mass_kg
-        centre = 0.5 * (theta.p_BE[0, p.rod, 0] + theta.p_BE[0, p.rod, 1])
-        at = torch.tensor(p.at_m, dtype=torch.float64) + centre
-        by = M / (m + M) * at
-        for mass, d in ((m, -by), (M, at - by)):
-            x["inertia"][0, p.rod] += mass * (d @ d * torch.eye(3, dtype=torch.float64) - torch.outer(d, d))
-        x["mass"][0, p.rod] = m + M
-        moved(p.rod, by)
-    if effects.cap_friction is not None:
-        x["friction"] = x["friction"] * _padded(effects.cap_friction.factors, robot.n_caps, 1.0).reshape(1, -1, 2)
-    if effects.cap_radius is not None:
-        x["cap_radius"] = x["cap_radius"] + _padded(effects.cap_radius.by_m, robot.n_caps, 0.0).reshape(1, -1, 2)
-    if effects.tendon_stiffness is not None:
-        x["stiffness"] = x["stiffness"] * _padded(effects.tendon_stiffness.factors, len(robot.cables), 1.0)[None]
-    if effects.tendon_set is not None:
-        passive = [k for k, cable in enumerate(robot.cables) if cable.kind == "passive"]
-        x["rest"] = x["rest"] + _padded(effects.tendon_set.lengths_m, len(robot.cables), 0.0)[None, passive]
-    if effects.ground_slope is not None:
-        a = world.start.heading_rad
-        R = np.array([[np.cos(a), np.sin(a), 0.0], [-np.sin(a), np.cos(a), 0.0], [0.0, 0.0, 1.0]])
-        down = -np.array(effects.ground_slope.normal())
-        # The floor stays level and gravity leans against it: the camera is levelled on the floor.
-        g = float(np.linalg.norm(theta.gravity[0].numpy()))
-        lean = np.array([-down[0], -down[1], down[2]]) @ R.T
-        x["gravity"] = torch.as_tensor(g * lean / np.linalg.norm(lean))[None]
-    return theta.with_values(x)
-
-
-def _padded(values: tuple[float, ...], n: int, fill: float) -> torch.Tensor:
-    import torch
-
-    return torch.tensor([*values, *(fill,) * n][:n], dtype=torch.float64)
 
 
 def _field(p: Any, caps: np.ndarray) -> torch.Tensor:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.parity.finding import Element
+from r2s2r_cli.stages.diagnose.which.before import Healthy
 from r2s2r_cli.stages.diagnose.which.fit import Fits, Hypothesis
+from r2s2r_cli.stages.diagnose.which.line import Line
 from r2s2r_cli.stages.diagnose.which.linear import AMPLITUDE_SD, by_element, linear_gains
 from r2s2r_cli.stages.diagnose.which.mixture import FACTORS, minus_log, weight
 from r2s2r_cli.stages.diagnose.which.score import ENOUGH
@@ -62,6 +64,40 @@ def test_the_gain_is_that_of_a_fit_without_the_gait() -> None:
     beside = cost(J, np.diag([1.0, 1.0, AMPLITUDE_SD**-2.0]), np.append(z, 0.0))
     expected = np.clip(plain - beside, -ENOUGH, ENOUGH).sum()
     assert linear_gains(arena, base, [one])[0] == pytest.approx(expected, rel=1e-3)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("before", "now", "gains"), [(0.8, 0.8, False), (0.0, 0.8, True), (0.8, -0.4, True)])
+def test_what_the_healthy_runs_show_as_well_is_no_change(before: float, now: float, gains: bool) -> None:
+    """An amplitude that was there before makes up for the simulator; another one than before is what has gone wrong."""
+    arena, healthy = LinearArena(now), LinearArena(before, seed=7)
+    base, responses = begun(arena)
+    known = Healthy(healthy, begun(healthy)[0])  # type: ignore[arg-type]
+    right = next(one for one in responses if one.candidate.effect == "right")
+    alone = linear_gains(arena, base, [right])[0]  # type: ignore[arg-type]
+    found = linear_gains(arena, base, [right], known)[0]  # type: ignore[arg-type]
+    assert alone > 10
+    assert (found > 10) == gains and found <= alone
+    assert gains or found < 1
+
+
+def test_an_amplitude_is_that_of_least_squares() -> None:
+    """With the nuisances, all weights 1: of the closed form, with its sd."""
+    arena = LinearArena(0.6, noise=0.5)
+    base, responses = begun(arena)
+    one = responses[0]
+    line = Line(arena, base)  # type: ignore[arg-type]
+    change = line.changes([(one.candidate, np.array([1.0]))])[0]
+    M = len(arena.y)
+    assert change[:M] == pytest.approx(arena.B[:, 0])
+    value, sd = line.amplitude(one.candidate, change, 100.0)
+    kinds = weight(arena.squares(base.residual[None])[0], arena.logdets, arena.sizes)  # type: ignore[attr-defined]
+    w = np.repeat(kinds @ np.array(FACTORS) ** -2.0, EACH)
+    X = np.column_stack([arena.A, arena.B[:, 0]])
+    H = (X * w[:, None]).T @ X + np.diag([1.0, 1.0, 1e-4])
+    P = np.linalg.inv(H)
+    assert value == pytest.approx((P @ (X.T @ (w * arena.y)))[2], rel=1e-3)
+    assert sd == pytest.approx(np.sqrt(P[2, 2]), rel=1e-3)
+    assert abs(value - 0.6) < 4 * sd
 
 
 def test_gains_are_kept_by_element_and_the_unseen_have_none() -> None:

@@ -5,7 +5,7 @@ linearised problem, and `parity` times what the parity stage says for it; that o
 gains by chance, and `none`, and `equivalent` more where the equivalence test finds no gap; that of `unknown` a share
 (`unknown_share`) of what no effect explains, less `unknown`. Linear in 1 / temperature and the products with it, so the
 fit (a multinomial regression, biases drawn to 0) has one optimum. Thresholds come from probabilities of sets left out
-of the fit.
+of the fit. To commit to a name, to `none` and to `unknown` are claims of different weight: each has its own.
 """
 
 from __future__ import annotations
@@ -28,7 +28,11 @@ BEFORE_SD = (0.5, 0.5, 0.3, 2.0, 1.0, 2.0, 0.3)
 POSITIVE = ("sharpness", "linear", "parity", "unknown_share")
 FOLDS = 10
 COVER = 0.90
-PRECISION = 0.90
+PRECISION = {"commit": 0.90, "commit_none": 0.80, "commit_unknown": 0.75}
+"""How often a verdict that commits shall be right: to an effect, to `none`, to `unknown` (the reference, section 4, asks
+for 0.90 and 0.75)."""
+BELIEVED = 10.0
+"""Sets' worth of belief that probabilities are as often right as they say: few sets alone would set any threshold."""
 BIAS_SD = 0.5
 """Of a bias over the temperature: how much more often a name wins than its gains say, before anything is learned."""
 SHARPNESS = 1.0 / 15.0
@@ -93,7 +97,10 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
         "unknown": -learned["unknown"] / sharp,
         "unknown_share": learned["unknown_share"] * SHARPNESS / sharp,
         "bias": {name: float(b) / sharp for name, b in zip(effects, whole[len(LEARNED) :], strict=True)},
-        "commit": _commit(sure, right),
+        **{
+            key: _commit(sure[of], right[of], wanted)
+            for (key, wanted), of in zip(PRECISION.items(), _claims(first), strict=True)
+        },
         "conformal": float(held[k - 1]) if k else 0.0,
         "words": words,
         "sets": len(cases),
@@ -152,11 +159,19 @@ def _left_out(cases: Sequence[Case], effects: Sequence[str], fold: int) -> list[
     ]  # fmt: skip
 
 
-def _commit(sure: np.ndarray, right: np.ndarray) -> float:
-    """The least probability from which on the first guess was right in PRECISION of the sets; 1 where there is none."""
+def _claims(first: Sequence[str]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which first guesses are an effect, `none`, `unknown`, in the order of PRECISION, (set,) each."""
+    none, unknown = (np.array([one == name for one in first], dtype=bool) for name in (NONE, UNKNOWN))
+    return ~(none | unknown), none, unknown
+
+
+def _commit(sure: np.ndarray, right: np.ndarray, precision: float) -> float:
+    """The least probability from which on the first guess is right in this share of the sets, as these and BELIEVED
+    say; 1 where there is none."""
     order = np.argsort(-sure)
-    share = np.cumsum(right[order]) / np.arange(1, len(order) + 1)
-    good = np.flatnonzero(share >= PRECISION)
+    count = np.arange(1, len(order) + 1)
+    share = (np.cumsum(right[order]) + BELIEVED * np.cumsum(sure[order]) / count) / (count + BELIEVED)
+    good = np.flatnonzero(share >= precision)
     return float(sure[order[good[-1]]]) if len(good) else 1.0
 
 

@@ -22,9 +22,10 @@ class Calibration:
     temperature [nats]: of the softmax over names. linear: nats of gain that a nat of a linear gain is worth; parity:
     the same of the parity stage, which needs no simulator and errs far less. none, equivalent [nats]: what `none`
     gains, and more where the equivalence test finds no gap. unknown_share, unknown [nats]: what `unknown` has of what
-    no effect explains, and what that must exceed. bias [nats]: of a name, what its gains are short of. commit:
-    probability from which one name is given. conformal: names whose probability is at least this are in the 90 % set.
-    words: where it comes from; sets: how many it rests on, 0 for the defaults.
+    no effect explains, and what that must exceed. bias [nats]: of a name, what its gains are short of. commit,
+    commit_none, commit_unknown: probability from which an effect, `none` or `unknown` is the verdict. conformal: names
+    whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many it rests on, 0
+    for the defaults.
     """
 
     temperature: float = 25.0
@@ -35,6 +36,8 @@ class Calibration:
     unknown: float = 25.0
     unknown_share: float = 0.3
     commit: float = 0.5
+    commit_none: float = 0.5
+    commit_unknown: float = 0.5
     conformal: float = 0.05
     bias: Mapping[str, float] = field(default_factory=dict)
     words: str = "uncalibrated: a temperature by hand"
@@ -50,6 +53,10 @@ class Calibration:
         if name == UNKNOWN:
             return self.unknown_share * gain - self.unknown
         return gain + self.linear * linear + self.parity * parity
+
+    def commits(self, name: str, probability: float) -> bool:
+        """Whether a first guess of this probability is a verdict."""
+        return probability >= {NONE: self.commit_none, UNKNOWN: self.commit_unknown}.get(name, self.commit)
 
     def probabilities(self, scores: Mapping[str, float]) -> dict[str, float]:
         """Softmax of scores [nats] by name."""

@@ -113,7 +113,7 @@ def _verdict(
     ranking: list[Ranked], calibration: Calibration, pair: tuple[str, ...] | None
 ) -> tuple[str, tuple[str, ...], float]:
     first = ranking[0]
-    if first.probability < calibration.commit:
+    if not calibration.commits(first.effect, first.probability):
         return "ambiguous", (), first.probability
     if first.effect == NONE:
         return "no_gap", (), first.probability

@@ -29,8 +29,8 @@ POSITIVE = ("sharpness", "linear", "parity", "unknown_share")
 FOLDS = 10
 COVER = 0.90
 PRECISION = {"commit": 0.90, "commit_none": 0.80, "commit_unknown": 0.75}
-"""How often a verdict that commits shall be right: to an effect, to `none`, to `unknown` (the reference, section 4, asks
-for 0.90 and 0.75)."""
+"""How often a verdict that commits shall be right: to an effect, to `none`, to `unknown` (the reference, section 4,
+asks for 0.90 and 0.75)."""
 BELIEVED = 10.0
 """Sets' worth of belief that probabilities are as often right as they say: few sets alone would set any threshold."""
 BIAS_SD = 0.5

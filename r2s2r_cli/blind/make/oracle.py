@@ -32,7 +32,7 @@ LOOK_S = 0.1
 """Between two instants that are compared."""
 STEP = 0.05
 """Relative change of friction and speed for their sensitivities."""
-PUSHES = 3
+PUSHES = 6
 """Of every interval's start, for the robot's repeatability."""
 PUSH_M_PER_S, PUSH_RAD_PER_S = 0.02, 0.1
 """Sd of a push in every coordinate of a rod: cables stop it within a twentieth of a second, a millimetre or a third of

@@ -1,4 +1,5 @@
-"""A blind set as what a diagnosis is made from: its logs go through import and estimate, as a user's would."""
+"""A blind set as what a diagnosis is made from: its logs go through import and estimate, as a user's would, and its
+pictures, where it has some, through the tracker."""
 
 from __future__ import annotations
 
@@ -8,10 +9,13 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.blind.recorded import SUFFIX, read_recording
 from r2s2r_cli.blind.split import FOLLOW
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, Run
 from r2s2r_cli.stages.estimate import estimate
+from r2s2r_cli.stages.estimate.camera_input import Pictures
 from r2s2r_cli.stages.floor.runs import sensed_run
 from r2s2r_cli.stages.identified import nominal
 from r2s2r_cli.stages.identify.data import Selection
@@ -74,17 +78,25 @@ def _robot(path: Path) -> Robot:
 
 
 def _runs(folder: Path, robot: Robot) -> tuple[Run, ...]:
-    logs = sorted(folder.glob("*.csv"), key=lambda path: (len(path.stem), path.stem))
+    logs = [path for path in folder.iterdir() if path.suffix in (".csv", SUFFIX)]
     found = []
-    for path in logs:
-        imported = import_source(path, robot=robot, format="trajectory_csv", rod_length_tolerance=ROD_TOLERANCE)
-        recording = merge_runs([imported])
-        states, _ = estimate(recording, robot, EstimateSettings(rod_length_tolerance=ROD_TOLERANCE))
+    for path in sorted(logs, key=lambda path: (len(path.stem), path.stem)):
+        recording, pictures = _recording(path, robot)
+        settings, name = EstimateSettings(rod_length_tolerance=ROD_TOLERANCE), path.stem
+        states, _ = estimate(recording, robot, settings, pictures=pictures)
         # Rows between frames are control ticks: commands as they were sent, not as frames found them.
-        caps = replace(run_data(recording, states, imported.name), sampled=False)
-        lengths = sensed_run(imported.name, recording, imported.name, robot)
-        found.append(Run(caps, lengths, gait=imported.name))
+        caps = replace(run_data(recording, states, name), sampled=False)
+        found.append(Run(caps, sensed_run(name, recording, name, robot), gait=name))
     return tuple(found)
+
+
+def _recording(path: Path, robot: Robot) -> tuple[ArtifactData, Pictures | None]:
+    """One run, named by its stem, and its pictures; None where the log brings the caps itself."""
+    if path.suffix == SUFFIX:
+        recorded = read_recording(path)
+        return recorded.data, recorded.pictures
+    imported = import_source(path, robot=robot, format="trajectory_csv", rod_length_tolerance=ROD_TOLERANCE)
+    return merge_runs([imported]), None
 
 
 def _complete(runs: tuple[Run, ...]) -> tuple[Selection, ...]:

@@ -81,6 +81,9 @@ def make(
     oracle: Annotated[
         bool, typer.Option("--oracle/--no-oracle", help="Compute how well each effect can be told; half of the time.")
     ] = True,
+    camera: Annotated[
+        bool, typer.Option("--camera", help="Pictures instead of caps, for our own tracker; 40 MB a gait.")
+    ] = False,
     executor: Executor = "local",
     workers: Workers = 1,
     json: JsonOption = False,
@@ -99,13 +102,17 @@ def make(
     if key.resolve().is_relative_to(out.resolve()):
         raise UsageError("the key lies in the bank that it locks", where="--key", expected=f"a file outside {out}",
                          received=str(key), hint=f"r2s2r blind make --key {out.name}.key {out}")  # fmt: skip
+    if camera and tier is Tier.A:
+        raise UsageError("tier A has no camera", where="--camera", expected="--tier B, the rig, which has one",
+                         received="--tier A", hint=f"r2s2r blind make --camera --key {key} {out}")  # fmt: skip
     if first is not None:
         _check_first(first, count, bank, console)
     asked = ["--out", str(out), "--key", str(key), "--bank", bank.value, "--tier", tier.value, "--count", str(count),
              "--commissioning", str(commissioning), "--observed", str(observed), "--executor", executor,
              "--workers", str(workers), *(["--effect", effect] if effect else []),
              *([] if first is None else ["--first", str(first)]),
-             *(["--gaits", str(gaits)] if gaits else []), *([] if oracle else ["--no-oracle"])]  # fmt: skip
+             *(["--gaits", str(gaits)] if gaits else []), *([] if oracle else ["--no-oracle"]),
+             *(["--camera"] if camera else [])]  # fmt: skip
     with console.progress("blind sets", count) as advance:
         make_sets(asked, advance)
     from r2s2r_cli.blind.index import read_index

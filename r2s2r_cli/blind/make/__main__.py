@@ -35,6 +35,7 @@ def _make(arguments: list[str]) -> int:
     parser.add_argument("--effect", choices=sorted(STARRED))
     parser.add_argument("--gaits", type=int)
     parser.add_argument("--no-oracle", action="store_true")
+    parser.add_argument("--camera", action="store_true")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--executor", default="local")
     given = parser.parse_args(arguments)
@@ -43,7 +44,8 @@ def _make(arguments: list[str]) -> int:
         # A key that is there belongs to a bank that was begun: go on with it.
         key = read_key(given.key) if given.key.exists() else new_key(given.key)
         asked = Asked(given.bank, given.count, given.out, key, given.first, given.commissioning, given.observed,
-                      given.effect, given.gaits, given.tier, not given.no_oracle)  # fmt: skip
+                      given.effect, given.gaits, given.tier, not given.no_oracle,
+                      given.camera)  # fmt: skip
         return make(asked, executor=given.executor, workers=given.workers)
 
     return _told(names, given.count)

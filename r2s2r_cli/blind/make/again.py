@@ -24,6 +24,7 @@ def world_of(label: dict[str, Any], *, where: str) -> Hidden:
         found = hidden(
             Bank(label["bank"]), int(label["seed"]), Kind(label["kind"]), effects=effects, gaits=gaits,
             commissioning=int(label["commissioning"]), tier=label["tier"],
+            camera=bool(label.get("camera", False)),
         )  # fmt: skip
         if _facts(found) == _told(label):
             return found
@@ -42,6 +43,7 @@ def _facts(world: Hidden) -> dict[str, Any]:
     strange = world.strange
     facts = {
         **{name: getattr(world, name) for name in _DRAWN},
+        **({"noise_m": None, "ar1": None} if world.camera else {}),
         "effects": [[one.id, one.table] for one in world.planted],
         "outside": None if strange is None else [strange[0], asdict(strange[1]), strange[2]],
     }

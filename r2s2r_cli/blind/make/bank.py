@@ -26,7 +26,7 @@ class Asked:
     """A bank. first: number of its first set; None: of a blind bank a secret one that the key decides, else 0, so that
     nobody can make its worlds again who has not the key. commissioning: runs of the healthy robot a set. observed:
     which draw of the camera's noise. effect: its single sets all have this effect; None: any of the first release.
-    gaits: of every set; None: 3, 5 or 8 by chance. tier: A, our engine; B, the rig.
+    gaits: of every set; None: 3, 5 or 8 by chance. tier: A, our engine; B, the rig. camera: sets have pictures.
     """
 
     bank: Bank
@@ -40,6 +40,7 @@ class Asked:
     gaits: int | None = None
     tier: Literal["A", "B"] = "B"
     oracle: bool = True
+    camera: bool = False
 
 
 def worlds(asked: Asked) -> tuple[Hidden, ...]:
@@ -53,7 +54,7 @@ def worlds(asked: Asked) -> tuple[Hidden, ...]:
     effects = () if asked.effect is None else (asked.effect,)
     return tuple(
         hidden(asked.bank, seed, kind, commissioning=asked.commissioning, gaits=asked.gaits, tier=asked.tier,
-               effects=effects if kind.value == "single" else ())
+               effects=effects if kind.value == "single" else (), camera=asked.camera)
         for seed, kind in zip(own, drawn, strict=True)
     )  # fmt: skip
 
@@ -83,11 +84,14 @@ def _check_world(asked: Asked, world: Hidden, name: str) -> None:
     path = sealed(asked.out, name)
     data = path.read_bytes()
     label = labels.opened(data, asked.key, labels.commitment_of(data, asked.key), where=str(path))
-    there, wanted = (label["seed"], label["observed"]), (world.seed, asked.observed)
+    seen = {False: "caps", True: "pictures"}
+    there = (label["seed"], label["observed"], seen[label.get("camera", False)])
+    wanted = (world.seed, asked.observed, seen[asked.camera])
+    words = "world {} under noise {} in {}"
     if there != wanted:
         raise UsageError(
             "the folder holds sets of another bank", where=str(path),
-            expected="world {} under noise {}".format(*wanted), received="world {} under noise {}".format(*there),
+            expected=words.format(*wanted), received=words.format(*there),
             hint=f"r2s2r blind make --key {asked.out.name}-2.key {asked.out}-2   # a shard, a folder, a key",
         )  # fmt: skip
 

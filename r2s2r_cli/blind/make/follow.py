@@ -21,9 +21,8 @@ from r2s2r_cli.blind.index import digest, read_index
 from r2s2r_cli.blind.make.again import world_of
 from r2s2r_cli.blind.make.bank import sealed, write_list, write_set
 from r2s2r_cli.blind.make.drive import Gait, drive, random_gait
-from r2s2r_cli.blind.make.observe import seen
 from r2s2r_cli.blind.make.worlds import Hidden
-from r2s2r_cli.blind.make.write import write_run
+from r2s2r_cli.blind.make.write import write_seen
 from r2s2r_cli.blind.seam import each, open_executor
 from r2s2r_cli.blind.split import FOLLOW
 from r2s2r_cli.errors import InputError
@@ -88,8 +87,7 @@ def drive_later(world: Hidden, robot: Robot, which: str, targets: Targets, folde
     number = NUMBERS[which]
     run = drive(robot, world, gait, number, exposures=world.rate_hz, phase=phase)
     noise = np.random.default_rng([world.seed, 14, observed, number, seed])
-    camera = world.world(number, gait.position, gait.heading).seen()
-    write_run(folder, run, seen(run, camera, world, noise), robot)
+    write_seen(folder, run, world, number, robot, noise)
 
 
 def _one(job: tuple[Followed, str, str, str]) -> None:

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from r2s2r_cli.blind.make.drive import Driven, drive, random_gait
-from r2s2r_cli.blind.make.observe import seen
 from r2s2r_cli.blind.make.onset import onset
 from r2s2r_cli.blind.make.oracle import Detectable, detectability
 from r2s2r_cli.blind.make.worlds import Hidden
-from r2s2r_cli.blind.make.write import robot_text, write_run
+from r2s2r_cli.blind.make.write import robot_text, write_seen
 from schemas.robot import Robot
 
 
@@ -40,8 +39,7 @@ def make_set(hidden: Hidden, folder: Path, *, observed: int = 0, oracle: bool = 
             number = i if part == "gaits" else 32 + i
             run = drive(robot, world, gait, number, exposures=hidden.rate_hz, phase=float(gaits.random()))
             noise = np.random.default_rng([hidden.seed, 14, observed, number])
-            camera = world.world(number, gait.position, gait.heading).seen()
-            write_run(folder / part, run, seen(run, camera, world, noise), robot)
+            write_seen(folder / part, run, world, number, robot, noise)
             runs += [run] if part == "gaits" else []
     found = detectability(robot, hidden, runs) if oracle and _wrong(hidden) else None
     return label(hidden, runs, found, observed)
@@ -53,7 +51,10 @@ def label(hidden: Hidden, runs: list[Driven], found: Detectable | None, observed
     return {
         "bank": hidden.bank.value, "seed": hidden.seed, "tier": hidden.tier, "kind": hidden.kind.value,
         "observed": observed, "factor": hidden.factor, "friction": hidden.friction, "speed": hidden.speed,
-        "tolerance": hidden.tolerance, "noise_m": hidden.noise_m, "ar1": hidden.ar1, "rate_hz": hidden.rate_hz,
+        "tolerance": hidden.tolerance, "camera": hidden.camera,
+        # Of pictures the tracker says what their noise is, and the maker does not know it.
+        "noise_m": None if hidden.camera else hidden.noise_m, "ar1": None if hidden.camera else hidden.ar1,
+        "rate_hz": hidden.rate_hz,
         "gaits": hidden.gaits,
         "commissioning": hidden.commissioning,
         "effects": [

@@ -1,4 +1,5 @@
-"""A set on disk: robot.toml, gaits/ and commissioning/ as trajectory CSVs with sidecars. No world, seed or label."""
+"""A set on disk: robot.toml, gaits/ and commissioning/ as trajectory CSVs with sidecars, or as recordings with
+pictures. No world, seed or label."""
 
 from __future__ import annotations
 
@@ -6,9 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from r2s2r_cli.artifact import Group, Scalar
 from r2s2r_cli.blind.make.drive import OFFSET_F, SLOPE_F_PER_M, Driven
-from r2s2r_cli.blind.make.observe import Seen
+from r2s2r_cli.blind.make.film import film
+from r2s2r_cli.blind.make.observe import Seen, seen
+from r2s2r_cli.blind.make.worlds import Hidden
+from r2s2r_cli.blind.recorded import SUFFIX, write_recording
 from r2s2r_cli.stages.init.robots import robot_toml
+from r2s2r_cli.stages.segments import segments, target_intervals
 from schemas.robot import Robot
 
 ROBOT = "threebar"
@@ -28,6 +34,37 @@ def robot_text(tolerance: float) -> str:
     for sensor in facts["sensors"]:  # type: ignore[union-attr]
         sensor["slope_f_per_m"], sensor["offset_f"] = SLOPE_F_PER_M, OFFSET_F  # type: ignore[index]
     return tomlkit.dumps(facts)
+
+
+def write_seen(
+    folder: Path, run: Driven, hidden: Hidden, number: int, robot: Robot, rng: np.random.Generator
+) -> None:  # fmt: skip
+    """What the camera of a hidden world makes of a run, and what the host wrote down meanwhile. number: of the gait in
+    its set, 0-based; rng: of the camera's noise."""
+    camera = hidden.world(number, run.gait.position, run.gait.heading).seen()
+    if hidden.camera:
+        folder.mkdir(parents=True, exist_ok=True)
+        streams = _streams(run, robot) | {"camera": film(run, camera, robot, rng)}
+        write_recording(folder / f"{run.gait.name}{SUFFIX}", streams)
+    else:
+        write_run(folder, run, seen(run, camera, hidden, rng), robot)
+
+
+def _streams(run: Driven, robot: Robot) -> dict[str, Group]:
+    """What the host knows at its ticks, as the streams of a recording."""
+    pid = robot.pid
+    facts: dict[str, Scalar] = {
+        "origin": "rig", "nature": "simulated", "source": SOURCE, "robot": robot.name, "pid_p": pid.p, "pid_i": pid.i,
+        "pid_d": pid.d, "pid_tolerance": pid.tolerance, "pid_min_length": pid.min_length_m, "pid_range": pid.range_m,
+    }  # fmt: skip
+    intervals = target_intervals(run.t, run.target, control=run.control)
+    return {
+        "": Group(attributes=facts),
+        "commands": Group({"t": run.t, "target": run.target, "control": run.control}),
+        "sensors": Group({"t": run.t, "length": run.length, "cable": np.arange(run.length.shape[1])}),
+        "intervals": intervals.to_group(),
+        "segments": segments(intervals, run.t, run.control).to_group(),
+    }
 
 
 def write_run(folder: Path, run: Driven, seen: Seen, robot: Robot) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import resources
 
 import numpy as np
@@ -13,6 +13,10 @@ from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN
 
 FILE = "calibration.json"
 """Beside this module; made by the calibration run of the blind trials, and frozen before any blind set exists."""
+
+ABSOLUTE = 0.25
+"""Of what a nat of the parity stage is worth, where there are no healthy runs: that was learned on differences from
+runs of the same robot, and how far robots are from their robot.toml is known far less well. By hand."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,11 @@ class Calibration:
         if name == UNKNOWN:
             return self.unknown_share * gain - self.unknown
         return gain + self.linear * linear + self.parity * parity
+
+    def absolute(self) -> Calibration:
+        """For a diagnosis without healthy runs."""
+        words = f"{self.words}; those had healthy runs, here are none: findings of the parity stage count for less"
+        return replace(self, parity=ABSOLUTE * self.parity, words=words)
 
     def commits(self, name: str, probability: float) -> bool:
         """Whether a first guess of this probability is a verdict."""

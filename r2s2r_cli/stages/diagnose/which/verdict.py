@@ -66,7 +66,7 @@ def concluded(m: Material) -> Which:
         Ranked(UNKNOWN, m.unexplained, probability[UNKNOWN]),
     ]
     ranking.sort(key=lambda one: (-one.probability, -one.gain))
-    verdict, effects, p = _verdict(ranking, calibration, pair)
+    verdict, effects, p = verdict_of(ranking, calibration, pair, m.chance)
     top = best.get(effects[0]) if effects else None
     return Which(
         verdict=verdict, effects=effects, probability=p, set90=calibration.within(probability), ranking=tuple(ranking),
@@ -109,11 +109,14 @@ def _channel(name: str) -> str:
     return next(str(effect.channel) for effect in CATALOGUE if effect.name == name)
 
 
-def _verdict(
-    ranking: list[Ranked], calibration: Calibration, pair: tuple[str, ...] | None
+def verdict_of(
+    ranking: list[Ranked], calibration: Calibration, pair: tuple[str, ...] | None, chance: float
 ) -> tuple[str, tuple[str, ...], float]:
+    """What the first of the ranking is worth. A cause predicts: an effect that gains no more in the replay than the
+    best of the catalogue does by chance is not named, whatever the parity stage says."""
     first = ranking[0]
-    if not calibration.commits(first.effect, first.probability):
+    predicts = first.gain > chance or first.effect in (NONE, UNKNOWN, *NO_REPLAY)
+    if not (predicts and calibration.commits(first.effect, first.probability)):
         return "ambiguous", (), first.probability
     if first.effect == NONE:
         return "no_gap", (), first.probability

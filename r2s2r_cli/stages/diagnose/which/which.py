@@ -77,6 +77,7 @@ def compare_effects(
     can be simulated.
     """
     ways = ways or Ways()
+    calibration = calibration if healthy is not None else calibration.absolute()
     made = candidates(arena.model, sizes, touched(arena), arena.values(base.z[None])[0])
     known = [one for one in made if effects is None or one.effect in effects]
     told("screening", 0, 1)

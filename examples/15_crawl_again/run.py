@@ -77,6 +77,9 @@ def redrawn(source: Path, estimate: Path, to: Path, seed: int) -> None:
         writer = csv.DictWriter(out, rows[0].keys())
         writer.writeheader()
         writer.writerows(rows)
+    sidecar = source.with_suffix(".toml").read_text("utf-8")
+    again = sidecar.replace('source = "', f'source = "noise drawn anew with seed {seed}; ')
+    to.with_suffix(".toml").write_text(again, "utf-8")
 
 
 def line(name: str, report: dict[str, Any]) -> str:

@@ -27,6 +27,7 @@ def crawl(folder: Path) -> tuple[Path, Path, np.ndarray]:
         writer.writerow(["t_s", *names, "target0", "control0"])
         for k in range(FRAMES):
             writer.writerow([2.0 + t[k], *caps[k].ravel(), 0.25, -1 + k % 3])
+    (folder / "crawl.toml").write_text('robot = "threebar"\nsource = "a test"\n', "utf-8")
     with h5py.File(folder / "estimate.h5", "w") as file:
         file["runs/crawl/frames/p_WE"], file["runs/crawl/frames/t"] = caps[::2], t[::2]
         sd = np.full((6, 3), SD)
@@ -52,6 +53,7 @@ def test_only_the_noise_is_another_one(tmp_path: Path) -> None:
         example.redrawn(source, estimate, tmp_path / f"{seed}.csv", seed)
         caps, rest = read(tmp_path / f"{seed}.csv")
         assert rest == read(source)[1]
+        assert f'source = "noise drawn anew with seed {seed}; a test"' in (tmp_path / f"{seed}.toml").read_text("utf-8")
         assert np.linalg.norm(caps[:, 1::2] - caps[:, ::2], axis=-1) == pytest.approx(0.32, abs=2e-6)
         found.append(caps - truth)
     across = found[0][:-1, 2, 0]  # to the side of its rod: rigidity takes nothing off

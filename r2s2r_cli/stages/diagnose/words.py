@@ -9,6 +9,9 @@ from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN
 if TYPE_CHECKING:
     from r2s2r_cli.stages.diagnose.diagnosis import Diagnosis
 
+SPELLED = 4
+"""Names that a sentence holds; of more it says how many there are."""
+
 
 def sentence(found: Diagnosis) -> str:
     """`The gap is caused by payload at rod 1 (p = 0.93): with it ...`."""
@@ -37,6 +40,10 @@ def _verdict(found: Diagnosis) -> str:
         first, *others = [_named(name) for name in which.set90]
         if not others:
             return f"These runs do not decide: {first} is the likeliest (p = {which.probability:.2f})."
+        if len(which.set90) > SPELLED:
+            p = {one.effect: one.probability for one in which.ranking}
+            likely = ", ".join(f"{_named(name)} ({p.get(name, 0.0):.2f})" for name in which.set90[:3])
+            return f"These runs do not decide: {len(which.set90)} names remain, the likeliest {likely}."
         between = f"{', '.join([first, *others[:-1]])} and {others[-1]}"
         return f"These runs do not decide between {between} (best p = {which.probability:.2f})."
     if which.verdict == "pair":

@@ -51,6 +51,15 @@ def test_each_verdict_has_its_sentence(diagnosis: SimpleNamespace, begins: str, 
     assert holds in said
 
 
+def test_of_many_names_the_likeliest_are_said() -> None:
+    """And how many there are."""
+    names = ("payload", "none", "unknown", "backlash", "motor_lag")
+    ranking = [SimpleNamespace(effect=name, probability=0.5 - 0.1 * k) for k, name in enumerate(names)]
+    said = sentence(found("ambiguous", set90=names, ranking=ranking))  # type: ignore[arg-type]
+    wanted = "5 names remain, the likeliest payload (0.50), no gap (0.40), something unnamed (0.30)."
+    assert said.startswith(f"These runs do not decide: {wanted} On 2 held-out")
+
+
 def test_at_the_floor_there_is_no_share() -> None:
     """A refit error at the floor has nothing to close, and a run on both sides of the split is said."""
     one = found("effect")

@@ -116,11 +116,10 @@ class _Told:
         r = np.concatenate([part for part, _ in white])
         nuisances, repeats, begins, at = [], [], [], 0
         for pose, again, (part, cap_rows) in zip(self._own, self._repeats, white, strict=True):
-            columns = np.zeros((len(r), 3 + again.shape[1]))
-            columns[at : at + cap_rows, :3] = self._caps_white(pose)
-            columns[at : at + len(part), 3:] = again
-            nuisances.append(columns[:, :3])
-            repeats.append(columns[:, 3:])
+            own, pushed = np.zeros((len(r), 3)), np.zeros((len(r), again.shape[1]))
+            own[at : at + cap_rows], pushed[at : at + len(part)] = self._caps_white(pose), again
+            nuisances.append(own)
+            repeats.append(pushed)
             begins.append(at)
             at += len(part)
         free, known = np.column_stack([self._common, *nuisances]), np.column_stack(repeats)

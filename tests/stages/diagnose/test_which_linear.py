@@ -60,7 +60,8 @@ def test_the_gain_is_that_of_a_fit_without_the_gait() -> None:
 
     z = base.z  # type: ignore[attr-defined]
     plain = cost(arena.A, np.eye(2), z)
-    J = np.concatenate([arena.A, one.change[:M, None].astype(float)], axis=1)
+    change = Line(arena, base).changes([(one.candidate, one.size)])[0]  # type: ignore[arg-type]
+    J = np.concatenate([arena.A, change[:M, None]], axis=1)
     beside = cost(J, np.diag([1.0, 1.0, AMPLITUDE_SD**-2.0]), np.append(z, 0.0))
     expected = np.clip(plain - beside, -ENOUGH, ENOUGH).sum()
     assert linear_gains(arena, base, [one])[0] == pytest.approx(expected, rel=1e-3)  # type: ignore[arg-type]

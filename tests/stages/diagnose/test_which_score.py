@@ -84,7 +84,7 @@ def test_what_parity_speaks_for_is_fitted_at_its_element() -> None:
     def response(name: str, index: int | None, gain: float) -> Response:
         one = candidate(name, 0)
         element = None if index is None else Element("sensor", index)
-        return Response(replace(one, element=element), gain, one.scale, arena.mean, 9.0, 0.0, np.zeros(1), np.zeros(1))
+        return Response(replace(one, element=element), gain, one.scale, arena.mean, 9.0, 0.0, np.zeros(1))
 
     many = [response(f"e{k}", None, 50.0 - k) for k in range(FITTED + 2)]
     sensors = [response("sensor_bias", k, 5.0 - k) for k in range(4)]

@@ -20,8 +20,6 @@ from r2s2r_cli.stages.diagnose.which.score import groups_of
 
 POINTS = 4
 """Of the posterior, the base among them."""
-CHUNK = 16
-"""Responses simulated at a time, each at POINTS."""
 
 
 class Line:
@@ -44,17 +42,13 @@ class Line:
         self._g = np.array([J[rows].T @ (w[rows] * self.residual[rows]) for rows in self._rows])
 
     def changes(self, many: Sequence[tuple[Candidate, np.ndarray]]) -> np.ndarray:
-        """What candidates at their sizes change in the residuals, (candidate, M)."""
-        k, found = len(self._points), []
-        for first in range(0, len(many), CHUNK):
-            some = many[first : first + CHUNK]
-            values = np.concatenate([
-                self.solver.values(Hypothesis((one,)), self._points, np.repeat(size[None], k, axis=0))
-                for one, size in some
-            ])  # fmt: skip
-            there = self.arena.residuals(values, np.tile(self._points, (len(some), 1)))
-            found.append((there.reshape(len(some), k, -1) - self._at).mean(axis=1))
-        return np.concatenate(found) if found else np.zeros((0, len(self.residual)))
+        """What candidates at their sizes change in the residuals, (candidate, M), all simulated at once."""
+        k = len(self._points)
+        values = np.concatenate([
+            self.solver.values(Hypothesis((one,)), self._points, np.repeat(size[None], k, axis=0)) for one, size in many
+        ])  # fmt: skip
+        there = self.arena.residuals(values, np.tile(self._points, (len(many), 1)))
+        return np.asarray((there.reshape(len(many), k, -1) - self._at).mean(axis=1))
 
     def amplitude(self, one: Candidate, change: np.ndarray, sd: float) -> tuple[float, float]:
         """Of a change (M,), and its sd, nuisances fitted with it. sd: of its prior about 0."""

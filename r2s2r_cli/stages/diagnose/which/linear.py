@@ -18,10 +18,12 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.before import Healthy
 from r2s2r_cli.stages.diagnose.which.fit import Fit
-from r2s2r_cli.stages.diagnose.which.line import CHUNK, Line
+from r2s2r_cli.stages.diagnose.which.line import Line
 from r2s2r_cli.stages.diagnose.which.score import ENOUGH
 from r2s2r_cli.stages.diagnose.which.screen import Response
 
+CHUNK = 16
+"""Responses simulated at a time: white residuals of a long evidence are large."""
 AMPLITUDE_SD = 2.0
 """Of the size that the screening found best: how far the prior of an amplitude reaches from 0."""
 AGED = 0.1

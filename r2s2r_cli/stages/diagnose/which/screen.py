@@ -37,8 +37,6 @@ class Response:
     seen: float
     absorbed: float
     direction: np.ndarray
-    change: np.ndarray
-    """(M,): what the residuals change by at `size`, nuisances as they are."""
 
     @property
     def testable(self) -> bool:
@@ -66,7 +64,7 @@ def screen(arena: Arena, base: Fit, candidates: Sequence[Candidate]) -> tuple[Re
     Jn = base.jacobian[:, : len(base.z)]
     plain = _Projection(Jn, by_row, arena.precision)
     pull = arena.precision @ (base.z - arena.mean)
-    best: dict[int, tuple[float, np.ndarray, np.ndarray, np.ndarray]] = {}
+    best: dict[int, tuple[float, np.ndarray, np.ndarray]] = {}
     shown: dict[int, tuple[float, float, np.ndarray]] = {}
     for first in range(0, len(rows), CHUNK):
         some = rows[first : first + CHUNK]
@@ -92,12 +90,10 @@ def screen(arena: Arena, base: Fit, candidates: Sequence[Candidate]) -> tuple[Re
             gains = base.cost - data - unlikely(arena, z)
             k = int(np.argmax(gains))
             if i not in best or gains[k] > best[i][0]:
-                change = (along[k] - base.residual).astype(np.float32)
-                best[i] = (float(gains[k]), candidates[i].share(size, float(SHARES[k])), z[k], change)
+                best[i] = (float(gains[k]), candidates[i].share(size, float(SHARES[k])), z[k])
     found = []
-    nothing = np.zeros(len(base.residual), dtype=np.float32)
     for i, one in enumerate(candidates):
         length, share, direction = shown.get(i, (0.0, 0.0, np.zeros(len(base.residual))))
-        gain, size, z, change = best.get(i, (-np.inf, one.off, base.z, nothing))
-        found.append(Response(one, gain, size, z, length, share, direction.astype(np.float32), change))
+        gain, size, z = best.get(i, (-np.inf, one.off, base.z))
+        found.append(Response(one, gain, size, z, length, share, direction.astype(np.float32)))
     return tuple(sorted(found, key=lambda one: -one.gain))

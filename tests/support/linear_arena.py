@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -26,7 +27,7 @@ class LinearArena:
         self.lower, self.upper = np.full(2, -10.0), np.full(2, 10.0)
         self.by_nuisance = _kinds(self.A.T).T
         self.engine = [0, 1]
-        self.many = tuple(SimpleNamespace(run="a", interval=k + 1) for k in range(STRETCHES))
+        self.many = tuple(SimpleNamespace(run="a", interval=k + 1, caps=np.zeros((1, 1, 3))) for k in range(STRETCHES))
         self.whole = self.many
         self.gait = np.arange(STRETCHES) // 2
         self.white = [
@@ -44,13 +45,13 @@ class LinearArena:
         """Off."""
         return np.concatenate([z, np.zeros((len(z), 2))], axis=1)
 
-    def residuals(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
+    def residuals(self, values: np.ndarray, z: np.ndarray, only: object = None) -> np.ndarray:
         """White under each kind, (k, kind M)."""
         return _kinds(values[:, :2] @ self.A.T + values[:, 2:] @ self.B.T - self.y)
 
-    def keys(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
+    def keys(self, values: np.ndarray, z: np.ndarray, only: Sequence[int]) -> np.ndarray:
         """Key frames of one cap."""
-        return np.zeros((len(z), STRETCHES, 1, 3))
+        return np.zeros((len(z), len(only), 1, 3))
 
     def squares(self, residual: np.ndarray) -> np.ndarray:
         """By stretch and kind."""

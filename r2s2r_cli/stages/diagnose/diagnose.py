@@ -90,7 +90,8 @@ def diagnose(
         again=settings.refit_baseline, with_floor=settings.with_floor,
     )  # fmt: skip
     compared = compare_effects(
-        fitted.arena, fitted.base, floor_m=fitted.floor.rmse, calibration=settings.calibration or calibration(),
+        fitted.arena, fitted.base, floor_m=fitted.floor.rmse, kept=fitted.floor.kept,
+        calibration=settings.calibration or calibration(),
         sizes={} if said is None else said.starts(), told_by=None if said is None else said.nats(),
         effects=settings.effects, seed=settings.seed, told=progress,
         ways=Ways(settings.held_out, settings.with_unknown), healthy=fitted.healthy,

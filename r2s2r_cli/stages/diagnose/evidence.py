@@ -38,12 +38,14 @@ class Run:
 @dataclass(frozen=True)
 class FloorGiven:
     """What remains of a gap when nothing is wrong. rmse: key-frame cap RMSE [m]; sensor: the part of it that noise
-    explains [m]; words: where it comes from; given: False where it was estimated from the diagnosed runs themselves."""
+    explains [m]; words: where it comes from; given: False where it was estimated from the diagnosed runs themselves.
+    kept: share of the intervals, the best ones, that it was taken from."""
 
     rmse: float
     sensor: float
     words: str
     given: bool = True
+    kept: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from r2s2r_cli.stages.diagnose.which.before import Healthy
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.pieces import pieces
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
+from r2s2r_cli.stages.diagnose.which.score import groups_of, scores
 from r2s2r_cli.stages.diagnose.which.stretches import stretches
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.measures.floor import floor_of
@@ -93,12 +94,11 @@ def refit(
         healthy, begin = Healthy(arena, base), base.z[: arena.shared]
         if evidence.floor is None:
             sensor = float(np.sqrt(np.mean([np.sum(one.noise[-1] ** 2, axis=-1).mean() for one in arena.whole])))
-            ends = Fits(arena)
-            key = arena.keys(ends.values(base.hypothesis, base.z[None], np.zeros((1, 0))), base.z[None])[0]
-            squared = np.sum(key**2, axis=-1).mean(axis=-1)
+            (own,) = scores(arena, [base], groups_of(arena))
+            squared = own.squared[np.isfinite(own.squared)]
             usual = squared[squared <= np.quantile(squared, KEPT)]
             rmse = float(np.sqrt(np.mean(usual)))
-            floor = FloorGiven(rmse, min(sensor, rmse), "the healthy runs, refitted", True)
+            floor = FloorGiven(rmse, min(sensor, rmse), "the healthy runs, each predicted by the others", True, KEPT)
         told("healthy runs", 1, 1)
     arena, base = _fitted(evidence.runs, evidence.fit, replayer, simulator, noise, prior, starts, begin, told)
     if not again:

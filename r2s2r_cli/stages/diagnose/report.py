@@ -52,8 +52,13 @@ def document(found: Diagnosis) -> dict[str, Any]:
     names = ("verdict", "effects", "probability", "set90", "ranking", "where", "shrinkage", "not_testable",
              "confusable", "next_gait", "sentence", "floor_m", "refit_rmse_m", "refit_upper_m", "chance_nats",
              "calibrated", "rollouts")  # fmt: skip
-    return {**{name: told[name] for name in names}, "unexplained": _finite(found.which.unexplained, -1e9),
-            "wider": found.which.wider}  # fmt: skip
+    left = found.which.left
+    return {
+        **{name: told[name] for name in names},
+        "unexplained": _finite(found.which.unexplained, -1e9), "wider": found.which.wider,
+        "left_nats": _finite(left.best, 1e9), "gap_nats": _finite(left.refit, 1e9),
+        "left_sd_nats": _finite(left.sd, 1e9),
+    }  # fmt: skip
 
 
 def _where(found: Diagnosis) -> WhereFound:

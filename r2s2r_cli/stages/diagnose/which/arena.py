@@ -110,23 +110,33 @@ class Arena:
         """Data of every stretch, (stretch,)."""
         return np.array([white.size for white in self.white], dtype=float)
 
-    def residuals(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
+    def residuals(self, values: np.ndarray, z: np.ndarray, only: Sequence[int] | None = None) -> np.ndarray:
         """Residuals (k, M), simulated minus observed, white under each kind of error, at values (k, n) of the model,
-        with the shifts of z."""
-        return whitened(self.white, self.raw(values, z))
+        with the shifts of z. only: places of the stretches that are simulated, whole intervals; the others' are 0."""
+        raw = self.raw(values, z, only)
+        if only is None:
+            return whitened(self.white, raw)
+        found = np.zeros((len(values), self.by_nuisance.shape[0]))
+        for k, one in zip(only, raw, strict=True):
+            for kind in self.white[k].kinds:
+                found[:, kind.rows] = kind.white(one)
+        return found
 
-    def raw(self, values: np.ndarray, z: np.ndarray) -> list[np.ndarray]:
-        """Residuals as they are, of every stretch (k, channel, F) [m]: caps by axis, then sensors; at most LOST_M."""
-        seen = self.replayer.seen(self.many, values)
-        found = [self._residual(k, seen[k], z) for k in range(len(self.many))]
+    def raw(self, values: np.ndarray, z: np.ndarray, only: Sequence[int] | None = None) -> list[np.ndarray]:
+        """Residuals as they are, of every stretch (k, channel, F) [m]: caps by axis, then sensors; at most LOST_M.
+        only: places of those that are asked for."""
+        only = range(len(self.many)) if only is None else only
+        seen = self.replayer.seen([self.many[k] for k in only], values)
+        found = [self._residual(k, one, z) for k, one in zip(only, seen, strict=True)]
         return [np.clip(np.nan_to_num(one, nan=LOST_M), -LOST_M, LOST_M) for one in found]
 
-    def keys(self, values: np.ndarray, z: np.ndarray) -> np.ndarray:
+    def keys(self, values: np.ndarray, z: np.ndarray, only: Sequence[int] | None = None) -> np.ndarray:
         """Simulated minus observed caps [m] at the ends of whole target intervals, the key frames, (k, interval, cap,
-        3)."""
-        seen = self.replayer.seen(self.whole, values)
-        caps = np.stack([s.caps[:, -1] - one.caps[-1] for s, one in zip(seen, self.whole, strict=True)], axis=1)
-        columns = np.array([self._camera_columns(one.caps[-1]) for one in self.whole])
+        3). only: places of the intervals in `whole`."""
+        whole = self.whole if only is None else [self.whole[k] for k in only]
+        seen = self.replayer.seen(whole, values)
+        caps = np.stack([s.caps[:, -1] - one.caps[-1] for s, one in zip(seen, whole, strict=True)], axis=1)
+        columns = np.array([self._camera_columns(one.caps[-1]) for one in whole])
         camera = z[:, len(self.engine) : len(self.engine) + len(CAMERA)]
         return np.asarray(caps + np.einsum("kq,sqci->ksci", camera, columns))
 

@@ -7,13 +7,14 @@ for the simulator does so in the healthy runs as well; what has gone wrong since
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
-from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, unlikely
+from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis, unlikely
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
+from r2s2r_cli.stages.diagnose.which.rough import DRAWS, around, root_of
 from r2s2r_cli.stages.diagnose.which.score import ENOUGH
 
 
@@ -36,42 +37,59 @@ def chronic(arena: Arena, healthy: Healthy | None, fits: Sequence[Fit]) -> np.nd
 
 def before(healthy: Healthy, fits: Sequence[Fit]) -> np.ndarray:
     """Log density of the healthy runs with each fit's effects at the fitted sizes over that without them, nuisances
-    following linearly, (fit,) [nats]."""
+    following linearly, (fit,) [nats]. All of them are simulated at a few points close together (`rough`)."""
     arena, base = healthy.arena, healthy.base
     if not fits:
         return np.zeros(0)
     solver = Fits(arena)
     weights = solver.likely(base) ** 2
-    own = _pieces(arena, base.residual[None])[0]
+    root = root_of(solver.normal(base)[0])
+    nominal = replace(base, hypothesis=Hypothesis(), x=np.zeros(0))
+    own = _costs(solver, [nominal], base, base.z[None], root)[0][0]
     z0 = np.repeat(base.z[None], len(fits), axis=0)
-    there = arena.residuals(_values(solver, fits, z0), z0)
-    z1 = np.array([_followed(solver, base, fit, residual, weights) for fit, residual in zip(fits, there, strict=True)])
-    after = arena.residuals(_values(solver, fits, z1), z1)
-    stayed, moved = (_gain(arena, own, base.z, z, r) for z, r in ((z0, there), (z1, after)))
-    return np.maximum(stayed, moved)
-
-
-def _values(solver: Fits, fits: Sequence[Fit], z: np.ndarray) -> np.ndarray:
-    return np.concatenate([
-        solver.values(fit.hypothesis, one[None], fit.x[None]) for fit, one in zip(fits, z, strict=True)
+    there, residuals = _costs(solver, fits, base, z0, root)
+    z1 = np.array([
+        _followed(solver, base, fit, residual, weights) for fit, residual in zip(fits, residuals, strict=True)
     ])  # fmt: skip
+    after, _ = _costs(solver, fits, base, z1, root)
+    return np.maximum(_gain(arena, own, base.z, z0, there), _gain(arena, own, base.z, z1, after))
+
+
+def _costs(
+    solver: Fits, fits: Sequence[Fit], base: Fit, z: np.ndarray, root: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Minus log densities of the pieces (fit, piece) with the nuisances about z (fit, p + q), and mean residuals
+    (fit, M)."""
+    arena = solver.arena
+    points = np.array([around(one, root, arena.lower, arena.upper) for one in z])
+    flat = points.reshape(-1, z.shape[1])
+    values = np.concatenate([
+        solver.values(fit.hypothesis, own, np.repeat(fit.x[None], DRAWS, axis=0))
+        for fit, own in zip(fits, points, strict=True)
+    ])  # fmt: skip
+    found = arena.residuals(values, flat).reshape(len(fits), DRAWS, -1)
+    for fit, residual, own in zip(fits, found, points, strict=True):
+        residual -= (own - own[0]) @ _derivatives(solver, base, fit).T
+    costs = minus_log(arena.squares(found.reshape(len(flat), -1)), arena.logdets, arena.sizes)
+    return np.asarray(costs.reshape(len(fits), DRAWS, -1).mean(axis=1)), found.mean(axis=1)
+
+
+def _derivatives(solver: Fits, base: Fit, fit: Fit) -> np.ndarray:
+    """By the nuisances (M, p + q), 0 by those that the fit's effects set."""
+    J = base.jacobian[:, : len(base.z)].copy()
+    J[:, solver.overruled(fit.hypothesis)] = 0.0
+    return J
 
 
 def _followed(solver: Fits, base: Fit, fit: Fit, residual: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Nuisances of the healthy runs after one Gauss-Newton step with the effect there."""
     arena = solver.arena
-    J = base.jacobian[:, : len(base.z)].copy()
-    J[:, solver.overruled(fit.hypothesis)] = 0.0
+    J = _derivatives(solver, base, fit)
     normal = (J * weights[:, None]).T @ J + arena.precision
     pull = J.T @ (weights * residual) + arena.precision @ (base.z - arena.mean)
     return np.clip(base.z - np.linalg.solve(normal, pull), arena.lower, arena.upper)
 
 
-def _pieces(arena: Arena, residuals: np.ndarray) -> np.ndarray:
-    """Minus log densities, (hypothesis, piece)."""
-    return np.asarray(minus_log(arena.squares(residuals), arena.logdets, arena.sizes))
-
-
-def _gain(arena: Arena, own: np.ndarray, z_own: np.ndarray, z: np.ndarray, residuals: np.ndarray) -> np.ndarray:
-    by_piece = np.clip(own[None] - _pieces(arena, residuals), -ENOUGH, ENOUGH).sum(axis=1)
+def _gain(arena: Arena, own: np.ndarray, z_own: np.ndarray, z: np.ndarray, costs: np.ndarray) -> np.ndarray:
+    by_piece = np.clip(own[None] - costs, -ENOUGH, ENOUGH).sum(axis=1)
     return np.asarray(by_piece + unlikely(arena, z_own[None]) - unlikely(arena, z))

@@ -16,7 +16,7 @@ from r2s2r_cli.stages.diagnose.which.candidates import Candidate
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log, weight
 
 ITERATIONS = 6
-LENGTHS = (1.0, 0.4, 0.1)
+LENGTHS = (1.0, 0.3)
 """Shares of a step that are tried together."""
 SECANT = 0.25
 """Of a number's scale: length of a secant."""
@@ -215,7 +215,7 @@ class Fits:
             missing = residuals[best] - fit.residual - fit.jacobian @ by
             fit.jacobian = fit.jacobian + np.outer(missing, unit / scale / (unit @ unit))
         fit.z, fit.x, fit.residual, fit.cost = z[best], x[best], residuals[best], float(costs[best])
-        fit.damping = max(1e-6, fit.damping / 3.0 if best < 2 else fit.damping * 3.0)
+        fit.damping = max(1e-6, fit.damping / 3.0 if best == 0 else fit.damping * 3.0)
         fit.ended = gain < LEAST_GAIN
 
     def _secants(self, fits: Sequence[Fit]) -> None:

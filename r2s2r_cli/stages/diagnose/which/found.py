@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from r2s2r_cli.stages.diagnose.parity.finding import Element
+from r2s2r_cli.stages.diagnose.which.left import Left
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap
 
 NONE, UNKNOWN = "none", "unknown"
@@ -71,7 +72,8 @@ class Which:
     """verdict: effect | pair | ambiguous | no_gap | unknown. effects: ids it commits to. probability: of them.
     set90: names that hold the truth with 90 %. ranking: best first. chance: gain that the best of the catalogue reaches
     by chance in one of twenty cases [nats]. wider: by how much the floor must grow to explain what the best effect
-    leaves. within: groups that were left out, in words. calibrated: where probabilities come from.
+    leaves; unexplained: what that gains [nats]. left: what today's runs cost more than healthy ones. within: groups
+    that were left out, in words. calibrated: where probabilities come from.
     """
 
     verdict: str
@@ -84,6 +86,7 @@ class Which:
     chance: float
     wider: float
     unexplained: float
+    left: Left
     confusable: tuple[tuple[str, str, float], ...]
     not_testable: tuple[str, ...]
     shifts: tuple[Shift, ...]

@@ -27,10 +27,11 @@ class Seen:
 
 
 def looked(
-    structure: Structure, theta: Parameters, flat: Tensor, many: Sequence[Stretch], behind: np.ndarray, *,
+    structure: Structure, theta: Parameters, flat: Tensor, rows: Tensor, many: Sequence[Stretch], behind: np.ndarray, *,
     every: float, cable_caps: Sequence[tuple[int, int]], up: float,
 ) -> list[Seen]:  # fmt: skip
-    """What is seen of each stretch, from the states (k stretch, stored, NS), which are `every` seconds apart.
+    """What is seen of each stretch, from the states (row, stored, NS), which are `every` seconds apart; rows
+    (k stretch,): of each hypothesis and stretch.
 
     theta: batch k stretch, without the camera's delay; behind (k,) [s]: that delay. cable_caps: end caps of each cable,
     between which the sensors measure; up: height of the ground in the world [m].
@@ -45,12 +46,12 @@ def looked(
     one_robot = effective(structure, theta.map(lambda x: x[:1]))  # no effect moves the caps on a rod
     caps = end_caps(one_robot, unpack_state(structure, flat.flatten(0, 1))).unflatten(0, flat.shape[:2])
     ends = torch.as_tensor(cable_caps)
-    length = torch.linalg.vector_norm(caps[..., ends[:, 0], :] - caps[..., ends[:, 1], :], dim=-1)
+    length = torch.linalg.vector_norm(caps[..., ends[:, 0], :] - caps[..., ends[:, 1], :], dim=-1)[rows]
     begin = torch.as_tensor([one.window.start for one in many]).repeat(k)
     length = _read(structure, theta, length, begin[:, None] + every * torch.arange(stored))
     since = torch.as_tensor(_since(many)).repeat(k, 1)
     late = torch.as_tensor(behind).repeat_interleave(len(many))[:, None]
-    shown = between(caps, since / every)
+    shown = between(caps[rows], since / every)
     shown[..., 2] += up
     lengths = between(length, (since + late) / every).numpy()
     special = acting(structure, theta, "observation").unflatten(0, (k, len(many)))

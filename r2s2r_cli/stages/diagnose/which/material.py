@@ -10,6 +10,7 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.fit import Fit
+from r2s2r_cli.stages.diagnose.which.left import Left
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap
 from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.screen import Response
@@ -28,6 +29,7 @@ class Material:
     chance: float
     no_gap: NoGap
     wider: float
+    left: Left
     unexplained: float
     groups: np.ndarray
     calibration: Calibration

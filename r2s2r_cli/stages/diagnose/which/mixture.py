@@ -20,20 +20,20 @@ ENOUGH = 15.0
 def minus_log(squares: np.ndarray, logdet: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Cost (..., piece) [nats] of sums of squares (..., piece, kind) of numbers that are white under each kind. logdet
     (piece, kind): of its covariance; size (piece,): how many numbers are data."""
-    usual = _usual(logdet, size)
-    excess = density(squares, logdet) - usual
-    return np.asarray(usual + np.where(excess > 0, ENOUGH * np.log1p(np.maximum(excess, 0.0) / ENOUGH), excess))
+    at_least = usual(logdet, size)
+    excess = density(squares, logdet) - at_least
+    return np.asarray(at_least + np.where(excess > 0, ENOUGH * np.log1p(np.maximum(excess, 0.0) / ENOUGH), excess))
 
 
 def weight(squares: np.ndarray, logdet: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Weight of each kind in re-weighted least squares, (..., piece, kind): its probability, less for pieces that cost
     much."""
-    excess = density(squares, logdet) - _usual(logdet, size)
-    probability = np.exp(_terms(squares, logdet) + (excess + _usual(logdet, size))[..., None])
+    excess = density(squares, logdet) - usual(logdet, size)
+    probability = np.exp(_terms(squares, logdet) + (excess + usual(logdet, size))[..., None])
     return np.asarray(probability / (1.0 + np.maximum(excess, 0.0) / ENOUGH)[..., None])
 
 
-def _usual(logdet: np.ndarray, size: np.ndarray) -> np.ndarray:
+def usual(logdet: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Cost of a piece that errs as noise and floor say."""
     return np.asarray(0.5 * (size + logdet[..., 0]))
 

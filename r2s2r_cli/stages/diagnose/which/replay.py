@@ -10,6 +10,7 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.begins import TINY, between, carried, placed
 from r2s2r_cli.stages.diagnose.which.looks import Seen, looked
+from r2s2r_cli.stages.diagnose.which.motion import first_of_each
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.identify.commands import CommandLog
@@ -135,19 +136,21 @@ class Replayer(Predictor):
         rows = EVERY * (math.ceil(lasting / step / EVERY - TINY) + 1)
         own_delay = delay_of(structure, own)
         delays = np.zeros(k) if own_delay is None else own_delay.expand(k, 1)[:, 0].numpy()
-        u = self._commands_at(many, rows, delays + behind + late.command_delay + late.camera_delay)
-        self.rollouts += len(s0)
+        delays = delays + behind + late.command_delay + late.camera_delay
+        first, back = first_of_each(structure, own, s0, delays)
+        moved, all_of = _rows(first, len(many)), _rows(back, len(many))
+        u = self._commands_at(many, rows, delays[first])
+        self.rollouts += len(moved)
+        packed = pack_parameters(structure, theta).expand(len(s0), -1)[moved]
         n = self.simulator.substeps(theta, unpack_state(structure, s0), step)
         with torch.no_grad():
-            flat = self.simulator.advance(
-                s0, u, pack_parameters(structure, theta), h=step / n, hold=n, every=EVERY * n
-            )  # fmt: skip
+            flat = self.simulator.advance(s0[moved], u, packed, h=step / n, hold=n, every=EVERY * n)
             seen = looked(
-                structure, theta, flat, many, behind, every=EVERY * step, cable_caps=self.cable_caps,
+                structure, theta, flat, all_of, many, behind, every=EVERY * step, cable_caps=self.cable_caps,
                 up=late.ground_height,
             )  # fmt: skip
         lasted = torch.as_tensor([one.window.duration / (EVERY * step) for one in many], dtype=torch.float64)
-        last = between(flat, lasted.repeat(k)[:, None])[:, 0]
+        last = between(flat, lasted.repeat(len(first))[:, None])[all_of, 0]
         return [(one, last[i :: len(many)]) for i, one in enumerate(seen)]
 
     def _undelayed(self, own: Parameters, k: int) -> tuple[Parameters, np.ndarray]:
@@ -175,6 +178,13 @@ class Replayer(Predictor):
         if id(run) not in self._logs:
             self._logs[id(run)] = (run, CommandLog(run))  # the run is kept: no other one gets its id
         return self._logs[id(run)][1]
+
+
+def _rows(hypotheses: np.ndarray, stretches: int) -> Tensor:
+    """Rows of hypotheses in a batch (k stretch, ...)."""
+    import torch
+
+    return torch.as_tensor((hypotheses[:, None] * stretches + np.arange(stretches)).ravel())
 
 
 def _cat(parts: Sequence[Tensor]) -> Tensor:

@@ -34,9 +34,11 @@ class NoGap:
         return self.upper is not None and self.upper < EQUIVALENT * self.floor
 
 
-def no_gap(refit: Score, floor_m: float) -> NoGap:
-    """Of the refit nominal model."""
+def no_gap(refit: Score, floor_m: float, *, kept: float = 1.0) -> NoGap:
+    """Of the refit nominal model. kept: share of the intervals, the best ones, that the floor was taken from: the same
+    share counts here."""
     squared = refit.squared[np.isfinite(refit.squared)]
+    squared = squared[squared <= np.quantile(squared, kept)] if len(squared) else squared
     rmse = float(np.sqrt(squared.mean())) if len(squared) else float("inf")
     return NoGap(rmse, upper_bound(squared, level=0.90) if len(squared) else None, floor_m)
 

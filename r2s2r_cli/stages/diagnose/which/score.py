@@ -2,6 +2,7 @@
 
 Without a gait the numbers are where one Gauss-Newton step leads from the whole fit; the gait is then really simulated
 with them. The predictive covariance has noise, floor, starts and what the other gaits leave unsure of the numbers.
+It is simulated at a few points close together (`rough`), and a piece's log density is the mean of theirs.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.which.arena import LOST_M, Arena
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
+from r2s2r_cli.stages.diagnose.which.rough import DRAWS, around, root_of
+from r2s2r_cli.stages.diagnose.which.white import White
 
 ENOUGH = 12.0
 """[nats]"""
@@ -70,58 +73,79 @@ def groups_of(arena: Arena) -> np.ndarray:
     return np.array([places.index((one.run, one.interval)) for one in arena.many])
 
 
+@dataclass(frozen=True)
+class _Left:
+    """The numbers of a fit without a group: points (draw, n), their precision (n, n)."""
+
+    points: np.ndarray
+    precision: np.ndarray
+
+    @property
+    def away(self) -> np.ndarray:
+        """From the first point, (draw, n)."""
+        return np.asarray(self.points - self.points[0])
+
+
 def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: bool = True) -> list[Score]:
-    """Of every fit, all hypotheses and groups in one batch. held_out: False, nothing is left out (an ablation)."""
+    """Of every fit; all hypotheses in one batch for each group. held_out: False, nothing is left out (an ablation)."""
     solver = Fits(arena)
     names = np.unique(groups)
-    points, precisions = [], []
-    for fit in fits:
-        own, pull = solver.products(fit)
-        H, gradient = solver.normal(fit, (own, pull))
-        for name in names:
-            out = (groups == name) & held_out
-            P = np.linalg.pinv(H - own[out].sum(axis=0), hermitian=True)
-            points.append(_placed(arena, fit, P @ (pull[out].sum(axis=0) - gradient)))
-            precisions.append(H - own[out].sum(axis=0))
-    values = np.concatenate([
-        solver.values(fits[i // len(names)].hypothesis, z[None], x[None]) for i, (z, x) in enumerate(points)
-    ])  # fmt: skip
-    nuisances = np.array([z for z, _ in points])
-    white, key = arena.residuals(values, nuisances), arena.keys(values, nuisances)
-    return [
-        _score(arena, fit, groups, names, points[rows], precisions[rows], white[rows], key[rows], solver)
-        for fit, rows in ((fit, slice(i * len(names), (i + 1) * len(names))) for i, fit in enumerate(fits))
-    ]
+    place = {(one.run, one.interval): groups[k] for k, one in enumerate(arena.many)}
+    of_whole = np.array([place[one.run, one.interval] for one in arena.whole])
+    products = [solver.products(fit) for fit in fits]
+    normals = [(*own, *solver.normal(fit, own)) for fit, own in zip(fits, products, strict=True)]
+    n, caps = len(fits), arena.whole[0].caps.shape[1]
+    elpd, misfit = np.full((n, len(groups)), -np.inf), np.full((n, len(groups)), np.inf)
+    key = np.full((n, len(of_whole), caps, 3), np.nan)
+    without: list[list[np.ndarray]] = [[] for _ in fits]
+    for name in names:
+        own, ends = np.flatnonzero(groups == name), np.flatnonzero(of_whole == name)
+        out = own if held_out else own[:0]
+        left = [
+            _without(arena, fit, H - by[out].sum(axis=0), pull[out].sum(axis=0) - gradient)
+            for fit, (by, pull, H, gradient) in zip(fits, normals, strict=True)
+        ]
+        values, z = _at(solver, fits, [one.points for one in left])
+        white = arena.residuals(values, z, own.tolist()).reshape(n, DRAWS, -1)
+        first = slice(None, None, DRAWS)
+        key[:, ends] = arena.keys(values[first], z[first], ends.tolist())
+        for i, (fit, one) in enumerate(zip(fits, left, strict=True)):
+            without[i].append(one.points[0])
+            for k in own:
+                elpd[i, k], misfit[i, k] = _piece(arena.white[k], fit.jacobian, white[i], one)
+    key[np.abs(key).max(axis=(2, 3)) > LOST_M] = np.nan
+    sds = [np.sqrt(np.maximum(np.diag(np.linalg.pinv(H, hermitian=True)), 0.0)) for _, _, H, _ in normals]
+    return [Score(elpd[i], misfit[i], key[i], sds[i], np.array(without[i])) for i in range(n)]
 
 
-def _placed(arena: Arena, fit: Fit, by: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    p = len(fit.z)
-    z = np.clip(fit.z + by[:p], arena.lower, arena.upper)
-    return z, np.clip(fit.x + by[p:], fit.hypothesis.stack("lower"), fit.hypothesis.stack("upper"))
+def _without(arena: Arena, fit: Fit, precision: np.ndarray, pull: np.ndarray) -> _Left:
+    """The step to the numbers without a group, and points about where it leads."""
+    root = root_of(precision)
+    middle = np.concatenate([fit.z, fit.x]) + root @ (root.T @ pull)
+    low = np.concatenate([arena.lower, fit.hypothesis.stack("lower")])
+    high = np.concatenate([arena.upper, fit.hypothesis.stack("upper")])
+    return _Left(around(middle, root, low, high), precision)
 
 
-def _score(
-    arena: Arena, fit: Fit, groups: np.ndarray, names: np.ndarray, points: Sequence[tuple[np.ndarray, np.ndarray]],
-    precisions: Sequence[np.ndarray], white: np.ndarray, key: np.ndarray, solver: Fits,
-) -> Score:  # fmt: skip
-    elpd, misfit = np.full(len(groups), -np.inf), np.full(len(groups), np.inf)
-    for k, own in enumerate(arena.white):
-        g = int(np.searchsorted(names, groups[k]))
-        squares = np.zeros(len(own.kinds))
-        logdet = own.logdet.copy()
-        for c, kind in enumerate(own.kinds):
-            r, J, without = white[g, kind.rows], fit.jacobian[kind.rows], precisions[g]
-            # Woodbury: r' (1 + J P J')^-1 r, in as many numbers as there are parameters.
-            inner = without + J.T @ J
-            along = J.T @ r
-            squares[c] = max(float(r @ r - along @ np.linalg.pinv(inner, hermitian=True) @ along), 0.0)
-            logdet[c] += float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(without)[1])
-        elpd[k] = -float(minus_log(squares, logdet, np.array(own.size)))
-        misfit[k] = squares[0] / own.size
-    place = {(one.run, one.interval): int(np.searchsorted(names, groups[k])) for k, one in enumerate(arena.many)}
-    ends = np.array([key[place[one.run, one.interval], k] for k, one in enumerate(arena.whole)])
-    ends[np.abs(ends).max(axis=(1, 2)) > LOST_M] = np.nan
-    H, _ = solver.normal(fit)
-    sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(H, hermitian=True)), 0.0))
-    without = np.array([np.concatenate(point) for point in points])
-    return Score(elpd, misfit, ends, sd, without)
+def _at(solver: Fits, fits: Sequence[Fit], points: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Values of the model and nuisances of all points of all fits, one fit after the other."""
+    z = [own[:, : len(fit.z)] for fit, own in zip(fits, points, strict=True)]
+    x = [own[:, len(fit.z) :] for fit, own in zip(fits, points, strict=True)]
+    values = [solver.values(fit.hypothesis, *both) for fit, *both in zip(fits, z, x, strict=True)]
+    return np.concatenate(values), np.concatenate(z)
+
+
+def _piece(white: White, jacobian: np.ndarray, residual: np.ndarray, left: _Left) -> tuple[float, float]:
+    """Log predictive density of a piece, and its misfit. jacobian (M, n); residual (draw, M)."""
+    squares, logdet = np.zeros((len(residual), len(white.kinds))), white.logdet.copy()
+    for c, kind in enumerate(white.kinds):
+        J = jacobian[kind.rows]
+        r = residual[:, kind.rows] - left.away @ J.T
+        # Woodbury: r' (1 + J P J')^-1 r, in as many numbers as there are parameters.
+        inner = left.precision + J.T @ J
+        along = r @ J
+        explained = np.sum((along @ np.linalg.pinv(inner, hermitian=True)) * along, axis=1)
+        squares[:, c] = np.maximum(np.sum(r**2, axis=1) - explained, 0.0)
+        logdet[c] += float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(left.precision)[1])
+    costs = minus_log(squares, logdet, np.array(white.size))
+    return -float(costs.mean()), float(np.median(squares[:, 0])) / white.size

@@ -73,7 +73,7 @@ def concluded(m: Material) -> Which:
         screened=tuple(
             Screened(r.candidate.effect, r.candidate.element, r.gain, r.absorbed, r.seen) for r in m.responses
         ),
-        no_gap=m.no_gap, chance=m.chance, wider=m.wider, unexplained=m.unexplained,
+        no_gap=m.no_gap, chance=m.chance, wider=m.wider, unexplained=m.unexplained, left=m.left,
         confusable=_confusable(m, [best[name] for name in sorted(names, key=lambda n: -names[n])[:4]]),
         not_testable=_not_testable(m.responses), shifts=() if top is None else _shifts(m, m.fits[top]),
         within=_left_out(m), calibrated=calibration.words, warnings=_warnings(m, [best[name] for name in names]),

@@ -13,6 +13,7 @@ from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.candidates import candidates
 from r2s2r_cli.stages.diagnose.which.fit import DAMPING, Fit, Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.found import Which
+from r2s2r_cli.stages.diagnose.which.left import expected, left
 from r2s2r_cli.stages.diagnose.which.linear import by_element, linear_gains
 from r2s2r_cli.stages.diagnose.which.material import Material
 from r2s2r_cli.stages.diagnose.which.rivals import WIDER, chance, no_gap
@@ -24,6 +25,8 @@ FITTED = 6
 """Effects that are fitted, of those with the highest linear gains."""
 ELEMENTS = 2
 """Elements of each that are fitted."""
+LOOKED_INTO = 3
+"""Elements of each of which linear gains are computed, the best of the screening."""
 SUSPECTED, LEAST_SAID = 3, 2.0
 """Effects that are fitted because the parity stage speaks for them, with so many nats at least."""
 PLACES = 8
@@ -34,6 +37,8 @@ FIRST = 2
 """Iterations of all starts of a hypothesis; the best one goes on."""
 POLISHED = 3
 """Fits that go on when all have ended."""
+PAIRED = 5
+"""Effects that are tried beside the best one."""
 SECOND = 3
 """Iterations after the floor was widened."""
 
@@ -65,11 +70,13 @@ class Compared:
 
 
 def compare_effects(
-    arena: Arena, base: Fit, *, floor_m: float, calibration: Calibration, sizes: Mapping[str, Mapping[str, float]],
-    told_by: Said | None = None, effects: Sequence[str] | None = None, seed: int = 0, told: Told,
+    arena: Arena, base: Fit, *, floor_m: float, kept: float = 1.0, calibration: Calibration,
+    sizes: Mapping[str, Mapping[str, float]], told_by: Said | None = None,
+    effects: Sequence[str] | None = None, seed: int = 0, told: Told,
     ways: Ways | None = None, healthy: Healthy | None = None,
 ) -> Compared:  # fmt: skip
-    """All effects against the refit nominal model `base` of this arena. floor_m: key-frame RMSE with nothing wrong.
+    """All effects against the refit nominal model `base` of this arena. floor_m: key-frame RMSE with nothing wrong, of
+    the share `kept` of the intervals.
     healthy: the runs of before; an effect that helps there as well makes up for the simulator.
 
     sizes, told_by: of the parity stage: sizes to begin with, and the nats that it says for an effect at an element: the
@@ -84,11 +91,15 @@ def compare_effects(
     responses = screen(arena, base, known)
     told("screening", 1, 1)
     groups = groups_of(arena)
-    nats = linear_gains(arena, base, responses, healthy)
-    responses = tuple(responses[i] for i in np.argsort(-nats, kind="stable"))
-    linear = by_element(responses, np.sort(nats)[::-1])
+    short = _short(responses, told_by or {})
+    nats = linear_gains(arena, base, short, healthy)
+    linear = by_element(short, nats)
+    short = [short[i] for i in np.argsort(-nats, kind="stable")]
+    taken = {id(one) for one in short}
+    responses = (*short, *(one for one in responses if id(one) not in taken))
     picked = _picked(responses, told_by or {})
     base, fits = _fitted(arena, base, picked, told)
+    at_least = expected(arena)
     wider, unexplained = _widened(arena, [base, *fits[:LOOKED_AT]]) if ways.unknown else (1.0, 0.0)
     if wider > 1.0:
         arena.whiten(floor_m=wider * arena.floor_m)
@@ -103,7 +114,8 @@ def compare_effects(
     told("left out", 1, 1)
     material = Material(
         arena=arena, base=base, refit=refit, fits=tuple(fits), scores=tuple(own), responses=responses,
-        chance=chance(arena, responses, groups, seed=seed), no_gap=no_gap(refit, floor_m), wider=wider,
+        chance=chance(arena, responses, groups, seed=seed), no_gap=no_gap(refit, floor_m, kept=kept), wider=wider,
+        left=left(at_least, refit, own, healthy),
         unexplained=unexplained if ways.unknown else -np.inf, groups=groups, calibration=calibration,
         chronic=old,
         asked=None if effects is None else tuple(effects), parity=told_by or {}, linear=linear,
@@ -139,6 +151,18 @@ def touched(arena: Arena) -> np.ndarray:
         away = np.min(np.linalg.norm(points[:, None] - np.array(kept)[None], axis=-1), axis=1)
         kept.append(points[int(np.argmax(away))])
     return np.array(kept)
+
+
+def _short(responses: Sequence[Response], told_by: Said) -> list[Response]:
+    """The first LOOKED_INTO elements of every effect, and those that the parity stage speaks for."""
+    count: dict[str, int] = {}
+    found = []
+    for one in responses:
+        name = one.candidate.effect
+        count[name] = count.get(name, 0) + 1
+        if count[name] <= LOOKED_INTO or told_by.get(name, {}).get(one.candidate.number, 0.0) >= LEAST_SAID:
+            found.append(one)
+    return found
 
 
 def _picked(responses: Sequence[Response], told_by: Said) -> list[Response]:
@@ -225,7 +249,7 @@ def _again(arena: Arena, old: Sequence[Fit]) -> list[Fit]:
 
 
 def _pairs(arena: Arena, base: Fit, fits: Sequence[Fit], gained: np.ndarray) -> list[Fit]:
-    """The best single effect with each other one that was fitted: where one effect leaves something, two may not.
+    """The best single effect with the next PAIRED ones: where one effect leaves something, two may not.
     gained (fit,): by each [nats]."""
     if len(fits) < 2:
         return []
@@ -235,7 +259,7 @@ def _pairs(arena: Arena, base: Fit, fits: Sequence[Fit], gained: np.ndarray) -> 
     seen: set[str] = set()
     points = []
     for other in others:
-        if other.hypothesis.effects[0] in seen:
+        if other.hypothesis.effects[0] in seen or len(seen) == PAIRED:
             continue
         seen.add(other.hypothesis.effects[0])
         both = Hypothesis((*first.hypothesis.parts, *other.hypothesis.parts))

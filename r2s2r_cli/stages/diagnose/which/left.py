@@ -1,0 +1,55 @@
+"""What hypotheses leave: how much worse today's pieces are predicted than those of healthy runs.
+
+Gains compare hypotheses with each other, and where all of them are wrong one of them still gains. What is left is an
+absolute number: a piece that noise and floor explain costs half its data, so what it costs beyond that is an error. A
+healthy robot's pieces cost something as well, because no floor is quite right: that is what is taken off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.before import Healthy
+from r2s2r_cli.stages.diagnose.which.mixture import usual
+from r2s2r_cli.stages.diagnose.which.score import Score, groups_of, scores
+
+
+@dataclass(frozen=True)
+class Left:
+    """Nats that the pieces cost beyond what as many of the healthy runs do. refit: under the refit nominal model; best:
+    each under the hypothesis that predicts it best. sd: of both, from how much pieces differ; nan for fewer than two
+    pieces."""
+
+    refit: float
+    best: float
+    sd: float
+
+
+def expected(arena: Arena) -> np.ndarray:
+    """What pieces cost where noise and floor explain them, (piece,) [nats]."""
+    return usual(arena.logdets, arena.sizes)
+
+
+def left(at_least: np.ndarray, refit: Score, others: Sequence[Score], healthy: Healthy | None) -> Left:
+    """Of scores without their groups. at_least: `expected` of the arena before its floor was widened. Without healthy
+    runs pieces are held to what noise and floor explain."""
+    own = -refit.elpd - at_least
+    best = -np.max([refit.elpd, *(one.elpd for one in others)], axis=0) - at_least
+    count = len(own)
+    usually, sd = 0.0, float(np.std(own, ddof=1)) * np.sqrt(count) if count > 1 else float("nan")
+    if healthy is not None:
+        then = healthy_excess(healthy)
+        usually = float(then.mean())
+        sd = count * float(np.std(then, ddof=1)) * np.sqrt(1 / count + 1 / len(then)) if len(then) > 1 else float("nan")
+    return Left(float(own.sum()) - count * usually, float(best.sum()) - count * usually, float(sd))
+
+
+def healthy_excess(healthy: Healthy) -> np.ndarray:
+    """What pieces of the healthy runs cost beyond what noise and floor explain, each predicted by the other groups,
+    (piece,) [nats]."""
+    (own,) = scores(healthy.arena, [healthy.base], groups_of(healthy.arena))
+    return np.asarray(-own.elpd - expected(healthy.arena))

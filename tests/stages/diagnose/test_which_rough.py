@@ -1,0 +1,107 @@
+"""What is rough is averaged, over points close together; and what all hypotheses leave is counted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.stages.diagnose.which.before import Healthy
+from r2s2r_cli.stages.diagnose.which.fit import Fits, Hypothesis
+from r2s2r_cli.stages.diagnose.which.left import expected, left
+from r2s2r_cli.stages.diagnose.which.rivals import no_gap
+from r2s2r_cli.stages.diagnose.which.rough import DRAWS, JITTER, around, root_of
+from r2s2r_cli.stages.diagnose.which.score import Score, gains, scores
+from tests.support.linear_arena import LinearArena, candidate
+
+
+class RoughArena(LinearArena):
+    """Every simulated number is off by luck that depends on the values in their last digits, `luck` sd in all."""
+
+    luck = 0.0
+
+    def residuals(self, values: np.ndarray, z: np.ndarray, only: object = None) -> np.ndarray:
+        """As of the linear arena, and luck."""
+        found = super().residuals(values, z)
+        for row, own in zip(found, values, strict=True):
+            seed = np.abs(np.round(own * 1e6)).astype(int)
+            row += self.luck * np.random.default_rng(seed).standard_normal(len(row))
+        return found
+
+
+def test_points_lie_about_the_middle_within_bounds() -> None:
+    """The first is the middle; the others have the sd that was asked for, by the covariance's root."""
+    precision = np.array([[4.0, 1.0], [1.0, 9.0]])
+    root = root_of(precision)
+    assert root @ root.T == pytest.approx(np.linalg.inv(precision))
+    far = np.full(2, 1e9)
+    points = around(np.array([1.0, 2.0]), root, -far, far)
+    drawn = np.linalg.solve(root, (points[1:] - points[0]).T) / JITTER
+    assert points.shape == (DRAWS, 2) and points[0] == pytest.approx([1.0, 2.0])
+    assert 0.2 < np.abs(drawn).mean() < 2.0
+    inside = around(np.array([1.0, 2.0]), root, np.array([1.0, 0.0]), far)
+    assert inside[:, 0].min() == 1.0
+
+
+def test_luck_is_worth_less_than_in_one_simulation() -> None:
+    """The same hypothesis twice, at numbers a millionth apart: what one gains over the other is luck. It is less than
+    half of what single simulations make of it, over twelve arenas."""
+
+    def apart(seed: int) -> tuple[float, float]:
+        arena = RoughArena(0.0, seed=seed)
+        arena.luck = 0.5
+        solver = Fits(arena)  # type: ignore[arg-type]
+        fits = []
+        for by in (0.0, 1e-5):
+            z = np.full((1, 2), by)
+            residual = arena.residuals(arena.values(z), z)[0]
+            fits.append(solver.begin(Hypothesis(), z[0], np.zeros(0), residual))
+        one, other = scores(arena, fits, arena.gait)  # type: ignore[arg-type]
+        single = [arena.squares(fit.residual[None])[0, :, 0].sum() for fit in fits]
+        return float(one.elpd.sum() - other.elpd.sum()), 0.5 * float(single[1] - single[0])
+
+    averaged, single = np.array([apart(seed) for seed in range(12)]).T
+    assert averaged.std() < 0.5 * single.std()
+    assert np.isfinite(averaged).all()
+
+
+def test_what_is_left_is_what_no_hypothesis_explains() -> None:
+    """Linear: the right effect leaves nothing beyond the healthy rate, the refit model leaves what the effect gains,
+    and something along neither effect is left by both."""
+
+    def of(arena: LinearArena, healthy: Healthy) -> tuple[float, float, float]:
+        solver = Fits(arena)  # type: ignore[arg-type]
+        fits = []
+        for hypothesis in (Hypothesis(), Hypothesis((candidate("right", 0),))):
+            x = np.zeros(len(hypothesis.parts))
+            residual = arena.residuals(solver.values(hypothesis, np.zeros((1, 2)), x[None]), np.zeros((1, 2)))[0]
+            fits.append(solver.begin(hypothesis, np.zeros(2), x, residual))
+        solver.run(fits)
+        refit, own = scores(arena, fits, arena.gait)  # type: ignore[arg-type]
+        found = left(expected(arena), refit, [own], healthy)  # type: ignore[arg-type]
+        assert found.refit - found.best >= gains(refit, [own])[0] - 1e-6
+        return found.refit, found.best, found.sd
+
+    well = LinearArena(0.0, seed=5)
+    solver = Fits(well)  # type: ignore[arg-type]
+    begun = solver.begin(Hypothesis(), np.zeros(2), np.zeros(0), well.residuals(np.zeros((1, 4)), np.zeros((1, 2)))[0])
+    solver.run([begun])
+    healthy = Healthy(well, begun)  # type: ignore[arg-type]
+    refit, best, sd = of(LinearArena(0.8), healthy)
+    assert refit > 3 * sd > abs(best)
+    strange = LinearArena(0.0, seed=1)
+    strange.y = strange.y + np.random.default_rng(9).standard_normal(len(strange.y))
+    refit, best, sd = of(strange, healthy)
+    assert best > 3 * sd and refit - best < 0.3 * best
+
+
+def test_equivalence_counts_the_share_that_the_floor_was_taken_from() -> None:
+    """One interval of twelve in which the robot fell decides neither the floor nor the test."""
+    rng = np.random.default_rng(1)
+    key = rng.normal(0, 0.005 / np.sqrt(3), (40, 6, 3))
+    key[0] = 0.1
+    one = Score(np.zeros(40), np.ones(40), key, np.zeros(1), np.zeros((1, 1)))
+    assert not no_gap(one, 0.005).equivalent
+    assert no_gap(one, 0.005, kept=0.9).equivalent
+    assert not no_gap(replace(one, key=2.0 * key), 0.005, kept=0.9).equivalent

@@ -10,7 +10,7 @@ SHELL := bash
 ROOT := $(shell cd "$$(dirname "$$(printf %s '$(MAKEFILE_LIST)' | sed 's/^ //')")" && pwd -P)
 HERE := $(shell pwd -P)
 
-GOALS := help demo test test-slow lint docs check clean iterate status
+GOALS := help demo test test-slow test-soak lint docs check clean iterate status
 .PHONY: $(GOALS)
 
 ifneq ($(ROOT),$(HERE))
@@ -45,6 +45,9 @@ test: $(VENV)/.dev-stamp  ## the test suite, without the slow tests
 
 test-slow: $(VENV)/.dev-stamp  ## the slow tests: kills while writing, damaged files, malformed inputs
 	@$(PY) -m pytest $(PYTEST_FLAGS) -m slow
+
+test-soak: $(VENV)/.dev-stamp  ## what is killed and damaged at random, in full numbers (an hour): before a release
+	@R2S2R_SOAK=1 $(PY) -m pytest $(PYTEST_FLAGS) -m slow -k "killed or mutants or mutated or damaged" tests/store tests/commands
 
 lint: $(VENV)/.dev-stamp  ## style, types, import layers
 	@failed=; \

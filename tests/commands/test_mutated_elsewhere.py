@@ -18,6 +18,7 @@ from tests.commands.conftest import invoke
 from tests.support.builders import same
 from tests.support.make_golden import GOLDEN
 from tests.support.mutate import KINDS_OF_DAMAGE, mutate
+from tests.support.soak import drawn
 
 FILES = sorted(GOLDEN.glob("*.h5"))
 
@@ -79,9 +80,9 @@ def test_reading_mutants(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(10))
-def test_reading_a_thousand_mutants(tmp_path: Path, seed: int) -> None:
-    """The same of a thousand, a hundred a seed."""
+@pytest.mark.parametrize("seed", range(drawn(3, 10)))
+def test_reading_many_mutants(tmp_path: Path, seed: int) -> None:
+    """The same of 300, in a soak test of a thousand, a hundred a seed."""
     check_reading(tmp_path, 100, seed=200 + seed)
 
 
@@ -91,9 +92,9 @@ def test_inspecting_and_exporting_mutants(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(drawn(1, 4)))
 def test_inspecting_and_exporting_many_mutants(tmp_path: Path, seed: int) -> None:
-    """The same of a hundred, 25 a seed, to tables as well."""
+    """The same of 25, in a soak test of a hundred, 25 a seed, to tables as well."""
     check_commands(tmp_path, 25, 300 + seed, ("inspect",), ("export", "--to", "npz"), ("export", "--to", "csv"))
 
 
@@ -121,5 +122,5 @@ def test_a_damaged_artifact_in_its_place(estimated: Path, tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_many_damaged_artifacts_in_their_place(estimated: Path, tmp_path: Path) -> None:
-    """The same of thirty."""
-    check_pipeline(estimated, tmp_path, 30, seed=14)
+    """The same of ten, in a soak test of thirty."""
+    check_pipeline(estimated, tmp_path, drawn(10, 30), seed=14)

@@ -22,10 +22,11 @@ from tests.store.test_seal import check_rows
 from tests.support import recorder
 from tests.support.builders import same, simulation
 from tests.support.nursery import Nursery
+from tests.support.soak import drawn
 from tests.support.versions import current, write_toy
 
 Check = Callable[[Path, dict], None]
-MANY, FEW = 200, 12
+MANY, FEW = drawn(50, 200), 12
 ROWS = 300
 
 
@@ -145,8 +146,8 @@ def test_killed_at_random_moments(nursery: Nursery, tmp_path: Path, job: str) ->
 
 @pytest.mark.slow
 @pytest.mark.parametrize("job", CHECKS)
-def test_killed_at_two_hundred_random_moments(nursery: Nursery, tmp_path: Path, job: str) -> None:
-    """The same with 200 kills each."""
+def test_killed_at_many_random_moments(nursery: Nursery, tmp_path: Path, job: str) -> None:
+    """The same with 50 kills each, in a soak test 200."""
     kill_at_random(nursery, tmp_path, job, MANY)
 
 

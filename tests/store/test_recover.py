@@ -23,6 +23,7 @@ from tests.store.conftest import Copy
 from tests.support import recorder
 from tests.support.builders import same
 from tests.support.mutate import KINDS_OF_DAMAGE, mutate
+from tests.support.soak import drawn
 
 Damage = Callable[[bytearray, int], None]
 
@@ -224,11 +225,11 @@ def test_recovering_mutated_artifacts_loses_nothing(tmp_path: Path, golden: Copy
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(drawn(2, 5)))
 def test_recovering_many_mutated_artifacts_loses_nothing(
     tmp_path: Path, golden: Copy, reader: IsolatedReader, seed: int
 ) -> None:
-    """The same of 500, a hundred a seed."""
+    """The same of 200, in a soak test 500, a hundred a seed."""
     fuzz(tmp_path, golden, reader, 100, seed=50 + seed)
 
 

@@ -100,6 +100,9 @@ class PublishedDiagnosis(Frozen):
     confusable: tuple[tuple[str, str, float], ...] = ()
     parity: tuple[str, ...] = ()
     chance_nats: float
+    gap_nats: float | None = None
+    left_nats: float | None = None
+    left_sd_nats: float | None = None
     refit_rmse_m: float | None = None
     refit_upper_m: float | None = None
     floor_m: float

@@ -138,6 +138,12 @@ class DiagnoseReport(Frozen):
     """Upper 90 % bound; below 1.25 floor there is no gap."""
     chance_nats: float
     """What the best of the catalogue gains by chance in one case of twenty."""
+    gap_nats: float | None = None
+    """What today's pieces cost beyond as many of the healthy runs, under the refit nominal model."""
+    left_nats: float | None = None
+    """The same, each piece under the hypothesis that predicts it best: what no effect explains."""
+    left_sd_nats: float | None = None
+    """Sd of both, from how much pieces differ."""
     calibrated: str
     left_out: str
     segments: tuple[SegmentFound, ...]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -39,26 +38,12 @@ def diagnose_report(found: Diagnosis) -> DiagnoseReport:
         confusable=tuple(one for one in which.confusable if math.isfinite(one[2])), next_gait=_next(found),
         robot=found.robot, floor_m=found.floor.rmse, floor_from=found.floor.words, floor_given=found.floor.given,
         refit_rmse_m=which.no_gap.rmse, refit_upper_m=which.no_gap.upper, chance_nats=which.chance,
+        gap_nats=_known(which.left.refit), left_nats=_known(which.left.best), left_sd_nats=_known(which.left.sd),
         calibrated=which.calibrated, left_out=which.within, segments=_segments(found),
         hidden=tuple(shift.words for shift in which.shifts), parity=_parity(found), missing=_missing(found),
         refit=found.refit, refit_units={name: _unit(name) for name in found.refit}, rollouts=found.rollouts,
         within_run=found.within_run, warnings=found.warnings,
     )  # fmt: skip
-
-
-def document(found: Diagnosis) -> dict[str, Any]:
-    """design.md section 5 as JSON values, and what else a score needs."""
-    told = diagnose_report(found).model_dump(mode="json")
-    names = ("verdict", "effects", "probability", "set90", "ranking", "where", "shrinkage", "not_testable",
-             "confusable", "next_gait", "sentence", "floor_m", "refit_rmse_m", "refit_upper_m", "chance_nats",
-             "calibrated", "rollouts")  # fmt: skip
-    left = found.which.left
-    return {
-        **{name: told[name] for name in names},
-        "unexplained": _finite(found.which.unexplained, -1e9), "wider": found.which.wider,
-        "left_nats": _finite(left.best, 1e9), "gap_nats": _finite(left.refit, 1e9),
-        "left_sd_nats": _finite(left.sd, 1e9),
-    }  # fmt: skip
 
 
 def _where(found: Diagnosis) -> WhereFound:
@@ -141,3 +126,7 @@ def _unit(name: str) -> str:
 
 def _finite(value: float, instead: float) -> float:
     return float(value) if np.isfinite(value) else instead
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -77,7 +77,7 @@ def execute(
     """Show what the policies of the plan do in the simulator, ask, then run them on the robot and keep all that comes.
 
     The same recorder, guard and emergency stop (the space bar) as `record`; put the robot to another place between
-    repeats. --dry-run ends after the simulated outcome.
+    repeats. --dry-run ends after the simulated outcome, whatever was executed before.
 
     Example: r2s2r execute straight --repeats 3 --port /dev/ttyUSB0 --camera realsense
     """  # fmt: skip
@@ -110,7 +110,8 @@ def execute(
         },
         seed=None, draw=draw, force=force, stage="execute", inputs=inputs,
     )  # fmt: skip
-    wish.recording().require_room(force=force)
+    if not dry_run:  # before the simulation, which takes its time
+        wish.recording().require_room(force=force)
     expect(here, place, runs, numbers, console)
     if dry_run:
         look(wish, console)

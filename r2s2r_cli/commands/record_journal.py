@@ -45,10 +45,22 @@ class Recording:
         """The artifact."""
         return self.iteration.artifact("recording", executed=self.stage == "execute")
 
+    def writer(self) -> str | None:
+        """Who records into this very file now; None: nobody."""
+        return writer(self.project.root) if journal_of(self.target).exists() else None
+
+    def refusal(self, *, force: bool) -> UsageError | None:
+        """Why nothing can be recorded here, as `require_room` raises it; None where there is room."""
+        try:
+            self.require_room(force=force)
+        except UsageError as error:
+            return error
+        return None
+
     def require_room(self, *, force: bool) -> None:
         """Raises UsageError where a recording is there: raw runs cannot be made again. force: it keeps another name."""
         journal = journal_of(self.target)
-        busy = writer(self.project.root) if journal.exists() else None
+        busy = self.writer()
         if busy is not None:
             raise UsageError("a recording is running in this iteration", where=self.project.relative(journal),
                              expected="one at a time", received=busy, hint="r2s2r status")  # fmt: skip

@@ -95,14 +95,21 @@ def carry_out(wish: Wish, console: Console) -> None:
 
 
 def look(wish: Wish, console: Console) -> None:
-    """--dry-run: the plan, and with a port what the sensors say; no motor moves, nothing is written."""
+    """--dry-run: the plan, and with a port what the sensors say; no motor moves, nothing is written.
+
+    What would be refused without --dry-run is said, not raised; a port is left alone while somebody records. Raises
+    HardwareError for a port that cannot be read.
+    """
     from r2s2r_cli.views.record_page import look_tables, plan_table
     from schemas.results import StageResult
 
     recording = wish.recording()
-    recording.require_room(force=wish.force)
+    refusal = recording.refusal(force=wish.force)
+    busy = recording.writer()
     tables = [plan_table(wish.runs, wish.robot)]
-    if wish.port:
+    if wish.port and busy is not None:  # opening its port would disturb it
+        console.warn(f"the sensors are not looked at: {busy} is recording")
+    elif wish.port:
         with _guarded(wish, dry_run=True) as link:
             end, sample = time.monotonic() + LOOK_S, None
             while time.monotonic() < end:
@@ -117,7 +124,12 @@ def look(wish: Wish, console: Console) -> None:
             reasons=("it was asked for",), inputs=(),
         )
     )  # fmt: skip
-    console.say(f"would write {wish.project.relative(recording.target)}; nothing moved")
+    if refusal is None:
+        console.say(f"would write {wish.project.relative(recording.target)}; nothing moved")
+        return
+    console.say("nothing moved")
+    console.warn(f"without --dry-run this would be refused: {refusal.what} ({refusal.where})")
+    console.hint(refusal.hint)
 
 
 def _guarded(wish: Wish, *, dry_run: bool) -> GuardedLink:

@@ -11,6 +11,7 @@ import pytest
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.commands.execute import _long
 from r2s2r_cli.stages.plan.view import far
+from r2s2r_cli.store.project import journal_of
 from r2s2r_cli.store.write import write_artifact
 from schemas.header import InputRef
 from tests.commands.conftest import invoke
@@ -75,3 +76,23 @@ def test_a_policy_of_another_robot_is_refused(project: Path, robot: str, target:
     refused = invoke("execute", "gait.toml", "--iteration", "1", "--dry-run")
     assert refused.exit_code == 4 and "policy gait is for another robot" in refused.stderr
     assert not list(project.rglob("50-*"))
+
+
+@pytest.mark.parametrize("cut_off", [False, True])
+def test_a_dry_run_shows_the_outcome_whatever_is_there(project: Path, cut_off: bool) -> None:
+    """Runs that were executed, or the journal of some: exit code 0, the outcome, what stands in the way of the robot
+    and not a byte changed. Without --dry-run it is refused."""
+    place = project / "iterations" / "001"
+    place.mkdir(parents=True)
+    (project / "gait.toml").write_text(GAIT.format(robot="threebar", target=[0.5] * 6))
+    there = journal_of(place / "50-execute.h5") if cut_off else place / "50-execute.h5"
+    there.write_bytes(b"runs")
+    asked = ("execute", "gait.toml", "--iteration", "1")
+    shown = invoke(*asked, "--dry-run")
+    assert shown.exit_code == 0, shown.stderr
+    assert "what the simulator expects" in shown.stderr and "gait" in shown.stdout
+    assert "without --dry-run this would be refused" in shown.stderr
+    assert ("r2s2r recover" if cut_off else "--force") in shown.stderr
+    assert [path.read_bytes() for path in place.iterdir()] == [b"runs"]
+    refused = invoke(*asked, "--port", "socket://h:1", "--yes")
+    assert refused.exit_code == 2 and "what the simulator expects" not in refused.stderr

@@ -2,7 +2,8 @@
 
 Gains compare hypotheses with each other, and where all of them are wrong one of them still gains. What is left is an
 absolute number: a piece that noise and floor explain costs half its data, so what it costs beyond that is an error. A
-healthy robot's pieces cost something as well, because no floor is quite right: that is what is taken off.
+healthy robot's pieces cost something as well, because no floor is quite right: that is what is taken off. A piece in
+which the robot fell at another instant costs any number of nats, so no piece says more than PIECE.
 """
 
 from __future__ import annotations
@@ -16,6 +17,9 @@ from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.before import Healthy
 from r2s2r_cli.stages.diagnose.which.mixture import usual
 from r2s2r_cli.stages.diagnose.which.score import Score, groups_of, scores
+
+PIECE = 10.0
+"""[nats]"""
 
 
 @dataclass(frozen=True)
@@ -37,8 +41,8 @@ def expected(arena: Arena) -> np.ndarray:
 def left(at_least: np.ndarray, refit: Score, others: Sequence[Score], healthy: Healthy | None) -> Left:
     """Of scores without their groups. at_least: `expected` of the arena before its floor was widened. Without healthy
     runs pieces are held to what noise and floor explain."""
-    own = -refit.elpd - at_least
-    best = -np.max([refit.elpd, *(one.elpd for one in others)], axis=0) - at_least
+    own = _bounded(-refit.elpd - at_least)
+    best = _bounded(-np.max([refit.elpd, *(one.elpd for one in others)], axis=0) - at_least)
     count = len(own)
     usually, sd = 0.0, float(np.std(own, ddof=1)) * np.sqrt(count) if count > 1 else float("nan")
     if healthy is not None:
@@ -52,4 +56,8 @@ def healthy_excess(healthy: Healthy) -> np.ndarray:
     """What pieces of the healthy runs cost beyond what noise and floor explain, each predicted by the other groups,
     (piece,) [nats]."""
     (own,) = scores(healthy.arena, [healthy.base], groups_of(healthy.arena))
-    return np.asarray(-own.elpd - expected(healthy.arena))
+    return _bounded(-own.elpd - expected(healthy.arena))
+
+
+def _bounded(nats: np.ndarray) -> np.ndarray:
+    return np.clip(nats, -PIECE, PIECE)

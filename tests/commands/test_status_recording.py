@@ -11,6 +11,7 @@ from r2s2r_cli.commands.status import survey
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.store.lock import writer, writing
 from r2s2r_cli.store.project import Project, journal_of
+from tests.commands.conftest import invoke
 
 
 @pytest.fixture
@@ -43,3 +44,17 @@ def test_a_journal_that_is_written_is_a_running_recording(bot: Project) -> None:
     assert not found.next.startswith("r2s2r recover")
     with pytest.raises(UsageError, match="cut off"):
         Recording(bot, bot.iteration(1), {}, {}, None).require_room(force=False)
+
+
+def test_a_dry_run_leaves_the_port_of_a_running_recording_alone(bot: Project, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It shows its plan and ends with exit code 0; opening the port could stop the robot of somebody else."""
+
+    def opened(*given: object, **how: object) -> None:
+        raise AssertionError("the port was opened")
+
+    monkeypatch.setattr("r2s2r_cli.hardware.open_link.open_link", opened)
+    with writing(bot.root, "record"):
+        shown = invoke("record", "--random", "2", "--port", "/dev/ttyUSB0", "--dry-run")
+    assert shown.exit_code == 0, shown.stderr
+    assert "random-0" in shown.stdout
+    assert "the sensors are not looked at" in shown.stderr and "a recording is running" in shown.stderr

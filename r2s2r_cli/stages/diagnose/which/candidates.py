@@ -14,8 +14,8 @@ from r2s2r_cli.stages.diagnose.which.numbers import Model
 
 KIND = {"rod": "rod", "cap": "cap", "cable": "cable", "actuated": "motor", "sensor": "sensor"}
 """Kind of the element, by what a parameter is counted `per`."""
-STEPS = (0.5, 1.5)
-"""Sizes, in scales of a number, at which responses are tried, to both sides of off."""
+STEP = 1.0
+"""Size, in scales of a number, at which responses are tried, to both sides of off; the screening looks at shares of it."""
 AZIMUTHS = 6
 """Directions in which the far end of something is tried."""
 SAME_AS_NUISANCE = ("motor_speed_mismatch", "cap_friction", "tendon_stiffness", "tendon_set")
@@ -152,8 +152,8 @@ def _tries(keys: Sequence[str], origin: np.ndarray, scale: np.ndarray, touched: 
     """Sizes: the numbers that do something alone, to both sides; with them, those that only say where or how."""
     shape = [k for k, key in enumerate(keys) if _only_shape(key, keys)]
     sizes = [k for k in range(len(keys)) if k not in shape]
-    rows = [origin + sign * step * scale * axis for k in sizes for axis in [np.eye(len(origin))[k]]
-            for step in STEPS for sign in (1.0, -1.0)]  # fmt: skip
+    axes = np.eye(len(origin))
+    rows = [origin + sign * STEP * scale * axes[k] for k in sizes for sign in (1.0, -1.0)]
     if 1 < len(sizes) <= 3:
         for signs in product((1.0, -1.0), repeat=len(sizes)):
             row = origin.copy()

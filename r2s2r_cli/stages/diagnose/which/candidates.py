@@ -15,7 +15,7 @@ from r2s2r_cli.stages.diagnose.which.numbers import Model
 KIND = {"rod": "rod", "cap": "cap", "cable": "cable", "actuated": "motor", "sensor": "sensor"}
 """Kind of the element, by what a parameter is counted `per`."""
 STEP = 1.0
-"""Size, in scales of a number, at which responses are tried, to both sides of off; the screening looks at shares of it."""
+"""Size, in scales of a number, at which responses are tried, to both sides of off; the screening takes shares of it."""
 AZIMUTHS = 6
 """Directions in which the far end of something is tried."""
 SAME_AS_NUISANCE = ("motor_speed_mismatch", "cap_friction", "tendon_stiffness", "tendon_set")

@@ -81,6 +81,7 @@ def execute(
 
     Example: r2s2r execute straight --repeats 3 --port /dev/ttyUSB0 --camera realsense
     """  # fmt: skip
+    from r2s2r_cli.commands.cameras import stored_camera
     from r2s2r_cli.commands.execute_outcome import expect
     from r2s2r_cli.commands.record_run import Wish, carry_out, look
     from r2s2r_cli.commands.stage import require_input
@@ -105,8 +106,9 @@ def execute(
         project=here, iteration=place, robot=robot, runs=runs, settings=settings, port=port or "",
         protocol=protocol.value, camera=camera, simulated=simulated, overrides=overrides,
         flags={
-            "policies": _stored(here, policies or ()), "port": port, "protocol": protocol.value, "camera": camera,
-            "repeats": repeats, "simulated": simulated, "model": None if numbers is None else here.relative(numbers),
+            "policies": _stored(here, policies or ()), "port": port, "protocol": protocol.value,
+            "camera": stored_camera(here, camera), "repeats": repeats, "simulated": simulated,
+            "model": None if numbers is None else here.relative(numbers),
         },
         seed=None, draw=draw, force=force, stage="execute", inputs=inputs,
     )  # fmt: skip

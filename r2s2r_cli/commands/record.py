@@ -97,6 +97,7 @@ def record(
 
     Example: r2s2r record --random 15 --repeats 3 --port /dev/ttyUSB0
     """
+    from r2s2r_cli.commands.cameras import stored_camera
     from r2s2r_cli.commands.record_run import Wish, carry_out, look
     from r2s2r_cli.commands.simulate_inputs import stored_names
     from r2s2r_cli.commands.stage import print_config, wanted
@@ -115,8 +116,9 @@ def record(
     settings = here.config(place, overrides).record
     runs = plans(chosen, repeats=repeats, rest=settings.rest_s)
     flags = {
-        "policies": stored_names(here, policies or ()), "port": port, "protocol": protocol.value, "camera": camera,
-        "random": random, "levels": levels, "excite": list(sets), "repeats": repeats, "simulated": simulated,
+        "policies": stored_names(here, policies or ()), "port": port, "protocol": protocol.value,
+        "camera": stored_camera(here, camera), "random": random, "levels": levels,
+        "excite": list(sets), "repeats": repeats, "simulated": simulated,
     }  # fmt: skip
     wish = Wish(
         project=here, iteration=place, robot=robot, runs=runs, settings=settings, port=port or "",

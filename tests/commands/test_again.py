@@ -176,6 +176,36 @@ def test_policies_are_named_from_the_project(sample: Path, monkeypatch: pytest.M
         assert asked(stage, "walk.toml", *more).flags["policies"] == ["policies/walk.toml"]
 
 
+@pytest.mark.parametrize(
+    ("typed", "kept"),
+    [
+        ("replay:films", "replay:policies/films"),
+        ("replay:../iterations/001/10-record.h5", "replay:iterations/001/10-record.h5"),
+        ("replay:../iterations/001/10-record.h5:walk", "replay:iterations/001/10-record.h5:walk"),
+        ("replay:{root}/policies/films/", "replay:policies/films"),
+        ("replay:.", "replay:policies"),
+        ("replay:../link", "replay:link"),
+        ("replay:../../elsewhere/films", "replay:{root.parent}/elsewhere/films"),
+        ("rig://127.0.0.1:9", "rig://127.0.0.1:9"),
+        ("realsense", "realsense"),
+    ],
+)
+def test_a_played_back_camera_is_found_from_the_project(
+    sample: Path, monkeypatch: pytest.MonkeyPatch, typed: str, kept: str
+) -> None:
+    """Typed in a folder of the project, in it or not, it comes back as it is typed in the project's directory: there
+    the command that makes the recording again asks for the same pictures. No path of this machine for what is in it."""
+    (sample.parent / "elsewhere" / "films").mkdir(parents=True)
+    (sample / "link").symlink_to(sample.parent / "elsewhere" / "films")
+    for stage, more in (("record", ("--port", "p", "--force")), ("execute", ("--port", "p", "--yes", "--force"))):
+        monkeypatch.chdir(sample / "policies")
+        one = asked(stage, "walk.toml", "--camera", typed.format(root=sample), *more)
+        assert one.flags["camera"] == kept.format(root=sample)
+        monkeypatch.chdir(sample)
+        confirmed = ["--yes"] if stage == "execute" else []
+        assert asked(*again(one, force=True), *confirmed).flags["camera"] == one.flags["camera"]
+
+
 def test_iterations_are_told_from_projects_by_where_they_lie(tmp_path: Path) -> None:
     """A project in a folder called 2026 is no iteration; a file named from within its iteration is of that."""
     made = builders.provenance(stage="floor", inputs=())

@@ -94,11 +94,11 @@ def refit(
         healthy, begin = Healthy(arena, base), base.z[: arena.shared]
         if evidence.floor is None:
             sensor = float(np.sqrt(np.mean([np.sum(one.noise[-1] ** 2, axis=-1).mean() for one in arena.whole])))
-            (own,) = scores(arena, [base], groups_of(arena))
+            (own,) = scores(arena, [base], groups_of(arena), held_out=False)
             squared = own.squared[np.isfinite(own.squared)]
             usual = squared[squared <= np.quantile(squared, KEPT)]
             rmse = float(np.sqrt(np.mean(usual)))
-            floor = FloorGiven(rmse, min(sensor, rmse), "the healthy runs, each predicted by the others", True, KEPT)
+            floor = FloorGiven(rmse, min(sensor, rmse), "the healthy runs, refitted", True, KEPT)
         told("healthy runs", 1, 1)
     arena, base = _fitted(evidence.runs, evidence.fit, replayer, simulator, noise, prior, starts, begin, told)
     if not again:

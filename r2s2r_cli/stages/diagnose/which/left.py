@@ -53,9 +53,9 @@ def left(at_least: np.ndarray, refit: Score, others: Sequence[Score], healthy: H
 
 
 def healthy_excess(healthy: Healthy) -> np.ndarray:
-    """What pieces of the healthy runs cost beyond what noise and floor explain, each predicted by the other groups,
-    (piece,) [nats]."""
-    (own,) = scores(healthy.arena, [healthy.base], groups_of(healthy.arena))
+    """What pieces of the healthy runs cost beyond what noise and floor explain, (piece,) [nats]. None is left out: with
+    a run or two that would be the error of a fit to half of them."""
+    (own,) = scores(healthy.arena, [healthy.base], groups_of(healthy.arena), held_out=False)
     return _bounded(-own.elpd - expected(healthy.arena))
 
 

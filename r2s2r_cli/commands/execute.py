@@ -133,7 +133,7 @@ def _chosen(project: Project, place: Iteration, names: Sequence[str]) -> tuple[l
     from r2s2r_cli.stages.simulate.policies import sequence
 
     plan = place.artifact("plan")
-    files = [text for text in names if _is_file(text)]
+    files = [text for text in names if is_file(text)]
     if not names or len(files) < len(names):
         require_input(plan, f"r2s2r plan --iteration {place.number}")
         _require_fresh(project, place, plan)
@@ -146,7 +146,7 @@ def _chosen(project: Project, place: Iteration, names: Sequence[str]) -> tuple[l
     return found, Asked(project, place, tuple(texts), None, 0, (), None).refs()
 
 
-def _is_file(text: str) -> bool:
+def is_file(text: str) -> bool:
     """Whether this names a file with policies; else it is a policy of the plan."""
     return Path(text).suffix in (".toml", ".h5") or ".h5:" in text
 
@@ -155,7 +155,7 @@ def _stored(project: Project, names: Sequence[str]) -> list[str]:
     """The policies as typed here, for the provenance."""
     from r2s2r_cli.commands.simulate_inputs import stored_names
 
-    return [word for text in names for word in (stored_names(project, [text]) if _is_file(text) else [text])]
+    return [word for text in names for word in (stored_names(project, [text]) if is_file(text) else [text])]
 
 
 def _require_fresh_file(project: Project, path: Path) -> None:

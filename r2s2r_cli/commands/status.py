@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from r2s2r_cli.commands.mend import Mending, mending, sighted
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError, GateError
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
-from r2s2r_cli.store.again import command_again
 from r2s2r_cli.store.header import read_header, sealed_header, whole_header
 from r2s2r_cli.store.lock import writer
 from r2s2r_cli.store.project import Iteration, Project, journal_of
@@ -78,11 +78,13 @@ def survey(project: Project, *, thorough: bool = False) -> StatusResult:
     journals = project.journals()
     states: list[ArtifactState] = []
     again: list[str] = []
+    runs: list[str] = []
     stale: set[str] = set()
     for path in project.artifacts():
-        state, command = _state(project, iterations.get(path.parent), path, stale, thorough)
+        state, mend = _state(project, iterations.get(path.parent), path, stale, thorough)
         states.append(state)
-        again += [command] if command else []
+        again += [mend.command] if mend.command else []
+        runs += [mend.runs] if mend.runs else []
     busy = writer(project.root) if journals else None
     states += [_unsealed(project, iterations.get(path.parent), path, busy) for path in journals]
     if busy is None:
@@ -93,7 +95,8 @@ def survey(project: Project, *, thorough: bool = False) -> StatusResult:
         iterations=len(iterations),
         artifacts=tuple(states),
         bytes=sum(p.stat().st_size for p in project.root.rglob("*") if p.is_file() and not p.is_symlink()),
-        next=again[0] if again else _forward(project), history=gap.history if (gap := _gap(project)) else (),
+        next=again[0] if again else _forward(project) or next(iter(runs), ""),
+        history=gap.history if (gap := _gap(project)) else (),
     )  # fmt: skip
 
 
@@ -115,17 +118,20 @@ def _gap(project: Project) -> CompareReport | None:
 
 def _state(
     project: Project, iteration: Iteration | None, path: Path, stale: set[str], thorough: bool
-) -> tuple[ArtifactState, str]:
-    """The line of one artifact, and the command that mends it; empty where it is fresh."""
+) -> tuple[ArtifactState, Mending]:
+    """The line of one artifact, and what mends it; nothing where it is fresh."""
     name = project.relative(path)
     header: Header | None = None
     try:
         header = sealed_header(path) if thorough else whole_header(path)
     except ArtifactError as error:
-        state, why, command = "damaged", [error.what], f"r2s2r recover {shlex.quote(name)}"
+        state, why, mend = "damaged", [error.what], Mending(f"r2s2r recover {shlex.quote(name)}")
     else:
-        why = _reasons(project, iteration, header, stale)
-        state, command = ("stale", command_again(header.provenance, path)) if why else ("fresh", "")
+        own, upstream = _reasons(project, iteration, header, stale)
+        # Stale through an input alone: made from the same input again it would be the same.
+        mend = mending(project, header, path) if own else Mending()
+        why = own + ([mend.why_not] if mend.why_not else []) + upstream
+        state = "stale" if why else "fresh"
     if state != "fresh":
         stale.add(name)
     made = header.provenance if header else None
@@ -134,15 +140,18 @@ def _state(
         "state": state, "reasons": tuple(why), "overrides": made.overrides if made else {},
         "bytes": path.stat().st_size, "content_sha256": header.content_sha256 if header else None,
     }  # fmt: skip
-    return ArtifactState.model_validate(line), command
+    return ArtifactState.model_validate(line), mend
 
 
-def _reasons(project: Project, iteration: Iteration | None, header: Header, stale: set[str]) -> list[str]:
+def _reasons(
+    project: Project, iteration: Iteration | None, header: Header, stale: set[str]
+) -> tuple[list[str], list[str]]:
+    """Why an artifact is stale: by itself, and through inputs that are."""
     from r2s2r_cli.commands.stage import wanted_again
 
     found = reasons(project, header, wanted_again(project, iteration, header.provenance))
     upstream = [ref.path for ref in header.provenance.inputs if ref.path in stale]
-    return found + [f"input {path} is stale itself" for path in upstream]
+    return found, [f"input {path} is stale itself" for path in upstream]
 
 
 def _remarks(state: ArtifactState) -> str:
@@ -173,7 +182,7 @@ def _forward(project: Project) -> str:
     if not place.artifact("recording").exists():  # it learns from the iteration before
         return _planned(project, place, ("identification", "plan"))
     held = list(read_header(place.artifact("recording")).datasets)
-    if not any(name.endswith("/caps/p_WE") or "/camera/depth" in name for name in held):
+    if not sighted(held):
         # Nothing to estimate states from yet; sensors alone tell how far the robot repeats itself.
         repeats = len({name.split("/")[1] for name in held if name.startswith("runs/")}) > 1
         return "r2s2r floor" if repeats and not project.artifact("floor", None).exists() else ""

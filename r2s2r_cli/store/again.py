@@ -14,6 +14,7 @@ from schemas.versions import KINDS, STAGE_VERSIONS
 
 _ROBOT = (("port", "port", None), ("protocol", "protocol", "checked"), ("camera", "camera", None),
           ("repeats", "repeats", 1), ("simulated", "simulated", False))  # fmt: skip
+_LINK = ("port", "protocol", "camera", "simulated")
 _RUNS = (("train", "train", None), ("test", "test", None), ("also", "also", None), ("seed", "seed", 0))
 OPTIONS: dict[str, tuple[tuple[str, str, Any], ...]] = {
     "import": (("format", "format", "auto"), ("depth-scale", "depth_scale", None)),
@@ -37,10 +38,11 @@ OPTIONS: dict[str, tuple[tuple[str, str, Any], ...]] = {
 that need not be typed. A list is an option for each entry, a table one NAME=VALUE for each."""
 
 
-def command_again(made: Provenance, artifact: Path, *, force: bool = False) -> str:
+def command_again(made: Provenance, artifact: Path, *, force: bool = False, dry_run: bool = False) -> str:
     """The command line, to be pasted in the project's directory; with --force where what lies there looks fresh.
 
-    What no stage made has the command line of the program that did.
+    dry_run: what a robot did is only shown, with --dry-run and without the robot, which may be gone and must not move
+    because a hint was pasted. What no stage made has the command line of the program that did.
     """
     if made.stage not in STAGE_VERSIONS:
         return shlex.join(made.argv)
@@ -49,12 +51,13 @@ def command_again(made: Provenance, artifact: Path, *, force: bool = False) -> s
     if made.stage == "import":
         words += [ref.path for ref in made.inputs if ref.kind in ("file", "folder")]
     words += flags.get("policies", ())
-    words += [word for option, key, usual in OPTIONS[made.stage] for word in _typed(option, flags.get(key), usual)]
+    options = [one for one in OPTIONS[made.stage] if not (dry_run and one[0] in _LINK)]
+    words += [word for option, key, usual in options for word in _typed(option, flags.get(key), usual)]
     words += [word for key, value in made.overrides.items() for word in ("--set", f"{key}={_toml(value)}")]
     folder = artifact.resolve().parent
     if folder.parent.name == ITERATIONS and folder.name.isdigit():
         words += ["--iteration", str(int(folder.name))]
-    return shlex.join([*words, "--force"] if force else words)
+    return shlex.join([*words, *(["--force"] if force else []), *(["--dry-run"] if dry_run else [])])
 
 
 def _flags(made: Provenance, artifact: Path) -> dict[str, Any]:

@@ -1,0 +1,107 @@
+"""What mends a stale artifact: a command that can be run with what there is, or the reason why there is none."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from r2s2r_cli.errors import R2S2RError
+from r2s2r_cli.store.again import command_again
+from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.project import Project
+from r2s2r_cli.store.staleness import input_reasons
+from schemas.header import Header, InputRef
+from schemas.versions import KINDS
+
+_BARE = {"estimate": "estimate", "identification": "identify", "plan": "plan"}
+"""Stages that need no argument, by what they make: what is missing of theirs is made by their name alone."""
+
+
+@dataclass(frozen=True)
+class Mending:
+    """command: makes the artifact fresh, or first an input of it that is missing. runs: shows, without moving a robot,
+    the runs that would have to be made anew where no command on this machine can help. why_not: why that is so. All to
+    be pasted in the project's directory, and empty where there is none."""
+
+    command: str = ""
+    runs: str = ""
+    why_not: str = ""
+
+
+def mending(project: Project, header: Header, path: Path) -> Mending:
+    """What mends the stale artifact at `path`, where the reason is not only that an input is stale."""
+    from r2s2r_cli.commands.stage import MEASURED
+
+    made = header.provenance
+    if made.stage in MEASURED:  # nothing makes it again: a robot must move
+        return Mending(runs=_runs(project, header, path))
+    lost = sorted((ref for ref in made.inputs if not (project.root / ref.path).exists()), key=lambda ref: ref.path)
+    sources = [ref.path for ref in lost if ref.kind not in KINDS]
+    if sources:
+        return Mending(why_not=f"it cannot be made again: {', '.join(sources)} is not kept")
+    if lost:
+        return _missing(project, lost[0])
+    if made.stage == "estimate":
+        found = _estimated(project, project.root / made.inputs[0].path)
+        if found is not None:
+            return found
+    return Mending(command_again(made, path))
+
+
+def sighted(datasets: Iterable[str]) -> bool:
+    """Whether states can be estimated from a recording with these datasets: it holds pictures, or end caps."""
+    return any(name.endswith("/caps/p_WE") or "/camera/depth" in name for name in datasets)
+
+
+def _estimated(project: Project, recording: Path) -> Mending | None:
+    """What makes up for a recording that no states can be estimated from; None: they can."""
+    try:
+        header = read_header(recording)
+    except R2S2RError:
+        return Mending()  # damaged: that is said of the recording, with its own way out
+    if sighted(header.datasets):
+        return None
+    why = f"the pictures or end caps of {project.relative(recording)} are not kept"
+    made = header.provenance
+    if made.stage == "import" and all((project.root / ref.path).exists() for ref in made.inputs):
+        return Mending(command_again(made, recording, force=True), why_not=why)
+    return Mending(runs=_runs(project, header, recording), why_not=f"it cannot be made again: {why}")
+
+
+def _missing(project: Project, ref: InputRef) -> Mending:
+    """What makes an artifact that is not there, and that another was made from."""
+    why = f"{ref.path} must be made first"
+    path = project.root / ref.path
+    place = next((one for one in project.iterations() if one.path == path.parent), None)
+    if place is None or ref.kind not in _BARE:
+        return Mending(why_not=why)
+    executed = ref.kind == "estimate" and path.name == KINDS["estimate"].executed
+    if ref.kind == "estimate":
+        recording = place.artifact("recording", executed=executed)
+        found = _estimated(project, recording) if recording.exists() else Mending()
+        if found is not None:
+            return Mending(found.command, found.runs, why)
+    words = ["r2s2r", _BARE[ref.kind], *(["--of", "execute"] if executed else []), "--iteration", str(place.number)]
+    return Mending(shlex.join(words), why_not=why)
+
+
+def _runs(project: Project, header: Header, path: Path) -> str:
+    """The runs of a recording once more, without the robot; empty where their policies are not there any more."""
+    from r2s2r_cli.commands.execute import is_file
+    from r2s2r_cli.commands.simulate_inputs import split_name
+
+    made = header.provenance
+    if made.stage == "import":
+        return ""
+    policies = made.settings.get("flags", {}).get("policies", ())
+    files = [text for text in policies if made.stage == "record" or is_file(text)]
+    if not all((project.root / split_name(text)[0]).exists() for text in files):
+        return ""
+    if made.stage == "execute" and (len(files) < len(policies) or not policies):  # those of a plan
+        if not path.with_name(KINDS["plan"].filename).exists():
+            return ""
+        if any(input_reasons(project, ref) for ref in made.inputs):  # it may hold others by now
+            return shlex.join(["r2s2r", "execute", "--iteration", str(int(path.parent.name)), "--dry-run"])
+    return command_again(made, path, dry_run=True)

@@ -1,0 +1,120 @@
+"""The hint of `status` works when it is pasted: it never asks for what cannot be done with what there is."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.commands.stage import wanted
+from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.project import Project
+from r2s2r_cli.store.staleness import artifact_ref
+from r2s2r_cli.store.write import write_artifact
+from schemas.header import InputRef
+from schemas.versions import STAGE_VERSIONS
+from tests.commands.conftest import document, invoke
+from tests.support import builders
+
+GAIT = 'schema_version = 1\nrobot = "threebar"\nname = "gait"\n[[steps]]\ntarget = [0.5, 0.5, 0.5, 0.5, 0.5, 0.5]\n'
+FLAGS = {"policies": ["gait.toml"], "port": "/dev/ttyUSB0", "protocol": "checked", "camera": "realsense", "repeats": 2}
+OLD = STAGE_VERSIONS["estimate"] - 1
+NAMES = {"record": ("10-record.h5", "20-estimate.h5"), "execute": ("50-execute.h5", "51-estimate.h5")}
+ESTIMATE = "iterations/001/20-estimate.h5"
+
+
+def ref(root: Path, name: str) -> InputRef:
+    """An artifact of iteration 1 as an input."""
+    path = root / "iterations" / "001" / name
+    return artifact_ref(Project.find(root), path, read_header(path))
+
+
+def put(root: Path, name: str, data: ArtifactData, stage: str, **made: Any) -> None:
+    """An artifact of iteration 1, fresh but for what is said of how it was made."""
+    folder = root / "iterations" / "001"
+    folder.mkdir(parents=True, exist_ok=True)
+    use = wanted(Project.find(root), None, stage, {}, {})
+    fresh = {"stage_version": use.stage_version, "settings": use.settings, "robot": use.robot, "inputs": ()}
+    write_artifact(folder / name, data, builders.provenance(stage=stage, **{**fresh, **made}))
+
+
+def without_pictures(root: Path, stage: str) -> None:
+    """Runs of gait.toml whose pictures were taken out, states from them by an older version, and a comparison."""
+    (root / "gait.toml").write_text(GAIT)
+    recording, estimate = NAMES[stage]
+    runs = builders.recording().groups.items()
+    blind = ArtifactData("recording", {name: group for name, group in runs if not name.endswith(("/camera", "/caps"))})
+    for name in {recording, NAMES["record"][0]}:
+        made = stage if name == recording else "record"
+        put(root, name, blind, made, settings={"flags": FLAGS})
+    put(root, estimate, builders.estimate(), "estimate", stage_version=OLD, inputs=(ref(root, recording),))
+    put(root, "60-compare.h5", builders.comparison(), "compare", inputs=(ref(root, estimate),))
+
+
+def said(name: str) -> str:
+    """Why an artifact of iteration 1 is stale, as `status` says it."""
+    found = document("status")["artifacts"]
+    return "; ".join(next(one for one in found if one["artifact"] == f"iterations/001/{name}")["reasons"])
+
+
+def pasted() -> str:
+    """The hint of `status`, after it was run in the project's directory and did what it says."""
+    hint: str = document("status")["next"]
+    done = invoke(*shlex.split(hint)[1:])
+    assert done.exit_code == 0, (hint, done.stderr)
+    return hint
+
+
+@pytest.mark.parametrize("stage", NAMES)
+def test_states_whose_pictures_are_gone_are_not_asked_for(project: Path, stage: str) -> None:
+    """Their runs are shown instead, without the robot that made them, and why is said. Nor is what was made of the
+    states asked for: of the same states it would be the same."""
+    without_pictures(project, stage)
+    recording, estimate = NAMES[stage]
+    assert f"the pictures or end caps of iterations/001/{recording} are not kept" in said(estimate)
+    assert pasted() == f"r2s2r {stage} gait.toml --repeats 2 --iteration 1 --dry-run"
+    (project / "gait.toml").unlink()
+    assert document("status")["next"] == ""
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_runs_that_are_stale_are_shown_where_their_plan_is_kept(project: Path, kept: bool) -> None:
+    """A plan was made again since: what is proposed is the plan as it is, and no command that would be refused."""
+    without_pictures(project, "execute")
+    put(project, "10-record.h5", builders.recording(), "record")
+    put(project, "20-estimate.h5", builders.estimate(), "estimate")
+    put(project, "30-identify.h5", builders.identification(), "identify")
+    put(project, "40-plan.h5", builders.plan(), "plan")
+    plan = ref(project, "40-plan.h5").model_copy(update={"sha256": "1" * 64})
+    put(project, "50-execute.h5", builders.recording(), "execute", inputs=(plan,),
+        settings={"flags": {**FLAGS, "policies": ["gone-7"]}})  # fmt: skip
+    put(project, "51-estimate.h5", builders.estimate(), "estimate")
+    put(project, "60-compare.h5", builders.comparison(), "compare")
+    if not kept:
+        (project / "iterations/001/40-plan.h5").unlink()
+    wanted = "r2s2r execute --iteration 1 --dry-run" if kept else "r2s2r plan --iteration 1"
+    assert "input iterations/001/40-plan.h5" in said("50-execute.h5")
+    assert document("status")["next"] == wanted
+
+
+def test_a_missing_input_is_made_first(estimated: Path) -> None:
+    """Not the stage that needs it, which could only say so."""
+    made = {"stage_version": 0, "inputs": (ref(estimated, "20-estimate.h5"),)}
+    put(estimated, "30-identify.h5", builders.identification(), "identify", **made)
+    (estimated / ESTIMATE).unlink()
+    assert f"{ESTIMATE} must be made first" in said("30-identify.h5")
+    assert pasted() == "r2s2r estimate --iteration 1"
+    assert document("status")["next"] == "r2s2r identify --iteration 1"
+
+
+def test_a_log_that_is_gone_is_not_asked_for(estimated: Path) -> None:
+    """What was imported from it stays, stale, and the project goes on."""
+    config = estimated / "project.toml"
+    config.write_text(config.read_text().replace("rod_length_tolerance = 0.05", "rod_length_tolerance = 0.04", 1))
+    assert document("status")["next"] == "r2s2r import sample.csv --iteration 1"
+    (estimated / "sample.csv").unlink()
+    assert "cannot be made again: sample.csv is not kept" in said("10-record.h5")
+    assert document("status")["next"] == "r2s2r identify --iteration 1"

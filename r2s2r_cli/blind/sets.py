@@ -85,7 +85,7 @@ def _runs(folder: Path, robot: Robot) -> tuple[Run, ...]:
         settings, name = EstimateSettings(rod_length_tolerance=ROD_TOLERANCE), path.stem
         states, _ = estimate(recording, robot, settings, pictures=pictures)
         # Rows between frames are control ticks: commands as they were sent, not as frames found them.
-        caps = replace(run_data(recording, states, name), sampled=False)
+        caps = replace(run_data(recording, states, name, still=True), sampled=False)
         found.append(Run(caps, sensed_run(name, recording, name, robot), gait=name))
     return tuple(found)
 

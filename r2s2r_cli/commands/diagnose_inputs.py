@@ -122,7 +122,7 @@ class Asked:
         gaits: dict[bytes, str] = {}
         for one in named_runs(self.sources):
             require_robot(one.recording, one.run, robot.name)
-            caps = run_data(one.recording, one.estimate, one.run, name=one.name)
+            caps = run_data(one.recording, one.estimate, one.run, name=one.name, still=True)
             gait = gaits.setdefault(caps.intervals.target.round(6).tobytes(), one.name)
             found.append(Run(caps, sensed_run(one.name, one.recording, one.run, robot), gait=gait))
         return tuple(found)

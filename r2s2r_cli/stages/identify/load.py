@@ -22,14 +22,17 @@ LEAST_M = 1e-5
 """Noise of a log that has none: its numbers are rounded somewhere."""
 
 
-def run_data(recording: ArtifactData | None, estimate: ArtifactData, run: str, *, name: str = "") -> RunData:
-    """The run of both artifacts; `name`: what it is called in the fit (default: as there).
+def run_data(
+    recording: ArtifactData | None, estimate: ArtifactData, run: str, *, name: str = "", still: bool = False
+) -> RunData:
+    """The run of both artifacts; `name`: what it is called in the fit (default: as there). still: one in which nothing
+    moves is a run as well: nothing can be identified from it, but a motor that does not start is a finding.
 
     observed: the recording's end caps at the frames that the estimate kept, moved on to its ground. Of camera images,
     what the tracker knew at each frame from it and those before.
 
     Raises InputError where there are no kept frames, target intervals or motor commands, where the recording is another
-    one, for numbers that are not finite, and where no cap moves.
+    one, for numbers that are not finite, and, unless `still`, where no cap moves.
     """
     frames, tracks, commands = (_group(estimate, run, stream) for stream in ("frames", "tracks", "commands"))
     if not len(frames["t"]):
@@ -70,7 +73,8 @@ def run_data(recording: ArtifactData | None, estimate: ArtifactData, run: str, *
     )
     _require_finite(found, run)
     _require_rows(found, run)
-    _require_motion(found, run)
+    if not still:
+        _require_motion(found, run)
     return found
 
 

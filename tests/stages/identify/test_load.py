@@ -163,6 +163,7 @@ def test_a_run_that_moves_less_than_its_noise_is_bad_input(factor: float, still:
     with pytest.raises(InputError, match="nothing moves") as error:
         run_data(recording, estimate, "walk")
     assert "cap 4" in error.value.received
+    assert run_data(recording, estimate, "walk", still=True).name == "walk"
 
 
 def test_a_log_without_noise_that_does_not_move_is_bad_input() -> None:

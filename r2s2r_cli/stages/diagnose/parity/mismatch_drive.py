@@ -18,6 +18,8 @@ CLEARER = 0.35
 """By how much commands must follow other cables better than their own, in correlation."""
 FAST, SLOW = 1.6, 0.6
 """Winding rates over the nominal, all winches alike, that are a wrong number and no effect."""
+STANDS = 0.05
+"""Of the nominal rate: a winch that does not turn has no wrong number, it does not start."""
 
 
 def order_of_motors(runs: Sequence[Series], robot: Robot, speed: float, missing: list[str]) -> list[Mismatch]:
@@ -74,7 +76,7 @@ def rate(runs: Sequence[Series], robot: Robot, speed: float, missing: list[str])
         missing.append("rate of the winches: too few long commands at full speed")
         return []
     ratio = float(np.median(rates)) / speed
-    if SLOW < ratio < FAST:
+    if SLOW < ratio < FAST or ratio < STANDS:
         return []
     return [Mismatch(
         "rate", f"all winches run at {ratio:.2g} times their nominal speed", f"{1e3 * speed:.0f} mm/s",

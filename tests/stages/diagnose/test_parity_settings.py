@@ -98,3 +98,14 @@ def test_boards_that_take_turns_are_no_mismatch() -> None:
     ]
     assert runs[0].lengths is not None
     assert noise_of(runs[0].lengths.length) == pytest.approx(np.r_[np.full(6, 5e-4), np.zeros(3)], rel=0.25)
+
+
+def test_winches_that_stand_have_no_wrong_number() -> None:
+    """Motors that do not start are for the diagnosis to name; winches at a third of their speed are a wrong number."""
+
+    def at(share: float) -> list[str]:
+        runs = [wound(f"g{k}", k, lambda u, h: np.cumsum(share * SPEED * h * u, axis=0)) for k in range(2)]
+        return [one.kind for one in mismatches(runs, threebar(), SPEED)[0]]
+
+    assert at(0.0) == []
+    assert at(0.3) == ["rate"]

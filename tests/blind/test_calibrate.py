@@ -1,5 +1,7 @@
 """From gains to probabilities: planted numbers come back, and what was left out is covered as often as promised."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,19 +13,19 @@ from tests.support import blind_bank
 
 EFFECTS = ("backlash", "payload", "motor_lag", "soft_ground")
 TRUE = Calibration(
-    temperature=20.0, linear=1.5, parity=14.0, none=9.0, equivalent=16.0, unknown=20.0, unknown_share=0.7,
-    bias={"soft_ground": -27.0},
+    temperature=20.0, linear=1.5, parity=14.0, none=9.0, equivalent=16.0, gap=0.4, unknown=20.0, unknown_share=0.7,
+    left=0.5, bias={"soft_ground": -27.0},
 )  # fmt: skip
 
 
-def scores(
-    by: Calibration, names: tuple[str, ...], score: np.ndarray, linear: np.ndarray, parity: np.ndarray, equivalent: bool
-) -> dict[str, float]:
+def scores(by: Calibration, one: Case) -> dict[str, float]:
     """What a diagnosis makes of the evidence of a set."""
+    beyond = {"none": one.gap, "unknown": one.left}
     return {
-        name: by.score(name, float(a), linear=float(b), parity=float(c), equivalent=equivalent)
-        for name, a, b, c in zip(names, score, linear, parity, strict=True)
-    }
+        name: by.score(name, float(a), linear=float(b), parity=float(c), equivalent=one.equivalent,
+                       beyond=beyond.get(name, 0.0))
+        for name, a, b, c in zip(one.names, one.score, one.linear, one.parity, strict=True)
+    }  # fmt: skip
 
 
 def planted(count: int, seed: int = 0) -> list[Case]:
@@ -35,9 +37,10 @@ def planted(count: int, seed: int = 0) -> list[Case]:
         score = np.array([*rng.normal(30.0, 25.0, len(EFFECTS)), 90.0, rng.uniform(0.0, 300.0)])
         linear = np.array([*rng.normal(25.0, 25.0, len(EFFECTS)), 0.0, 0.0])
         parity = np.array([*rng.exponential(1.5, len(EFFECTS)), 0.0, 0.0])
-        equivalent = bool(rng.random() < 0.3)
-        p = np.array(list(TRUE.probabilities(scores(TRUE, names, score, linear, parity, equivalent)).values()))
-        found.append(Case(names, score, linear, parity, equivalent, names[rng.choice(len(names), p=p)]))
+        gap = rng.uniform(0.0, 120.0)
+        one = Case(names, score, linear, parity, bool(rng.random() < 0.3), "", gap, gap * rng.uniform(0.0, 1.0))
+        p = np.array(list(TRUE.probabilities(scores(TRUE, one)).values()))
+        found.append(replace(one, truth=names[rng.choice(len(names), p=p)]))
     return found
 
 
@@ -48,9 +51,11 @@ def test_planted_numbers_come_back() -> None:
     assert found["linear"] == pytest.approx(TRUE.linear, rel=0.15)
     assert found["parity"] == pytest.approx(TRUE.parity, rel=0.15)
     assert found["unknown_share"] == pytest.approx(TRUE.unknown_share, abs=0.15)
-    middle = found["unknown_share"] * 150.0 - found["unknown"]  # where `unknown` has a chance
-    assert middle == pytest.approx(TRUE.unknown_share * 150.0 - TRUE.unknown, abs=8.0)
+    middle = found["unknown_share"] * 150.0 + found["left"] * 30.0 - found["unknown"]  # where `unknown` has a chance
+    assert middle == pytest.approx(TRUE.unknown_share * 150.0 + TRUE.left * 30.0 - TRUE.unknown, abs=10.0)
     assert found["none"] == pytest.approx(TRUE.none, abs=10.0)
+    assert found["gap"] == pytest.approx(TRUE.gap, abs=0.15)
+    assert found["left"] == pytest.approx(TRUE.left, abs=0.2)
     assert found["equivalent"] == pytest.approx(TRUE.equivalent, abs=8.0)
     assert found["bias"]["soft_ground"] - found["bias"]["payload"] == pytest.approx(-27.0, abs=7.0)
 
@@ -63,8 +68,7 @@ def test_a_set_of_90_per_cent_holds_the_truth_so_often() -> None:
     said: dict[str, list[bool]] = {"effect": [], "none": [], "unknown": []}
     fresh = planted(1500, seed=1)
     for one in fresh:
-        told = scores(found, one.names, one.score, one.linear, one.parity, one.equivalent)
-        p = np.array(list(found.probabilities(told).values()))
+        p = np.array(list(found.probabilities(scores(found, one)).values()))
         held += p[one.names.index(one.truth)] >= found.conformal
         first = one.names[int(p.argmax())]
         if found.commits(first, p.max()):
@@ -83,12 +87,12 @@ def test_a_verdict_becomes_a_case() -> None:
         "ranking": [{"effect": "payload", "elpd_gain": 7.5, "linear_gain": 4.0, "parity_nats": 2.5},
                     {"effect": "none", "elpd_gain": 0.0},
                     {"effect": "unknown", "elpd_gain": 3.0}, {"effect": "backlash", "elpd_gain": -1e9}],
-        "chance_nats": 2.0, "refit_upper_m": 0.012, "floor_m": 0.010,
+        "chance_nats": 2.0, "gap_nats": 31.0, "left_nats": -4.0, "refit_upper_m": 0.012, "floor_m": 0.010,
     }  # fmt: skip
     one = case(truth_of(label), document)
     assert one is not None and one.names == ("payload", "none", "unknown") and one.score.tolist() == [7.5, 2.0, 3.0]
     assert one.linear.tolist() == [4.0, 0.0, 0.0] and one.parity.tolist() == [2.5, 0.0, 0.0]
-    assert one.equivalent and one.truth == "payload"
+    assert one.equivalent and one.truth == "payload" and (one.gap, one.left) == (31.0, 0.0)
     pair = next(each for each in blind_bank.bank() if each["kind"] == "pair" and each["d"] > 3)
     assert case(truth_of(pair), document) is None
 

@@ -25,11 +25,12 @@ class Calibration:
 
     temperature [nats]: of the softmax over names. linear: nats of gain that a nat of a linear gain is worth; parity:
     the same of the parity stage, which needs no simulator and errs far less. none, equivalent [nats]: what `none`
-    gains, and more where the equivalence test finds no gap. unknown_share, unknown [nats]: what `unknown` has of what
-    no effect explains, and what that must exceed. bias [nats]: of a name, what its gains are short of. commit,
-    commit_none, commit_unknown: probability from which an effect, `none` or `unknown` is the verdict. conformal: names
-    whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many it rests on, 0
-    for the defaults.
+    gains, and more where the equivalence test finds no gap; gap: what it loses for every nat that the refit model costs
+    more than in healthy runs. unknown_share, left: what `unknown` has of what a wider floor gains and of every nat that
+    the best effect leaves; unknown [nats]: what that must exceed. bias [nats]: of a name, what its gains are short of.
+    commit, commit_none, commit_unknown: probability from which an effect, `none` or `unknown` is the verdict.
+    conformal: names whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many
+    it rests on, 0 for the defaults.
     """
 
     temperature: float = 25.0
@@ -37,8 +38,10 @@ class Calibration:
     parity: float = 15.0
     none: float = 20.0
     equivalent: float = 6.0
+    gap: float = 0.0
     unknown: float = 25.0
     unknown_share: float = 0.3
+    left: float = 0.0
     commit: float = 0.5
     commit_none: float = 0.5
     commit_unknown: float = 0.5
@@ -48,14 +51,16 @@ class Calibration:
     sets: int = 0
 
     def score(
-        self, name: str, gain: float, *, linear: float = 0.0, parity: float = 0.0, equivalent: bool = False
-    ) -> float:
+        self, name: str, gain: float, *, linear: float = 0.0, parity: float = 0.0, equivalent: bool = False,
+        beyond: float = 0.0,
+    ) -> float:  # fmt: skip
         """What a name is worth without its bias [nats]. gain: held out; of `none` what chance reaches, of `unknown`
-        what no effect explains. equivalent: the equivalence test found no gap."""
+        what a wider floor gains. equivalent: the equivalence test found no gap. beyond: what pieces cost more than
+        those of healthy runs (`left.Left`): under the refit model for `none`, under the best effect for `unknown`."""
         if name == NONE:
-            return gain + self.none + (self.equivalent if equivalent else 0.0)
+            return gain + self.none + (self.equivalent if equivalent else 0.0) - self.gap * max(beyond, 0.0)
         if name == UNKNOWN:
-            return self.unknown_share * gain - self.unknown
+            return self.unknown_share * gain + self.left * max(beyond, 0.0) - self.unknown
         return gain + self.linear * linear + self.parity * parity
 
     def absolute(self) -> Calibration:

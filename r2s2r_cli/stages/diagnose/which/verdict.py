@@ -46,8 +46,8 @@ def concluded(m: Material) -> Which:
     table |= {
         one.effect: calibration.score(one.effect, one.gain, linear=one.linear, parity=one.parity) for one in others
     }
-    table[NONE] = calibration.score(NONE, m.chance, equivalent=m.no_gap.equivalent)
-    table[UNKNOWN] = calibration.score(UNKNOWN, m.unexplained)
+    table[NONE] = calibration.score(NONE, m.chance, equivalent=m.no_gap.equivalent, beyond=m.left.refit)
+    table[UNKNOWN] = calibration.score(UNKNOWN, m.unexplained, beyond=m.left.best)
     probability = calibration.probabilities(table)
     sds = gain_sds(m.refit, m.scores, m.groups).tolist() if m.scores else []
     pair = _pair(m, order, gains, best)

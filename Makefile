@@ -24,7 +24,8 @@ PY     := $(VENV)/bin/python
 # Compiled Python is kept, whatever the shell says: the suite starts some hundred processes, and rewrites every test file.
 unexport PYTHONDONTWRITEBYTECODE
 # Two workers on the two cores; `make test PYTEST_FLAGS=` runs in one process, `PYTEST_FLAGS="-k store"` a part.
-PYTEST_FLAGS ?= -n auto --dist loadfile
+# In the order of the names: xdist would leave files of one long test for the end, when the other worker has nothing to do.
+PYTEST_FLAGS ?= -n auto --dist loadfile --no-loadscope-reorder
 DEMO   ?= demo
 PROJECT ?= .
 ITER   ?= 001
@@ -47,7 +48,7 @@ test-slow: $(VENV)/.dev-stamp  ## the slow tests: kills while writing, damaged f
 	@$(PY) -m pytest $(PYTEST_FLAGS) -m slow
 
 test-soak: $(VENV)/.dev-stamp  ## what is killed and damaged at random, in full numbers (an hour): before a release
-	@R2S2R_SOAK=1 $(PY) -m pytest $(PYTEST_FLAGS) -m slow -k "killed or mutants or mutated or damaged" tests/store tests/commands
+	@R2S2R_SOAK=1 $(PY) -m pytest $(PYTEST_FLAGS) -m slow -k "killed or mutants or mutated or damaged or flipped or unplugg or plug" tests/store tests/commands tests/hardware
 
 lint: $(VENV)/.dev-stamp  ## style, types, import layers
 	@failed=; \

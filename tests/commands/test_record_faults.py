@@ -95,8 +95,8 @@ def forked(robot: Robot) -> Iterator[tuple[str, Any]]:
 
 @pytest.mark.slow
 def test_the_plug_is_pulled_at_random_moments(root: Path) -> None:
-    """The rig is killed anywhere between the handshake and a second later, KILLS times: exit code 5, the port and a hint
-    in the message, and all samples that came are in a sealed file; or none came, and none is there."""
+    """The rig is killed anywhere between the handshake and a second later, KILLS times: exit code 5, the port and a
+    hint in the message, and all samples that came are in a sealed file; or none came, and none is there."""
     import mujoco  # noqa: F401 - once, before the forks
 
     robot, generator = Project.find(root).robot(), np.random.default_rng(5)

@@ -148,8 +148,8 @@ def test_a_link_that_goes_ends_as_one_error_and_comes_back(kind: str, link: str)
 @pytest.mark.slow
 @pytest.mark.parametrize("protocol", ["checked", "boards"])
 def test_unpluggings_at_random_moments(protocol: str) -> None:
-    """The rig's process is killed under a running controller at 8 moments in each protocol (25 in a soak test), over all
-    links in turn.
+    """The rig's process is killed under a running controller at 8 moments in each protocol (25 in a soak test), over
+    all links in turn.
 
     One clear error each time, exit code 5, and what became of the motors where a port died.
     """

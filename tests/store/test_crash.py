@@ -175,8 +175,8 @@ def test_killed_before_system_calls(nursery: Nursery, tmp_path: Path, job: str, 
 @pytest.mark.slow
 @pytest.mark.parametrize("job", ["write", "seal"])
 def test_killed_before_every_system_call(nursery: Nursery, tmp_path: Path, job: str) -> None:
-    """The same before every fifth one, in a soak test before each, up to the end of the job (writing: over the first two
-    artifacts)."""
+    """The same before every fifth one, in a soak test before each, up to the end of the job (writing: over the first
+    two artifacts)."""
     stride = drawn(5, 1)
     killed = kill_at_steps(nursery, tmp_path, job, range(0, 320 if job == "write" else 100_000, stride))
     assert killed > 50 / stride

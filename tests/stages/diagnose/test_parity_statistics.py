@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.parity import parity
-from r2s2r_cli.stages.diagnose.parity.finding import MOST_NATS, discoveries
+from r2s2r_cli.stages.diagnose.parity.finding import (
+    ABSOLUTE,
+    MOST_NATS,
+    Element,
+    Finding,
+    Parity,
+    Suspicion,
+    discoveries,
+)
 from r2s2r_cli.stages.diagnose.parity.series import Measured, combined, regression
 from r2s2r_cli.stages.identify.data import Selection
 from tests.support.parity_log import evidence_of, foremost, swaying, with_caps
@@ -125,3 +133,19 @@ def test_what_findings_say_in_nats_is_half_their_square_by_effect_and_element() 
     for index, nats in found.nats()["sensor_bias"].items():
         assert nats >= 0.8 * min(by_sensor.get(index, 0.0), MOST_NATS)
         assert nats <= MOST_NATS
+
+
+def test_what_no_healthy_run_confirms_counts_less_beside_them() -> None:
+    """Among findings that were compared with healthy runs, one that could not be counts a quarter; without healthy runs
+    all are alike, and the calibration sees to it."""
+
+    def finding(index: int, differential: bool) -> Finding:
+        return Finding(
+            "cap_height", Element("cap", index), 1e-3, 2e-4, "m", 0.0, 0.0, differential, 5.0, 1e-6, "",
+            (Suspicion("cap_radius"),),
+        )  # fmt: skip
+
+    both = (finding(1, True), finding(2, False))
+    nats = Parity(both, differential=True).nats()["cap_radius"]
+    assert nats == {1: pytest.approx(12.5), 2: pytest.approx(12.5 * ABSOLUTE)}
+    assert Parity(both[1:], differential=False).nats()["cap_radius"] == {2: pytest.approx(12.5)}

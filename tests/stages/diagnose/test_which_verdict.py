@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from r2s2r_cli.stages.diagnose.which.calibration import ABSOLUTE, Calibration
+from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
+from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.found import Ranked
 from r2s2r_cli.stages.diagnose.which.verdict import verdict_of
 

@@ -13,6 +13,9 @@ KINDS = ("cable", "cap", "rod", "motor", "sensor", "place", "world", "camera")
 """Kinds of elements, as `diagnose --json` has them."""
 MOST_NATS = 60.0
 """However far a finding stands out, it says no more than this for an effect or a channel."""
+ABSOLUTE = 0.25
+"""Of what a finding is worth that no healthy run could be compared with: what nats are worth was learned on differences
+from runs of the same robot, and how far robots are from their robot.toml is known far less well. By hand."""
 
 
 @dataclass(frozen=True)
@@ -103,12 +106,14 @@ class Parity:
 
     def nats(self) -> dict[str, dict[int | None, float]]:
         """What all findings say for each effect (`Finding.nats`), the most of each element, by id and index of the
-        element (None: of no element)."""
+        element (None: of no element). Where there are healthy runs, those that could not be compared with them count
+        ABSOLUTE."""
         found: dict[str, dict[int | None, float]] = {}
         for one in self.findings:
+            worth = ABSOLUTE if self.differential and not one.differential else 1.0
             for suspicion in one.suspicions:
                 own = found.setdefault(suspicion.effect, {})
-                own[one.element.index] = max(own.get(one.element.index, 0.0), one.nats(suspicion))
+                own[one.element.index] = max(own.get(one.element.index, 0.0), worth * one.nats(suspicion))
         return found
 
     def starts(self) -> dict[str, dict[str, float]]:

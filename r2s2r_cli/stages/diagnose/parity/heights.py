@@ -18,6 +18,8 @@ LEAST_SD_M = 5e-4
 """Of a mean height of one cap over one interval: the ground of a room, and a tracker."""
 SLOPE_RAD, HEIGHT_M = 0.1, 2e-3
 """Prior sd of a slope and of a cap's height: few intervals tell them apart."""
+STANDS_M = 0.006
+"""A cap whose mean height is further off than this from that of the others does not stand: it hangs by its cables."""
 NEAR_M = 0.012
 """A cap stands if its smoothed centre lies within this and three times its error of its radius over the plane."""
 
@@ -79,7 +81,9 @@ def heights(runs: Sequence[Series], robot: Robot) -> Heights | None:
     own, wide = average @ beta[n + 2 :], average @ cov[n + 2 :, n + 2 :] @ average.T
     seen = np.isin(np.arange(len(radius)), cap)
     found = [
-        Measured(float(own[k]), float(np.sqrt(wide[k, k]))) if seen[k] else Measured(float("nan"), float("nan"))
+        Measured(float(own[k]), float(np.sqrt(wide[k, k])))
+        if seen[k] and abs(own[k]) < STANDS_M
+        else Measured(float("nan"), float("nan"))
         for k in range(len(radius))
     ]
     sd = np.sqrt(np.diag(cov))

@@ -9,14 +9,11 @@ from importlib import resources
 
 import numpy as np
 
+from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN
 
 FILE = "calibration.json"
 """Beside this module; made by the calibration run of the blind trials, and frozen before any blind set exists."""
-
-ABSOLUTE = 0.25
-"""Of what a nat of the parity stage is worth, where there are no healthy runs: that was learned on differences from
-runs of the same robot, and how far robots are from their robot.toml is known far less well. By hand."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from tests.support import blind_bank
 EFFECTS = ("backlash", "payload", "motor_lag", "soft_ground")
 TRUE = Calibration(
     temperature=20.0, linear=1.5, parity=14.0, none=9.0, equivalent=16.0, gap=0.4, unknown=20.0, unknown_share=0.7,
-    left=0.5, bias={"soft_ground": -27.0},
+    left=0.5, lapse=0.05, bias={"soft_ground": -27.0},
 )  # fmt: skip
 
 

@@ -5,9 +5,9 @@ linearised problem, and `parity` times what the parity stage says for it; that o
 gains by chance, and `none`, and `equivalent` more where the equivalence test finds no gap, less `gap` for every nat
 that today's pieces cost beyond those of healthy runs; that of `unknown` a share (`unknown_share`) of what a wider floor
 gains, and `left` for every nat that the best effect leaves, less `unknown`. Linear in 1 / temperature and the products
-with it, so the fit (a multinomial regression, biases drawn to 0) has one optimum. Thresholds come from probabilities of
-sets left out of the fit. To commit to a name, to `none` and to `unknown` are claims of different weight: each has its
-own.
+with it: a multinomial regression, biases drawn to 0, in which any name is the truth once in 20 sets (LAPSE). Thresholds
+come from probabilities of sets left out of the fit. To commit to a name, to `none` and to `unknown` are claims of
+different weight: each has its own.
 """
 
 from __future__ import annotations
@@ -37,6 +37,9 @@ BELIEVED = 10.0
 """Sets' worth of belief that probabilities are as often right as they say: few sets alone would set any threshold."""
 BIAS_SD = 0.5
 """Of a bias over the temperature: how much more often a name wins than its gains say, before anything is learned."""
+LAPSE = 0.05
+"""How often the evidence says nothing of the truth, whatever it says: without this one set in which a stranger looks
+just like an effect decides what all evidence is worth."""
 SHARPNESS = 1.0 / 15.0
 """1 / temperature before anything is learned [1/nats], and the unit in which it is fitted."""
 
@@ -112,6 +115,7 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
             for (key, wanted), of in zip(PRECISION.items(), _claims(first), strict=True)
         },
         "conformal": float(held[k - 1]) if k else 0.0,
+        "lapse": LAPSE,
         "words": words,
         "sets": len(cases),
         "left_out": {
@@ -144,17 +148,22 @@ def _fit(cases: Sequence[Case], effects: Sequence[str]) -> np.ndarray:
     X, there = np.zeros((len(known), most, len(LEARNED) + len(effects))), np.zeros((len(known), most), dtype=bool)
     for k, one in enumerate(known):
         X[k, : len(one.names)], there[k, : len(one.names)] = _design(one, effects), True
-    right = X[np.arange(len(known)), [one.names.index(one.truth) for one in known]]
+    truth = np.array([one.names.index(one.truth) for one in known], dtype=int)
+    right = X[np.arange(len(known)), truth]
     mean = np.r_[BEFORE, np.zeros(len(effects))]
     weight = np.r_[np.array(BEFORE_SD) ** -2.0, np.full(len(effects), 1.0 / BIAS_SD**2)]
 
+    rows, names = np.arange(len(known)), there.sum(axis=1)
+
     def cost(w: np.ndarray) -> tuple[float, np.ndarray]:
         x = np.where(there, X @ w, -np.inf)
-        top = x.max(axis=1, keepdims=True)
-        e = np.exp(x - top)
-        total = e.sum(axis=1, keepdims=True)
-        value = 0.5 * float(weight @ (w - mean) ** 2) + float((np.log(total) + top).sum() - (right @ w).sum())
-        return value, weight * (w - mean) + np.einsum("kn,knp->p", e / total, X) - right.sum(axis=0)
+        e = np.exp(x - x.max(axis=1, keepdims=True))
+        p = e / e.sum(axis=1, keepdims=True)
+        told = (1.0 - LAPSE) * p[rows, truth]
+        whole = told + LAPSE / names
+        value = 0.5 * float(weight @ (w - mean) ** 2) - float(np.log(whole).sum())
+        pull = right - np.einsum("kn,knp->kp", p, X)
+        return value, weight * (w - mean) - ((told / whole)[:, None] * pull).sum(axis=0)
 
     bounds = [(1e-3, None) if name in POSITIVE else (None, None) for name in LEARNED] + [(None, None)] * len(effects)
     return np.asarray(minimize(cost, mean, jac=True, bounds=bounds, method="L-BFGS-B").x)
@@ -187,4 +196,4 @@ def _commit(sure: np.ndarray, right: np.ndarray, precision: float) -> float:
 
 def _softmax(x: np.ndarray) -> np.ndarray:
     e = np.exp(x - x.max())
-    return np.asarray(e / e.sum())
+    return np.asarray((1.0 - LAPSE) * e / e.sum() + LAPSE / len(x))

@@ -70,20 +70,21 @@ def _alike(shards: Sequence[Shard], what: str, of: Callable[[Shard], str]) -> No
 
 
 def _apart(shards: Sequence[Shard]) -> None:
-    names: dict[object, str] = {}
+    """Names come from key and number: two shards of one key have the same names for other worlds."""
+    there: dict[object, str] = {}
     for shard in shards:
         for one in shard.sets:
-            world = (one.label.get("seed"), one.label.get("observed"))
-            for key in (one.name, *((world,) if world[0] is not None else ())):
-                if key in names:
-                    where = names[key]
-                    raise InputError(
-                        "one world would be counted twice", where=f"{where}, {shard.where}: {one.name}",
-                        expected="shards made each with its own key and, of a calibration bank, its own --first",
-                        received="the same file twice" if where == shard.where else f"set {one.name} in both",
-                        hint=f"r2s2r blind score --published {where}",
-                    )  # fmt: skip
-            names |= {one.name: shard.where} | ({world: shard.where} if world[0] is not None else {})
+            seed = one.label.get("seed")
+            world = one.name if seed is None else (seed, one.label.get("observed"))
+            if world in there:
+                where = there[world]
+                raise InputError(
+                    "one world would be counted twice", where=f"{where}, {shard.where}: {one.name}",
+                    expected="shards made each with its own key and, of a calibration bank, its own --first",
+                    received="the same file twice" if where == shard.where else f"set {one.name} in both",
+                    hint=f"r2s2r blind score --published {where}",
+                )  # fmt: skip
+            there[world] = shard.where
 
 
 def _facts(shard: Shard) -> BlindShard:

@@ -27,7 +27,8 @@ class Calibration:
     the best effect leaves; unknown [nats]: what that must exceed. bias [nats]: of a name, what its gains are short of.
     commit, commit_none, commit_unknown: probability from which an effect, `none` or `unknown` is the verdict.
     conformal: names whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many
-    it rests on, 0 for the defaults.
+    it rests on, 0 for the defaults. lapse: how often the evidence says nothing of the truth, so that no name is ever
+    certain.
     """
 
     temperature: float = 25.0
@@ -43,6 +44,7 @@ class Calibration:
     commit_none: float = 0.5
     commit_unknown: float = 0.5
     conformal: float = 0.05
+    lapse: float = 0.0
     bias: Mapping[str, float] = field(default_factory=dict)
     words: str = "uncalibrated: a temperature by hand"
     sets: int = 0
@@ -70,12 +72,13 @@ class Calibration:
         return probability >= {NONE: self.commit_none, UNKNOWN: self.commit_unknown}.get(name, self.commit)
 
     def probabilities(self, scores: Mapping[str, float]) -> dict[str, float]:
-        """Softmax of scores [nats] by name."""
+        """Softmax of scores [nats] by name; a share `lapse` of it goes to all names alike."""
         names = list(scores)
         x = np.array([scores[name] + self.bias.get(name, 0.0) for name in names]) / self.temperature
         x = np.where(np.isfinite(x), x, -1e9)
         p = np.exp(x - x.max())
-        return dict(zip(names, (p / p.sum()).tolist(), strict=True))
+        p = (1.0 - self.lapse) * p / p.sum() + self.lapse / len(p)
+        return dict(zip(names, p.tolist(), strict=True))
 
     def within(self, probabilities: Mapping[str, float]) -> tuple[str, ...]:
         """The 90 % set, most probable first; never empty."""

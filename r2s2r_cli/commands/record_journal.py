@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -70,12 +71,23 @@ class Recording:
                 expected="no journal", received="one", hint=f"r2s2r recover '{journal}'",
             )  # fmt: skip
         if self.target.exists() and not force:
-            newest = self.project.iterations()[-1].number
             raise UsageError(
                 "this iteration has a recording already, and what a robot did cannot be made again",
                 where=self.project.relative(self.target), expected="none", received="one",
-                hint=f"r2s2r {self.stage} ... --iteration {newest + 1}   # or --force: the old one stays as .replaced",
+                hint=self._elsewhere(),
             )  # fmt: skip
+
+    def _elsewhere(self) -> str:
+        """The command as it was typed, for where there is room: a recording starts a new iteration, what is executed
+        belongs to the plan of its own."""
+        words = sys.argv[1:] if sys.argv[1:2] == [self.stage] else [self.stage]
+        if self.stage == "execute":
+            return shlex.join(["r2s2r", *words, "--force"]) + "   # the old runs stay as .replaced"
+        at = next((k for k, word in enumerate(words) if word.split("=")[0] == "--iteration"), None)
+        if at is not None:
+            del words[at : at + (1 if "=" in words[at] else 2)]
+        newest = self.project.iterations()[-1].number
+        return shlex.join(["r2s2r", *words, "--iteration", str(newest + 1)])
 
     def put_aside(self) -> Path | None:
         """The recording that is there gets another name (--force); None where there is none."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -107,8 +108,10 @@ def test_a_recording_does_not_go_stale(robot_project: Path, link: Maker) -> None
     assert status["next"] == ""  # a single run repeats nothing, and holds no camera to estimate states from
 
 
-def test_nothing_is_overwritten(robot_project: Path, link: Maker) -> None:
-    """A second recording is refused before anything moves; with --force the first keeps another name."""
+def test_nothing_is_overwritten(robot_project: Path, link: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second recording is refused before anything moves, with a hint that records elsewhere what was asked for; with
+    --force the first keeps another name."""
+    monkeypatch.setattr("sys.argv", ["r2s2r", *ASK])
     first = link()
     document(*ASK, "--no-draw")
     before = read_header(robot_project / RECORDING).content_sha256
@@ -116,7 +119,11 @@ def test_nothing_is_overwritten(robot_project: Path, link: Maker) -> None:
     refused = invoke(*ASK)
     assert refused.exit_code == 2 and "--iteration 2" in refused.stderr
     assert made.commands == [] and first.commands != []
-    document(*ASK, "--no-draw", "--force", "--seed", "1")
+    hint = shlex.split(refused.stderr.split("hint: ")[-1], comments=True)
+    assert hint == ["r2s2r", *ASK, "--iteration", "2"]
+    document(*hint[1:], "--no-draw")
+    link()
+    document(*ASK, "--no-draw", "--force", "--seed", "1", "--iteration", "1")
     assert read_header(robot_project / f"{RECORDING}.replaced").content_sha256 == before
     assert read_header(robot_project / RECORDING).content_sha256 != before
 

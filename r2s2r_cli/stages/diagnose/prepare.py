@@ -15,7 +15,6 @@ from r2s2r_cli.stages.diagnose.which.before import Healthy
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
 from r2s2r_cli.stages.diagnose.which.pieces import pieces
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
-from r2s2r_cli.stages.diagnose.which.score import groups_of, scores
 from r2s2r_cli.stages.diagnose.which.stretches import stretches
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.measures.floor import floor_of
@@ -94,8 +93,8 @@ def refit(
         healthy, begin = Healthy(arena, base), base.z[: arena.shared]
         if evidence.floor is None:
             sensor = float(np.sqrt(np.mean([np.sum(one.noise[-1] ** 2, axis=-1).mean() for one in arena.whole])))
-            (own,) = scores(arena, [base], groups_of(arena), held_out=False)
-            squared = own.squared[np.isfinite(own.squared)]
+            squared = healthy.score.squared
+            squared = squared[np.isfinite(squared)]
             usual = squared[squared <= np.quantile(squared, KEPT)]
             rmse = float(np.sqrt(np.mean(usual)))
             floor = FloorGiven(rmse, min(sensor, rmse), "the healthy runs, refitted", True, KEPT)

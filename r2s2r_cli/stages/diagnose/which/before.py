@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis, unlikely
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
 from r2s2r_cli.stages.diagnose.which.rough import DRAWS, around, root_of
-from r2s2r_cli.stages.diagnose.which.score import ENOUGH
+from r2s2r_cli.stages.diagnose.which.score import ENOUGH, Score, groups_of, scores
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,12 @@ class Healthy:
 
     arena: Arena
     base: Fit
+
+    @cached_property
+    def score(self) -> Score:
+        """Of their own refit, nothing left out: with a run or two that would be the error of a fit to half of them."""
+        (own,) = scores(self.arena, [self.base], groups_of(self.arena), held_out=False)
+        return own
 
 
 def chronic(arena: Arena, healthy: Healthy | None, fits: Sequence[Fit]) -> np.ndarray:

@@ -16,7 +16,7 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.before import Healthy
 from r2s2r_cli.stages.diagnose.which.mixture import usual
-from r2s2r_cli.stages.diagnose.which.score import Score, groups_of, scores
+from r2s2r_cli.stages.diagnose.which.score import Score
 
 PIECE = 10.0
 """[nats]"""
@@ -53,10 +53,8 @@ def left(at_least: np.ndarray, refit: Score, others: Sequence[Score], healthy: H
 
 
 def healthy_excess(healthy: Healthy) -> np.ndarray:
-    """What pieces of the healthy runs cost beyond what noise and floor explain, (piece,) [nats]. None is left out: with
-    a run or two that would be the error of a fit to half of them."""
-    (own,) = scores(healthy.arena, [healthy.base], groups_of(healthy.arena), held_out=False)
-    return _bounded(-own.elpd - expected(healthy.arena))
+    """What pieces of the healthy runs cost beyond what noise and floor explain, (piece,) [nats]."""
+    return _bounded(-healthy.score.elpd - expected(healthy.arena))
 
 
 def _bounded(nats: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ A sensor that reads wrong moves nothing while recorded commands are replayed; an
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,7 @@ SEEN = ("sensing", "observation")
 """Hooks that act on what is seen of a trajectory."""
 
 
+@lru_cache(maxsize=16)
 def moves_nothing(structure: Structure) -> tuple[str, ...]:
     """Fields of the parameters, `EFFECT.NAME`, that no replayed trajectory depends on."""
     from r2s2r_cli.engine.hooks import Hooks

@@ -101,7 +101,9 @@ class IdentifiedBy(Frozen):
     error_median: float
     """Of the relative errors of all values."""
     cpu_ratio: float
-    """Its processor time in all cases over ours."""
+    """Its processor time in all cases over ours: one hard case can decide it."""
+    cpu_median_ratio: float
+    """Median over the cases of its processor time over ours in the same one."""
 
 
 class IdentifyBenchResult(Frozen):

@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
 SEEDS = 2
 """Cases beside mujoco.sysid by default: it takes a quarter of a minute for each, twice."""
-MUJOCO_STEP_S = 0.002
-"""Half the steps that ours takes in the same time: the time that it was measured with elsewhere, in its favour."""
+STEP_MS = 2.0
+"""Of both simulators, so that they do the same work: the one that `mujoco.sysid` was measured with elsewhere."""
+OWN_STEP_MS = 1.0
+"""Of ours where it is alone: that of `identify`."""
 FEW = 5
 """Up to so many cases are shown one by one."""
 MANY = 20
@@ -49,13 +51,23 @@ def identify(
         bool, typer.Option("--growing", help="mujoco.sysid with a growing horizon of our making, too: a minute each.")
     ] = False,
     seconds: Annotated[int, typer.Option("--seconds", min=2, max=60, help="Length of each gait [s].")] = 10,
+    step: Annotated[
+        float | None,
+        typer.Option(
+            "--step",
+            min=0.25,
+            max=4.0,
+            help=f"Step of both simulators [ms]; {STEP_MS:g}, or {OWN_STEP_MS:g} with --cases.",
+        ),
+    ] = None,
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
     """Plant five numbers in a robot, and see who finds them: our fit and mujoco.sysid, in processor time.
 
     A random binary gait, end caps at 20 Hz with 1 mm of noise, starts 15 to 50 % off, first state known. Each tool gets
-    data of its own simulator, so that neither is judged by how the two differ. Needs the extra `rig`, with --cases not.
+    data of its own simulator, so that neither is judged by how the two differ, and both take the same step. Needs the
+    extra `rig`, with --cases not.
 
     Example: r2s2r bench identify --cases 10
     """
@@ -67,7 +79,8 @@ def identify(
     theirs = () if cases is not None else (DEFAULTS, SCALED, *((GROWING,) if growing else ()))
     if theirs:
         _require_sysid()
-    result = _measured(robot, range(cases or seeds), theirs, hard, seconds, console)
+    step_ms = step or (STEP_MS if theirs else OWN_STEP_MS)
+    result = _measured(robot, range(cases or seeds), theirs, hard, seconds, 1e-3 * step_ms, console)
     console.document(result)
     _print(result, console)
 
@@ -87,7 +100,7 @@ def _require_sysid() -> None:
 
 
 def _measured(
-    name: str, seeds: Iterable[int], theirs: tuple[str, ...], hard: bool, seconds: int, console: Console
+    name: str, seeds: Iterable[int], theirs: tuple[str, ...], hard: bool, seconds: int, step: float, console: Console
 ) -> IdentifyBenchResult:
     import tomllib
 
@@ -102,7 +115,7 @@ def _measured(
     seeds = list(seeds)
     found: dict[str, list[IdentifiedCase]] = {tool: [] for tool in (OURS, *theirs)}
     with console.progress("identify", len(seeds) * len(found) + 1) as advance:
-        predictor = predictor_of(robot, hard=hard)
+        predictor = predictor_of(robot, hard=hard, step=step)
         compile_s = _compiled(robot, predictor)
         advance(1)
         for seed in seeds:
@@ -110,12 +123,12 @@ def _measured(
             for tool in found:
                 found[tool].append(_one(tool, case, predictor))
                 advance(1)
-    ours_cpu_s = sum(one.cpu_s for one in found[OURS])
+    ours_cpu_s = [max(one.cpu_s, 1e-9) for one in found[OURS]]
     packages = ("torch", "llvmlite", "numpy", *(("mujoco",) if theirs else ()))
     frees = predictor.mapping.frees
     return IdentifyBenchResult(
         machine=machine(), versions={package: version(package) for package in packages}, robot=name,
-        run_s=float(seconds), step_s={"ours": predictor.step, **({"mujoco": MUJOCO_STEP_S} if theirs else {})},
+        run_s=float(seconds), step_s={"ours": step, **({"mujoco": step} if theirs else {})},
         noise_mm=1e3 * NOISE_M, frames_per_s=1.0 / FRAME_S, hard=hard, parameters=tuple(free.name for free in frees),
         units=tuple(free.unit for free in frees),
         tools={tool: summed_up(_WHAT[tool], cases, ours_cpu_s) for tool, cases in found.items()}, compile_s=compile_s,
@@ -142,7 +155,7 @@ def _one(tool: str, case: Case, predictor: Predictor) -> IdentifiedCase:
         return judged(case, ours.truth, _tried(ours.fit))
     from r2s2r_cli.commands.bench_identify_mujoco import SysidSide
 
-    side = SysidSide(case, MUJOCO_STEP_S)
+    side = SysidSide(case, predictor.step)
     fits: dict[str, Callable[[], Fit]] = {
         DEFAULTS: side.fit,
         SCALED: lambda: side.fit(x_scale="jac"),
@@ -161,15 +174,15 @@ def _tried(fit: Callable[[], Fit]) -> Any:
 
 def _print(result: IdentifyBenchResult, console: Console) -> None:
     rows = [
-        [tool, f"{by.cpu_median_s:.2f} s", f"{by.cpu_ratio:.1f}x", _of(by.solved),
+        [tool, f"{by.cpu_median_s:.2f} s", f"{by.cpu_median_ratio:.1f}x", f"{by.cpu_ratio:.1f}x", _of(by.solved),
          f"{100 * by.error_median:.2g} %", _of(by.covered), f"{by.without_interval}", f"{_rms(by):.2f} mm"]
         for tool, by in result.tools.items()
     ]  # fmt: skip
     console.table(
         f"{result.robot}, {len(result.parameters)} numbers, {result.run_s:g} s of gait at {result.frames_per_s:g} Hz, "
-        f"noise {result.noise_mm:g} mm ({result.machine})",
-        ["tool", "processor, median", "to ours", "solved", "error, median", "in its 95 % interval", "no interval",
-         "residual, median"],
+        f"noise {result.noise_mm:g} mm, steps of {1e3 * result.step_s['ours']:g} ms ({result.machine})",
+        ["tool", "processor, median", "to ours, median", "in all", "solved", "error, median", "in its 95 % interval",
+         "no interval", "residual, median"],
         rows,
     )  # fmt: skip
     for tool, by in result.tools.items():

@@ -30,8 +30,9 @@ PHASE = 0.2
 RUN = "gait"
 
 
-def predictor_of(robot: Robot, *, hard: bool = False) -> Predictor:
-    """The simulator of all cases of one robot, on one thread: compiled once. hard: attachment phases are free too."""
+def predictor_of(robot: Robot, *, hard: bool = False, step: float = 1e-3) -> Predictor:
+    """The simulator of all cases of one robot, on one thread: compiled once. hard: attachment phases are free too;
+    step: of the engine [s]."""
     import torch
 
     from r2s2r_cli.stages.identify.free import Mapping, select
@@ -39,7 +40,7 @@ def predictor_of(robot: Robot, *, hard: bool = False) -> Predictor:
 
     torch.set_num_threads(1)
     phases = tuple(f"attachment_phase.{rod}" for rod in range(len(robot.rods)) if hard)
-    return Predictor(Mapping(robot, select((*NUMBERS, *phases), robot)), threads=1)
+    return Predictor(Mapping(robot, select((*NUMBERS, *phases), robot)), step=step, threads=1)
 
 
 class OurSide:

@@ -36,8 +36,8 @@ def judged(case: Case, truth: np.ndarray, fit: Fit | str) -> IdentifiedCase:
     )  # fmt: skip
 
 
-def summed_up(what: str, cases: Sequence[IdentifiedCase], ours_cpu_s: float) -> IdentifiedBy:
-    """A tool over all cases. ours_cpu_s: processor time that ours took for the same ones [s]."""
+def summed_up(what: str, cases: Sequence[IdentifiedCase], ours_cpu_s: Sequence[float]) -> IdentifiedBy:
+    """A tool over all cases. ours_cpu_s: processor time that ours took for each of them [s], (case,)."""
     covered, none, errors = 0, 0, []
     for one in cases:
         for value, start, estimate, low, high in zip(
@@ -48,11 +48,12 @@ def summed_up(what: str, cases: Sequence[IdentifiedCase], ours_cpu_s: float) -> 
                 none += 1
             else:
                 covered += low <= value <= high
-    cpu = [one.cpu_s for one in cases]
+    cpu, ours = np.array([one.cpu_s for one in cases]), np.array(ours_cpu_s)
     return IdentifiedBy(
         what=what, cases=tuple(cases), solved=share(sum(one.solved for one in cases), len(cases)),
         covered=share(covered, len(errors)), without_interval=none, cpu_median_s=float(np.median(cpu)),
-        error_median=float(np.median(errors)), cpu_ratio=sum(cpu) / ours_cpu_s if ours_cpu_s > 0 else 1.0,
+        error_median=float(np.median(errors)), cpu_ratio=float(cpu.sum() / ours.sum()),
+        cpu_median_ratio=float(np.median(cpu / ours)),
     )  # fmt: skip
 
 

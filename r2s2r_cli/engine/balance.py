@@ -12,6 +12,7 @@ from r2s2r_cli.engine.cable import CableRows, cable_rows, rest_lengths, spring_f
 from r2s2r_cli.engine.centred import centred
 from r2s2r_cli.engine.contact import contact_rows
 from r2s2r_cli.engine.hooks import effective
+from r2s2r_cli.engine.nnls import nnls
 from r2s2r_cli.engine.parameters import Parameters
 from r2s2r_cli.engine.state import State
 from r2s2r_cli.engine.structure import Structure
@@ -20,7 +21,6 @@ TOUCHING = 0.003
 """[m] a cap lower than this may be carried by the ground."""
 LEVER = 0.1
 """[m] torques are weighed against forces at this arm."""
-ROUNDS = 3000
 SHRINK = 1e-3
 """Weight of the tensions themselves, against those that pull at each other without moving anything."""
 
@@ -40,7 +40,7 @@ def balance(structure: Structure, theta: Parameters, state: State, *, loose: Ten
 
     loose: winched cables that are known to pull at nothing, (B, actuated) bool.
     Passive cables pull as their lengths say. Frame G; velocities are ignored; friction is not limited here, because
-    what slides is for the simulation to decide. Projected gradients with Nesterov's momentum.
+    what slides is for the simulation to decide.
     """
     still = replace(state, v_WB=torch.zeros_like(state.v_WB), w_R=torch.zeros_like(state.w_R))
     with torch.no_grad():
@@ -59,9 +59,9 @@ def balance(structure: Structure, theta: Parameters, state: State, *, loose: Ten
         pulling = cables[..., winched] if loose is None else cables[..., winched] * ~loose[:, None]
         matrix = torch.cat([pulling, _ground_wrenches(structure, theta, rods)], dim=-1)
         weight = (theta.mass[..., None] * theta.gravity[:, None]).expand_as(rods.p)
-        load = torch.cat([weight, torch.zeros_like(rods.w)], dim=-1).flatten(1) + (cables @ own[..., None])[..., 0]
-        x = _least(matrix, load, structure)
-        left = (load + (matrix @ x[..., None])[..., 0]).unflatten(1, (-1, 6))
+        load = torch.cat([weight, torch.zeros_like(rods.w)], dim=-1).flatten(1) + (cables * own[:, None]).sum(-1)
+        x = nnls(matrix, load, free=_free(structure).to(matrix.device), shrink=SHRINK)
+        left = (load + (matrix * x[:, None]).sum(-1)).unflatten(1, (-1, 6))
     tension = own.clone()
     tension[:, winched] += x[:, : len(winched)]
     ground = x[:, len(winched) :].unflatten(1, (-1, 3))
@@ -96,21 +96,7 @@ def _ground_wrenches(structure: Structure, theta: Parameters, rods: Bodies) -> T
     return wrench.flatten(3).flatten(1, 2)
 
 
-def _least(matrix: Tensor, load: Tensor, structure: Structure) -> Tensor:
-    """Minimum of |load + matrix x|^2 + SHRINK |x|^2 with tensions and normal forces at least 0."""
-    n = structure.n_actuated
-    free = torch.ones(matrix.shape[-1], dtype=torch.bool, device=matrix.device)
-    free[:n] = False
-    free[n + 2 :: 3] = False
-    normal = matrix.mT @ matrix + SHRINK * torch.eye(matrix.shape[-1], dtype=matrix.dtype, device=matrix.device)
-    pull = (matrix.mT @ load[..., None])[..., 0]
-    rate = 1.0 / torch.linalg.eigvalsh(normal)[..., -1:]
-    x = torch.zeros_like(pull)
-    y, momentum = x, 1.0
-    for _ in range(ROUNDS):
-        step = y - rate * ((normal @ y[..., None])[..., 0] + pull)
-        new = torch.where(free, step, torch.relu(step))
-        after = 0.5 * (1.0 + (1.0 + 4.0 * momentum * momentum) ** 0.5)
-        y = new + (momentum - 1.0) / after * (new - x)
-        x, momentum = new, after
-    return x
+def _free(structure: Structure) -> Tensor:
+    """Which unknowns may be negative, (actuated + 6 rods,) bool: forces along the ground; not tensions, nor normals."""
+    along = torch.tensor([True, True, False]).repeat(2 * structure.n_rods)
+    return torch.cat([torch.zeros(structure.n_actuated, dtype=torch.bool), along])

@@ -13,17 +13,14 @@ from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.free import select
 from r2s2r_cli.stages.identify.paper import (
     PAPER_FREE,
-    Loss,
     PaperFit,
     Preset,
     Settings,
     demonstrations,
-    fly,
     identify_paper,
     preset,
     seen,
     settled_start,
-    synthetic,
 )
 from r2s2r_cli.stages.segments import segments, target_intervals
 from tests.stages.identify.paper.test_shooting import TARGETS, TRUTH, demo, made, start
@@ -141,16 +138,3 @@ def fly_states(state: Any, task: Preset) -> Any:
     from r2s2r_cli.engine import pack_state
 
     return pack_state(task.world.simulator.structure, state)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("first", [0.3, 0.8])
-def test_the_papers_task(first: float) -> None:
-    """Four shapes, motor speed from 0.3 and 0.8: of fifty iterations the best lies within 3 % of 0.5."""
-    task = from_speed(first)
-    targets = np.vstack([TARGETS, TARGETS[:, [2, 0, 1, 5, 3, 4]]])
-    theta = task.numbers.theta(np.array([TRUTH]))
-    truth = fly(task.world, theta, start(), targets)
-    run = synthetic(task.world.simulator, truth, seen(task.world, theta, truth.states).numpy(), targets)
-    found = identify_paper(task.world, task.numbers, [run], [start()], Settings(Loss.KEY_FRAME, iterations=50))
-    assert found.best[0] == pytest.approx(TRUTH, rel=0.03)

@@ -19,6 +19,8 @@ HORIZONS = (1, 2, 4, 7, 10)
 """Seconds of a growing fit; those beyond the run are left out, its length is the last."""
 Edit = Callable[[Any, float, Robot], None]
 """Writes a value into an MjSpec; the robot as in robot.toml is at hand."""
+MORE = 2
+"""Rows of the controls beyond the last observation, so that it lies within whatever roundings say."""
 WINCH, PASSIVE = "winch", "passive"
 """How the names of the actuators begin in the twin."""
 
@@ -51,7 +53,7 @@ class SysidSide:
         self._model, self._caps = model, [f"cap{cap}" for cap in range(caps)]
         self._start = sysid.create_initial_state(model, np.array(sim.data.qpos), np.array(sim.data.qvel))
         reeled = bench_gait.reeled_in(case.u[None], winch_speed(case.nominal), step_s)[0]
-        rows = np.concatenate([reeled, reeled[-1:]])  # one more, so that the last observation lies within
+        rows = np.concatenate([reeled, *[reeled[-1:]] * MORE])
         self._control = np.zeros((len(rows), model.nu))
         self._control[:, : rows.shape[1]] = rows
         self._step_s = step_s
@@ -99,7 +101,7 @@ class SysidSide:
         """The toolbox's residual function for the first len(observed) frames of end caps (frame, 3 cap)."""
         from mujoco import sysid
 
-        rows = round(self.case.t[len(observed) - 1] / self._step_s) + 1
+        rows = round(self.case.t[len(observed) - 1] / self._step_s) + MORE
         t = self._step_s * np.arange(rows)
         control = sysid.TimeSeries.from_control_names(t, self._control[:rows], self._model)
         seen = sysid.TimeSeries.from_names(self.case.t[: len(observed)], observed, self._model, names=self._caps)

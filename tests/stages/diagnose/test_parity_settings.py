@@ -109,3 +109,17 @@ def test_winches_that_stand_have_no_wrong_number() -> None:
 
     assert at(0.0) == []
     assert at(0.3) == ["rate"]
+
+
+def test_a_single_motor_that_stands_is_named() -> None:
+    """Its cable keeps its length whatever it is told; one that turns one way only, or slowly, is for the diagnosis."""
+
+    def found(inwards: float, outwards: float) -> list[str]:
+        def lengths(u: np.ndarray, h: float) -> np.ndarray:
+            own = np.where(u > 0, inwards, outwards)
+            return np.asarray(np.cumsum(SPEED * h * u * np.where(np.arange(6) == 3, own, 1.0), axis=0))
+
+        return [one.what for one in mismatches([wound(f"g{k}", k, lengths) for k in range(2)], threebar(), SPEED)[0]]
+
+    assert found(0.0, 0.0) == ["motor 3 does not turn at full command, either way"]
+    assert found(1.0, 0.0) == found(0.2, 0.2) == found(1.0, 1.0) == []

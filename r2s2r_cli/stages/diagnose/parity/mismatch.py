@@ -8,7 +8,7 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Run
 from r2s2r_cli.stages.diagnose.parity.finding import Mismatch
-from r2s2r_cli.stages.diagnose.parity.mismatch_drive import order_of_motors, rate, signs
+from r2s2r_cli.stages.diagnose.parity.mismatch_drive import order_of_motors, rate, signs, standing
 from r2s2r_cli.stages.diagnose.parity.mismatch_order import order_of_caps, order_of_sensors
 from r2s2r_cli.stages.diagnose.parity.series import Series, series
 from schemas.robot import Robot
@@ -30,7 +30,7 @@ def mismatches(runs: Sequence[Run], robot: Robot, speed: float) -> tuple[list[Mi
     many = tuple(series(run, robot) for run in runs)
     missing: list[str] = []
     stages: tuple[Callable[[Sequence[Series], Robot, float, list[str]], list[Mismatch]], ...] = (
-        _units, order_of_caps, order_of_sensors, order_of_motors, signs, rate,
+        _units, order_of_caps, order_of_sensors, order_of_motors, signs, standing, rate,
     )  # fmt: skip
     for stage in stages:
         found = stage(many, robot, speed, missing)

@@ -20,6 +20,8 @@ FAST, SLOW = 1.6, 0.6
 """Winding rates over the nominal, all winches alike, that are a wrong number and no effect."""
 STANDS = 0.05
 """Of the nominal rate: a winch that does not turn has no wrong number, it does not start."""
+TURNS = 0.3
+"""Of the nominal rate: the others turn, so power and commands are there."""
 
 
 def order_of_motors(runs: Sequence[Series], robot: Robot, speed: float, missing: list[str]) -> list[Mismatch]:
@@ -59,19 +61,27 @@ def signs(runs: Sequence[Series], robot: Robot, speed: float, missing: list[str]
     )]  # fmt: skip
 
 
+def standing(runs: Sequence[Series], robot: Robot, speed: float, missing: list[str]) -> list[Mismatch]:
+    """Single motors that turn neither way at full command while others do: a plug, a cable off its winch. Where all
+    stand there may be a law behind it (a dead zone), which is for the catalogue to name."""
+    del missing
+    rates = _full_rates(runs, robot)
+    turned = {k: np.abs(list(both.values())) / speed for k, both in rates.items() if len(both) == 2}
+    still = [k for k, share in turned.items() if share.max() < STANDS]
+    if not still or len(still) == len(turned) or np.median([share.min() for share in turned.values()]) < TURNS:
+        return []
+    who = f"motor{'s' * (len(still) > 1)} {listed(robot.actuated[k] for k in still)}"
+    most = max(turned[k].max() for k in still)
+    return [Mismatch(
+        "motor", f"{who} {'do' if len(still) > 1 else 'does'} not turn at full command, either way",
+        f"{1e3 * speed:.0f} mm/s", f"{1e3 * most * speed:.1f} mm/s at most",
+        "r2s2r doctor   # then the plug of the motor and its winch; leave these runs out",
+    )]  # fmt: skip
+
+
 def rate(runs: Sequence[Series], robot: Robot, speed: float, missing: list[str]) -> list[Mismatch]:
     """All winches much too fast or slow both ways: a wrong speed, radius or clock."""
-    rates: list[float] = []
-    for one in runs:
-        log = CommandLog(one.run.caps)
-        for k, cable in enumerate(robot.actuated):
-            t, length = _readings(one, cable)
-            u, past = log.at(t)[:, k], np.diff(t)
-            for way in (1.0, -1.0):
-                inside = way * u > 0.9
-                steady = inside[1:] & inside[:-1] & (past > 0) & (past < GAP_S)
-                if steady.sum() >= LEAST_ROWS:
-                    rates.append(float(-way * np.diff(length)[steady].sum() / past[steady].sum()))
+    rates = [one for both in _full_rates(runs, robot).values() for one in both.values()]
     if len(rates) < 4:
         missing.append("rate of the winches: too few long commands at full speed")
         return []
@@ -83,6 +93,26 @@ def rate(runs: Sequence[Series], robot: Robot, speed: float, missing: list[str])
         f"{1e3 * ratio * speed:.0f} mm/s",
         "r2s2r identify   # or correct speed and winch_radius_m in robot.toml, or the stamps of the log",
     )]  # fmt: skip
+
+
+def _full_rates(runs: Sequence[Series], robot: Robot) -> dict[int, dict[float, float]]:
+    """Winding rate of each winch at full command, way (+1: reeling in) by way, where there is enough of it [m/s]; +: as
+    it was told. Runs are taken together."""
+    found: dict[int, dict[float, float]] = {}
+    for k, cable in enumerate(robot.actuated):
+        for way in (1.0, -1.0):
+            moved, took, rows = 0.0, 0.0, 0
+            for one in runs:
+                t, length = _readings(one, cable)
+                u, past = CommandLog(one.run.caps).at(t)[:, k], np.diff(t)
+                inside = way * u > 0.9
+                steady = inside[1:] & inside[:-1] & (past > 0) & (past < GAP_S)
+                moved += -way * float(np.diff(length)[steady].sum())
+                took += float(past[steady].sum())
+                rows += int(steady.sum())
+            if rows >= LEAST_ROWS:
+                found.setdefault(k, {})[way] = moved / took
+    return found
 
 
 def _readings(one: Series, cable: int) -> tuple[np.ndarray, np.ndarray]:

@@ -172,4 +172,9 @@ if __name__ == "__main__":
     if given.again:
         again(given.out.resolve(), given.seeds)
     else:
-        main(given.out.resolve(), given.seeds, DEMO if given.demo else Profile(), paper=not (given.demo or given.no_paper))
+        main(
+            given.out.resolve(),
+            given.seeds,
+            DEMO if given.demo else Profile(),
+            paper=not (given.demo or given.no_paper),
+        )

@@ -28,7 +28,7 @@ def test_who_does_not_look_fails(answer: blind_bank.Answer) -> None:
     """Always friction, or any answer: neither names the cause, and both cry wolf."""
     _, rows = scored(answer)
     for name in ("top1_clear", "top3_clear", "precision_named", "channel_clear", "element_clear", "false_alarm",
-                 "sub_floor", "outside_recall", "coverage", "ece"):  # fmt: skip
+                 "false_claim", "sub_floor", "outside_recall", "coverage", "ece"):  # fmt: skip
         assert rows[name].passed is False, name
 
 

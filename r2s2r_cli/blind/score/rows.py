@@ -172,6 +172,8 @@ METRICS = (
            _onset),
     Metric("false_alarm", "anything but 'no gap' where nothing is wrong", {"A": 0.05, "B": 0.10},
            lambda p: p[1].verdict != "no_gap" if p[0].kind == "none" else None, above=False),
+    Metric("false_claim", "an effect, a pair or 'unknown' said where nothing is wrong", {"A": 0.05, "B": 0.10},
+           lambda p: p[1].verdict in ("effect", "pair", "unknown") if p[0].kind == "none" else None, above=False),
     Metric("sub_floor", "'no gap' where the effect lies under the floor", {"A": 0.90, "B": 0.85},
            lambda p: p[1].verdict == "no_gap" if p[0].stratum == "sub-floor" else None),
     Metric("outside_recall", "'unknown' where no catalogue has it, clear", {"A": 0.80, "B": 0.65},

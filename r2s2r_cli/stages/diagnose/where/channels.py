@@ -40,36 +40,37 @@ def fitted(design: Design, places: np.ndarray, rows: np.ndarray) -> Spread:
     T = _part(design, places)[rows]
     logdet, size = design.logdet[rows], design.size[rows]
     for _ in range(ROUNDS if K else 3):
-        V, square, wider = _marginal(T, q, K, variance, nuisance, mean)
-        w = weight(square, logdet + wider, size)
+        free = _free(T, q, variance)
+        w = weight(_squares(T, free, _left(nuisance, mean)), logdet + free.logdet, size)
         # Generalised least squares of nuisances and means: products within the marginal covariance.
-        H = np.einsum("sc,scij->ij", w, V[..., : q + K, : q + K])
-        g = np.einsum("sc,sci->i", w, V[..., : q + K, -1])
+        reached = (free.W * np.sqrt(w)[..., None, None]).reshape(-1, T.shape[-1])
+        V = np.tensordot(w, T, 2) - reached.T @ reached
+        H, g = V[: q + K, : q + K], V[: q + K, -1]
         H[:q, :q] += design.known
         H[q:, q:] += np.eye(K)
         unit = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-12))
         both = unit * np.linalg.solve(unit[:, None] * H * unit + 1e-9 * np.eye(q + K), unit * g)
         nuisance, mean = both[:q], both[q:]
         if K:
-            variance = np.where(varies, _variance(T, q, K, variance, nuisance, mean, w), LEAST)
+            variance = np.where(varies, _variance(free, _left(nuisance, mean), w), LEAST)
     return Spread(nuisance, mean, variance)
 
 
-def densities(design: Design, places: np.ndarray, spread: Spread) -> np.ndarray:
-    """Log density of every stretch, (stretch,) [nats], up to what all probes share."""
-    q, K = design.q, len(places)
-    T = _part(design, places)
-    _, square, wider = _marginal(T, q, K, spread.variance, spread.nuisance, spread.mean)
-    return -minus_log(square, design.logdet + wider, design.size)
+def densities(design: Design, places: np.ndarray, spread: Spread, rows: np.ndarray) -> np.ndarray:
+    """Log density of the stretches `rows` (R,) [nats], up to what all probes share."""
+    T = _part(design, places)[rows]
+    free = _free(T, design.q, spread.variance)
+    square = _squares(T, free, _left(spread.nuisance, spread.mean))
+    return -minus_log(square, design.logdet[rows] + free.logdet, design.size[rows])
 
 
 def held_out(design: Design, places: np.ndarray, groups: np.ndarray) -> np.ndarray:
     """Log density of every stretch (stretch,) from probes and nuisances fitted without its group (stretch,)."""
     found = np.zeros(len(groups))
     for group in np.unique(groups):
-        out = groups == group
-        spread = fitted(design, places, np.flatnonzero(~out) if (~out).any() else np.flatnonzero(out))
-        found[out] = densities(design, places, spread)[out]
+        out, others = np.flatnonzero(groups == group), np.flatnonzero(groups != group)
+        spread = fitted(design, places, others if len(others) else out)
+        found[out] = densities(design, places, spread, out)
     return found
 
 
@@ -80,14 +81,13 @@ def gains(design: Design, places: np.ndarray, groups: np.ndarray, plain: np.ndar
 
 def sizes(design: Design, places: np.ndarray, spread: Spread) -> tuple[np.ndarray, np.ndarray]:
     """Fitted numbers of every stretch in units of the probes, (stretch, K), and their sd."""
-    q, K = design.q, len(places)
-    T = _part(design, places)
-    _, square, wider = _marginal(T, q, K, spread.variance, spread.nuisance, spread.mean)
-    w = weight(square, design.logdet + wider, design.size)
+    T, b = _part(design, places), _left(spread.nuisance, spread.mean)
+    free = _free(T, design.q, spread.variance)
+    w = weight(_squares(T, free, b), design.logdet + free.logdet, design.size)
     p = w / w.sum(axis=1, keepdims=True)
-    c, covariance = _posterior(T, q, K, spread.variance, spread.nuisance, spread.mean)
+    c, known = _posterior(free, b)
     mean = np.einsum("sc,sck->sk", p, c)
-    variance = np.einsum("sc,sckk->sk", p, covariance) + np.einsum("sc,sck->sk", p, (c - mean[:, None]) ** 2)
+    variance = np.einsum("sc,sck->sk", p, known + (c - mean[:, None]) ** 2)
     scale = np.array([design.columns[k].scale for k in places])
     return (mean + spread.mean) * scale, np.sqrt(variance) * scale
 
@@ -98,43 +98,52 @@ def _part(design: Design, places: np.ndarray) -> np.ndarray:
     return design.gram[..., chosen[:, None], chosen[None, :]]
 
 
-def _marginal(
-    T: np.ndarray, q: int, K: int, variance: np.ndarray, nuisance: np.ndarray, mean: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Products within the covariance of noise and free probes (Woodbury), squares of what is left of the innovations,
-    and what the probes add to log determinants, each by stretch and kind."""
-    if not K:
-        V, logdet = T, np.zeros(T.shape[:2])
-    else:
-        A = T[..., q : q + K]
-        root = np.sqrt(variance)
-        B = np.eye(K) + root[:, None] * T[..., q : q + K, q : q + K] * root
-        scaled = A * root
-        V = T - scaled @ np.linalg.solve(B, np.swapaxes(scaled, -1, -2))
-        logdet = np.linalg.slogdet(B)[1]
-    b = np.concatenate([nuisance, mean, [-1.0]])
-    square = np.maximum(np.einsum("i,scij,j->sc", b, V, b), 1e-12)
-    return V, square, logdet
+@dataclass(frozen=True)
+class _Free:
+    """Probes of unknown size, by stretch and kind. root (K,): sd of their sizes. inverse: of the Cholesky factor of
+    1 + root P root, P the probes' products (S, c, K, K); W: it times root times the probes' products with everything
+    (S, c, K, n), so that T - W'W are the products within the covariance of noise and probes (Woodbury). logdet (S, c):
+    what they add to the covariance's."""
+
+    root: np.ndarray
+    inverse: np.ndarray
+    W: np.ndarray
+    logdet: np.ndarray
 
 
-def _posterior(
-    T: np.ndarray, q: int, K: int, variance: np.ndarray, nuisance: np.ndarray, mean: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Deviations of the probes from their mean (stretch, kind, K), and their covariance."""
-    b = np.concatenate([-nuisance, -mean, [1.0]])
-    left = T[..., q : q + K, :] @ b
-    covariance = np.linalg.inv(T[..., q : q + K, q : q + K] + np.diag(1.0 / variance))
-    return np.einsum("scij,scj->sci", covariance, left), covariance
+def _free(T: np.ndarray, q: int, variance: np.ndarray) -> _Free:
+    """Of products T (S, c, q + K + 1, q + K + 1) and the variances (K,) of the probes."""
+    K = len(variance)
+    root = np.sqrt(variance)
+    rows = root[:, None] * T[..., q : q + K, :]
+    factor = np.linalg.cholesky(np.eye(K) + rows[..., q : q + K] * root)
+    inverse = np.linalg.inv(factor)
+    logdet = 2.0 * np.log(np.diagonal(factor, axis1=-2, axis2=-1)).sum(axis=-1)
+    return _Free(root, inverse, inverse @ rows, logdet)
 
 
-def _variance(
-    T: np.ndarray, q: int, K: int, variance: np.ndarray, nuisance: np.ndarray, mean: np.ndarray, w: np.ndarray
-) -> np.ndarray:
-    c, covariance = _posterior(T, q, K, variance, nuisance, mean)
+def _left(nuisance: np.ndarray, mean: np.ndarray) -> np.ndarray:
+    """Innovations less what nuisances and mean probes explain, in columns of the products (q + K + 1,)."""
+    return np.concatenate([-nuisance, -mean, [1.0]])
+
+
+def _squares(T: np.ndarray, free: _Free, b: np.ndarray) -> np.ndarray:
+    """Squares of what is left of the innovations within the covariance of noise and free probes, (S, c)."""
+    return np.maximum((T @ b) @ b - np.sum((free.W @ b) ** 2, axis=-1), 1e-12)
+
+
+def _posterior(free: _Free, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Deviations of the probes from their mean and their variances, (S, c, K) each."""
+    c = free.root * ((free.W @ b)[..., None, :] @ free.inverse)[..., 0, :]
+    return c, free.root**2 * np.sum(free.inverse**2, axis=-2)
+
+
+def _variance(free: _Free, b: np.ndarray, w: np.ndarray) -> np.ndarray:
+    c, known = _posterior(free, b)
     p = w / w.sum(axis=1, keepdims=True)
     # One interval's worth of prior at a quarter of the scale keeps few intervals from saying too much.
-    total = np.einsum("sc,sck->k", w, c**2) + np.einsum("sc,sckk->k", p, covariance) + 0.0625
-    return np.clip(total / (len(T) + 1), LEAST, MOST)
+    total = np.einsum("sc,sck->k", w, c**2) + np.einsum("sc,sck->k", p, known) + 0.0625
+    return np.clip(total / (len(w) + 1), LEAST, MOST)
 
 
 def explained(design: Design, places: Sequence[int], spread: Spread) -> float:
@@ -143,9 +152,9 @@ def explained(design: Design, places: Sequence[int], spread: Spread) -> float:
     chosen = np.asarray(places, dtype=int)
     q, K = design.q, len(chosen)
     T = _part(design, chosen)
-    _, square, wider = _marginal(T, q, K, spread.variance, spread.nuisance, spread.mean)
-    w = weight(square, design.logdet + wider, design.size)
-    c, _ = _posterior(T, q, K, spread.variance, spread.nuisance, spread.mean)
+    free, left = _free(T, q, spread.variance), _left(spread.nuisance, spread.mean)
+    w = weight(_squares(T, free, left), design.logdet + free.logdet, design.size)
+    c, _ = _posterior(free, left)
     moved = np.broadcast_to(-spread.nuisance, (*w.shape, q))
     b = np.concatenate([moved, -(c + spread.mean), np.ones((*w.shape, 1))], axis=-1)
     plain = np.concatenate([-spread.nuisance, np.zeros(K), [1.0]])

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from r2s2r_cli.stages.identify.free.base import values_of
 from r2s2r_cli.stages.identify.growing import BEFORE_POPULATION, EARLY_HORIZONS, stages_of, started
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
@@ -53,6 +54,12 @@ def near_fit(predictor: Predictor, windows: Sequence[Window], values: np.ndarray
     )  # fmt: skip
     mark = _passed(marks, count - 1) if count < len(stages) else None
     return Near(tuple(windows), solution, tuple(said), predictor.rollouts - before, mark, predictor)
+
+
+def reached(near: Near) -> np.ndarray:
+    """The values of the parameters that it came to, (n,), in their units."""
+    frees = near.predictor.mapping.frees
+    return values_of(frees, near.solution.z[: len(frees)])
 
 
 def _passed(marks: Sequence[Mark], stage: int) -> Mark | None:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.errors import NumericalError
+from r2s2r_cli.stages.identify import cables
 from r2s2r_cli.stages.identify.cables import with_cables
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.identify.recipe import default_fixed
@@ -21,20 +24,57 @@ SOFTER = tuple(default_fixed(threebar()).items())
 TRAIN = (Selection("walk", (1, 2, 3)),)
 
 
-def task(cache: Path | None = None, *, softer: bool = False, **request: object) -> Task:
-    """A fit of a walk of 3 intervals with 1 mm of noise, of a robot as robot.toml says or with softer cables."""
-    run = walk(3, values=SOFTER if softer else (), noise=1e-3, seed=5)
+def task(cache: Path | None = None, **request: object) -> Task:
+    """A fit of a walk of 3 intervals with 1 mm of noise, of a robot as robot.toml says."""
+    run = walk(3, noise=1e-3, seed=5)
     return Task(threebar(), [run], Request(TRAIN, **request), IdentifySettings(), cache)  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("softer", [False, True])
-def test_the_cables_that_the_robot_has_are_found(tmp_path: Path, softer: bool) -> None:
-    """Planted both ways; what is given to the fit is what was planted."""
-    found = with_cables(task(tmp_path, softer=softer))
-    assert found.stock is not softer
-    assert found.given == (dict(SOFTER) if softer else {})
+def test_cables_that_are_as_robot_toml_says_stay(tmp_path: Path) -> None:
+    """Planted as robot.toml has them; the fit goes on with what was tried."""
+    found = with_cables(task(tmp_path))
+    assert found.stock and found.given == {}
     assert found.near is not None and found.near.rollouts > 0 and np.isfinite(found.near.solution.cost)
+
+
+@pytest.mark.parametrize(
+    ("costs", "softer", "last"),
+    [
+        ((100.0, 130.0), True, 0),  # softer ones fit clearly better
+        ((100.0, 105.0, 99.0), False, 1),  # by less than robot.toml is worth
+        ((200.0, 100.0, 80.0), True, 2),  # begun again, as the others were
+        ((200.0, 100.0, 95.0), False, 1),
+        ((None, 100.0, None), False, 1),  # not to be simulated
+        ((100.0, None), True, 0),
+    ],
+)
+def test_softer_cables_must_fit_clearly_better(
+    monkeypatch: pytest.MonkeyPatch, costs: tuple[float | None, ...], softer: bool, last: int
+) -> None:
+    """Softer ones first, then those of robot.toml from there, then perhaps softer ones from there: whose fit it is."""
+    made: list[SimpleNamespace | None] = []
+    begun: list[object] = []
+
+    def near(task: Task, other: object = None) -> SimpleNamespace | None:
+        assert task.stock is (len(made) == 1)
+        cost = costs[len(made)]
+        made.append(None if cost is None else SimpleNamespace(solution=SimpleNamespace(cost=cost)))
+        begun.append(other)
+        return made[-1]
+
+    monkeypatch.setattr(cables, "_near", near)
+    found = with_cables(task())
+    assert len(made) == len(costs) and begun == [None, *made[:-1]]
+    assert found.stock is not softer
+    assert found.near is made[last]
+
+
+def test_none_that_can_be_simulated_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Exit 6."""
+    monkeypatch.setattr(cables, "_near", lambda *_: None)
+    with pytest.raises(NumericalError, match="cannot be simulated"):
+        with_cables(task())
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from r2s2r_cli.commands.identify_inputs import Asked as IdentifyAsked, Source, named_runs
+from r2s2r_cli.commands.identify_inputs import Asked as IdentifyAsked, Source, named_runs, require_robot
 from r2s2r_cli.commands.stage import require_input
-from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.errors import UsageError
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
 
@@ -121,7 +121,7 @@ class Asked:
         found: list[Run] = []
         gaits: dict[bytes, str] = {}
         for one in named_runs(self.sources):
-            require_robot(one.recording, one.run, robot.name)
+            require_robot(one.recording, one.run, robot.name, "diagnose")
             caps = run_data(one.recording, one.estimate, one.run, name=one.name, still=True)
             gait = gaits.setdefault(caps.intervals.target.round(6).tobytes(), one.name)
             found.append(Run(caps, sensed_run(one.name, one.recording, one.run, robot), gait=gait))
@@ -160,17 +160,6 @@ class Asked:
             return None
         told = group.attributes
         return FloorGiven(float(told["floor"]), float(told["sensor"]), f"floor.h5, {told['basis']}")
-
-
-def require_robot(recording: ArtifactData | None, run: str, name: str) -> None:
-    """Raises InputError where a run says that it is of another robot."""
-    own = None if recording is None else recording.groups.get(f"runs/{run}")
-    told = name if own is None else str(own.attributes.get("robot", name))
-    if told != name:
-        raise InputError(
-            f"run {run} is of another robot", where=f"runs/{run}, robot", expected=f"{name}, as robot.toml says",
-            received=told, hint="r2s2r diagnose --iteration N   # with runs of this robot alone",
-        )  # fmt: skip
 
 
 def _unsaid(model: Identified, path: Path) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.commands.stage import require_input
-from r2s2r_cli.errors import UsageError
+from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
 
@@ -69,6 +69,17 @@ def named_runs(sources: Sequence[Source]) -> Iterator[NamedRun]:
             name = f"executed-{name}" if name in taken else name
             taken.add(name)
             yield NamedRun(name, recording, estimate, run)
+
+
+def require_robot(recording: ArtifactData | None, run: str, name: str, command: str) -> None:
+    """Raises InputError where a run says that it is of another robot than `name`."""
+    own = None if recording is None else recording.groups.get(f"runs/{run}")
+    told = name if own is None else str(own.attributes.get("robot", name))
+    if told != name:
+        raise InputError(
+            f"run {run} is of another robot", where=f"runs/{run}, robot", expected=f"{name}, as robot.toml says",
+            received=told, hint=f"r2s2r {command} --iteration N   # with runs of this robot alone",
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -159,7 +170,10 @@ class Asked:
         """The runs of all sources, named by `named_runs`. Raises ArtifactError, InputError."""
         from r2s2r_cli.stages.identify.load import run_data
 
-        return [run_data(one.recording, one.estimate, one.run, name=one.name) for one in named_runs(self.sources)]
+        found, robot = list(named_runs(self.sources)), self.project.robot()
+        for one in found:
+            require_robot(one.recording, one.run, robot.name, "identify")
+        return [run_data(one.recording, one.estimate, one.run, name=one.name) for one in found]
 
     def artifacts(self) -> list[Path]:
         """Recordings and estimates that are read, those of the main iteration first."""

@@ -117,5 +117,9 @@ class CameraFeed(Protocol):
         """What has come since the last call, in order; never waits. Raises CameraError once the camera is gone and
         all of its frames were taken."""
 
+    def hold(self, on: bool) -> None:
+        """While on, a camera that can wait does so instead of frames being thrown away: that of a rig in lock-step,
+        whose time does not go on meanwhile. Somebody must take frames then."""
+
     def close(self) -> None:
         """Stop reading. The camera stays open."""

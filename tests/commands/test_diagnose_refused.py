@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
-from r2s2r_cli.commands.diagnose_inputs import Asked, require_robot
+from r2s2r_cli.commands.diagnose_inputs import Asked
+from r2s2r_cli.commands.identify_inputs import require_robot
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.write import write_artifact
@@ -71,6 +72,6 @@ def test_another_robot_is_refused(estimated: Path) -> None:
         one.evidence()
     recording = ArtifactData("recording", {"runs/walk": Group({}, {"robot": "sixbar"})})
     with pytest.raises(InputError, match="run walk is of another robot") as caught:
-        require_robot(recording, "walk", "threebar")
+        require_robot(recording, "walk", "threebar", "diagnose")
     assert caught.value.received == "sixbar" and caught.value.hint.startswith("r2s2r diagnose")
-    require_robot(recording, "walk", "sixbar")
+    require_robot(recording, "walk", "sixbar", "diagnose")

@@ -71,6 +71,15 @@ def test_without_an_estimate_the_hint_is_to_estimate(project: Path) -> None:
     assert result.stderr.splitlines()[-1] == "hint: r2s2r import run.csv --iteration 1"
 
 
+def test_runs_of_another_robot_are_refused(estimated: Path) -> None:
+    """Exit code 4 before any fit, in a dry run too; it says whose they are."""
+    robot = estimated / "robot.toml"
+    robot.write_text(robot.read_text().replace('name = "threebar"', 'name = "another"', 1))
+    result = invoke("identify", "--dry-run")
+    assert result.exit_code == 4
+    assert "run sample is of another robot" in result.stderr and "received: threebar" in result.stderr
+
+
 def test_a_dry_run_says_what_it_would_read(estimated: Path) -> None:
     """Recording and estimate are the inputs; the document has the keys that others rely on, without numbers yet."""
     result = invoke("identify", "--dry-run", "--json", "--train", "sample:1")

@@ -19,6 +19,10 @@ KEPT = 90
 """Frames kept for the reader: 3 s at 30 Hz, 140 MB at 640 x 480. Older ones are thrown away and counted."""
 
 
+HELD = 16
+"""Frames kept while the camera waits: the reader takes them all at once, and the camera's patience is short."""
+
+
 class Feed:
     """A `devices.camera.CameraFeed`: begins to read at once."""
 
@@ -26,7 +30,8 @@ class Feed:
         """camera: open. Its owner closes it, after the feed."""
         self._camera, self._kept = camera, kept
         self._waiting: deque[Frame] = deque()
-        self._lock = threading.Lock()
+        self._lock = threading.Condition()
+        self._holds = False
         self._statistics = FeedStatistics()
         self._error: CameraError | None = None
         self._last: Frame | None = None
@@ -46,13 +51,21 @@ class Feed:
         with self._lock:
             frames = list(self._waiting)
             self._waiting.clear()
+            self._lock.notify_all()
             if not frames and self._error is not None:
                 raise self._error
         return frames
 
+    def hold(self, on: bool) -> None:
+        """As `CameraFeed.hold`: no frame is read while there is no room for it."""
+        with self._lock:
+            self._holds = on
+            self._lock.notify_all()
+
     def close(self) -> None:
         """Stop reading. The camera stays open."""
         self._ended.set()
+        self.hold(False)
         if self._thread is not threading.current_thread():
             self._thread.join(timeout=READ_S + 5.0)
 
@@ -81,6 +94,7 @@ class Feed:
         last, wall = self._last, time.monotonic()
         again = last is not None and np.array_equal(last.depth, frame.depth)
         with self._lock:
+            self._lock.wait_for(lambda: not self._holds or len(self._waiting) < min(HELD, self._kept))
             s = self._statistics
             full = len(self._waiting) >= self._kept
             if full:

@@ -73,6 +73,7 @@ class Pictures:
     def __enter__(self) -> Self:
         self._feed.frames()  # what came before the run is not of it
         self._repeated_before = self._feed.statistics.repeated
+        self._feed.hold(self._waits)  # encoding takes longer than simulating
         self._thread.start()
         return self
 
@@ -81,6 +82,7 @@ class Pictures:
     ) -> None:
         self._ended.set()
         self._thread.join()
+        self._feed.hold(False)
         if error is None and self._error is not None:
             raise self._error
 
@@ -97,6 +99,7 @@ class Pictures:
                     self._ended.wait(_IDLE_S)
         except BaseException as error:
             self._error = error
+            self._feed.hold(False)  # nobody takes frames any more
 
     def _write(self, frame: Frame) -> None:
         self._last_seen = time.monotonic()

@@ -30,6 +30,7 @@ class Still:
     def __init__(self, frames: Sequence[Frame], *, error: Exception | None = None) -> None:
         self.left, self.error, self.begun = list(frames), error, False
         self.statistics = FeedStatistics()
+        self.holds: list[bool] = []
 
     def frames(self) -> list[Frame]:
         """None at the first call, which is for what came before the run."""
@@ -40,6 +41,10 @@ class Still:
             raise self.error
         some, self.left = self.left[:2], self.left[2:]
         return some
+
+    def hold(self, on: bool) -> None:
+        """Kept for the test."""
+        self.holds.append(on)
 
     def close(self) -> None:
         """Nothing to close."""
@@ -260,3 +265,15 @@ def test_in_lock_step_a_frame_that_has_waited_shifts_no_clock() -> None:
     now = 30.02
     assert second(frame(299, 29.9)) == pytest.approx(-0.08)
     assert second(frame(300, 30.0)) == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize("lock_step", [False, True])
+def test_in_lock_step_the_camera_waits_for_the_writer(lock_step: bool) -> None:
+    """While a run is on the feed holds the camera; in real time never, and never after the run."""
+    robot = calibrated()
+    feed = Still([frame(k, 0.1 + k / 30) for k in range(4)])
+    plan = plans([random_policy(robot, 1, 0)], repeats=2, rest=0.0)
+    Session(plan, robot, FakeLink(robot, lock_step=lock_step), RecordSettings(camera_gone_s=60.0), feed=feed).record(
+        Rows()
+    )
+    assert feed.holds == [lock_step, False] * 2

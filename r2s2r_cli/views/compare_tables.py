@@ -55,7 +55,25 @@ def verdict(report: CompareReport) -> str:
         f"{runs}, {seen}: the simulated centre of mass ends {1e3 * two.rms:.0f} mm from the real one with "
         f"{last.model}, {1e3 * one.rms:.0f} mm with {first.model}{floor}."
     )
-    return f"{ends} {_against(first.model, last.model, b)}"
+    words = [ends, _against(first.model, last.model, b)]
+    if len(report.models) > 2:
+        before = report.models[-2]
+        words.append(_beside(before.model, last.model, before.heldout if held else before.runs, b))
+    return " ".join(word for word in words if word)
+
+
+def _beside(before: str, last: str, side: Mapping[str, CompareMeasure], now: Mapping[str, CompareMeasure]) -> str:
+    """What the last simulator is beside the one named before it: with an effect and without, say."""
+    both = {name: (scale * side[name].rms, scale * now[name].rms, text) for name, (text, scale) in MEASURES.items()
+            if name in side and name in now}  # fmt: skip
+    better = [name for name, (old, new, _) in both.items() if new < old]
+    told = []
+    for name, (old, new, text) in both.items():
+        if name in ("com_end_m", "keyframe_cap_m") and new > old:
+            what, unit = text.removesuffix("]").split(" [")
+            told.append(f"{what} {new:.3g} against {old:.3g} {unit}")
+    worse = f"; worse: {', '.join(told)}" if told else ""
+    return f"Beside {before} it is better in {len(better)} of {counted(len(both), 'measure')}{worse}." if both else ""
 
 
 def _against(first: str, last: str, side: Mapping[str, CompareMeasure]) -> str:

@@ -93,6 +93,20 @@ def test_a_refined_simulator_that_is_worse_is_called_worse(spread: float, doubt:
     assert ("do not prove" in said) is doubt
 
 
+@pytest.mark.parametrize(("now", "says"), [(0.1, "0 of 1 measure; worse: centre of mass at the end 100 against 30 mm"),
+                                           (0.02, "1 of 1 measure.")])  # fmt: skip
+def test_the_last_simulator_is_held_to_the_one_before_as_well(now: float, says: str) -> None:
+    """Of three the verdict says whether the step from the second to the third was one forward."""
+    made = report()
+    refined = made.models[-1]
+    assert refined.heldout
+    own = {name: one.model_copy(update={"rms": now}) for name, one in refined.heldout.items()}
+    third = refined.model_copy(update={"model": "with effect", "heldout": own})
+    said = verdict(made.model_copy(update={"models": (*made.models, third)}))
+    assert f"Beside refined it is better in {says}" in said
+    assert "Beside" not in verdict(made)
+
+
 def test_runs_that_were_all_learned_from_back_no_claim() -> None:
     """It is said in the first sentence."""
     assert "ALL trained on: no claim of accuracy rests on them" in verdict(report(held=False))

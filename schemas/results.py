@@ -32,7 +32,7 @@ class StageResult(Frozen):
     """Relative to the project."""
     content_sha256: str | None
     reasons: tuple[str, ...]
-    """Why the stage ran (or would run)."""
+    """Why the stage ran (or would run); where it is fresh, which of its inputs are stale themselves."""
     inputs: tuple[str, ...]
     drawings: tuple[str, ...] = ()
     """Pictures and reports written beside the artifact, relative to the project."""

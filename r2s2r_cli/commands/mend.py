@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.staleness import input_reasons
 from schemas.header import Header, InputRef
-from schemas.versions import KINDS
+from schemas.versions import KINDS, STAGE_VERSIONS
 
 _BARE = {"estimate": "estimate", "identification": "identify", "plan": "plan"}
 """Stages that need no argument, by what they make: what is missing of theirs is made by their name alone."""
@@ -30,8 +30,8 @@ class Mending:
     why_not: str = ""
 
 
-def mending(project: Project, header: Header, path: Path) -> Mending:
-    """What mends the stale artifact at `path`, where the reason is not only that an input is stale."""
+def mending(project: Project, header: Header, path: Path, reasons: Sequence[str]) -> Mending:
+    """What mends the stale artifact at `path`. reasons: why it is stale, other than through a stale input."""
     from r2s2r_cli.commands.stage import MEASURED
 
     made = header.provenance
@@ -44,7 +44,8 @@ def mending(project: Project, header: Header, path: Path) -> Mending:
     if lost:
         return _missing(project, lost[0])
     if made.stage == "estimate":
-        found = _estimated(project, project.root / made.inputs[0].path)
+        older = len(reasons) == 1 and made.stage_version != STAGE_VERSIONS["estimate"]
+        found = _estimated(project, project.root / made.inputs[0].path, older=older)
         if found is not None:
             return found
     return Mending(command_again(made, path))
@@ -55,18 +56,27 @@ def sighted(datasets: Iterable[str]) -> bool:
     return any(name.endswith("/caps/p_WE") or "/camera/depth" in name for name in datasets)
 
 
-def _estimated(project: Project, recording: Path) -> Mending | None:
-    """What makes up for a recording that no states can be estimated from; None: they can."""
+def blind(project: Project, recording: Path) -> str:
+    """Why no states can be estimated from a recording; empty: they can. Raises ArtifactError where it is damaged."""
+    if sighted(read_header(recording).datasets):
+        return ""
+    return f"the pictures or end caps of {project.relative(recording)} are not kept"
+
+
+def _estimated(project: Project, recording: Path, *, older: bool = False) -> Mending | None:
+    """What makes up for a recording that no states can be estimated from; None: they can. older: there are states from
+    it, which only an older version of the stage made: no reason to move a robot."""
     try:
-        header = read_header(recording)
+        header, why = read_header(recording), blind(project, recording)
     except R2S2RError:
         return Mending()  # damaged: that is said of the recording, with its own way out
-    if sighted(header.datasets):
+    if not why:
         return None
-    why = f"the pictures or end caps of {project.relative(recording)} are not kept"
     made = header.provenance
     if made.stage == "import" and all((project.root / ref.path).exists() for ref in made.inputs):
         return Mending(command_again(made, recording, force=True), why_not=why)
+    if older:
+        return Mending(why_not=f"it cannot be made again here, and remains usable: {why}")
     return Mending(runs=_runs(project, header, recording), why_not=f"it cannot be made again: {why}")
 
 

@@ -96,6 +96,9 @@ def run(
             console.say(f"[{number}/{len(steps)}] {here.relative(step.target)} is there: the robot is not moved again")
             _warn_of_old(here, step, console)
             continue
+        if why := _kept(here, place, step, steps):
+            console.say(f"[{number}/{len(steps)}] {here.relative(step.target)} is used as it is: {why}")
+            continue
         console.say(f"[{number}/{len(steps)}] {shlex.join(words)}")
         if dry_run:
             continue
@@ -130,6 +133,23 @@ def _steps(
         yield Step("estimate-executed", ("estimate", "--of", "execute"), place.artifact("estimate", executed=True))
     if robot or executed.exists() or source or recording.exists() or not earlier:
         yield Step("compare", ("compare",), place.artifact("comparison"))
+
+
+def _kept(project: Project, place: Iteration, step: Step, steps: Sequence[Step]) -> str:
+    """Why states that are there are not estimated again: their pictures are gone, and no step brings them back."""
+    from r2s2r_cli.commands.mend import blind
+
+    executed = step.name == "estimate-executed"
+    recording = place.artifact("recording", executed=executed)
+    if step.words[0] != "estimate" or not step.target.exists() or not recording.exists():
+        return ""
+    if any(one.target == recording and not one.robot for one in steps):  # imported again, where it is stale
+        return ""
+    try:
+        why = blind(project, recording)
+    except R2S2RError:  # damaged: the stage says so
+        return ""
+    return why and f"it cannot be made again here, {why}"
 
 
 def _warn_of_old(project: Project, step: Step, console: Console) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import sys
 import time
@@ -18,10 +19,11 @@ from r2s2r_cli.commands.interrupts import whole_items
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError, InputError, R2S2RError, UsageError
 from r2s2r_cli.store.atomic import sweep, write_bytes
+from r2s2r_cli.store.brief import brief
 from r2s2r_cli.store.header import read_header, sealed_header
 from r2s2r_cli.store.lock import writing
 from r2s2r_cli.store.project import Iteration, Project
-from r2s2r_cli.store.staleness import Wanted, reasons
+from r2s2r_cli.store.staleness import Wanted, joined, reasons
 from schemas.header import Header, InputRef, Provenance
 from schemas.results import StageResult
 from schemas.versions import KINDS, STAGE_VERSIONS
@@ -153,7 +155,7 @@ class StageRun(Generic[Report]):
         if header.provenance.stage != self.stage:
             found.insert(0, f"it was made by {header.provenance.stage}")
         elif not found and not same_inputs(header.provenance.inputs, self.inputs):
-            found.append("it was made from other inputs")
+            found += joined(self.project, self.iteration, header.provenance) or ["it was made from other inputs"]
         elif not found and drawn and not header.provenance.drawings:
             found.append("it was made with --no-draw")
         if not found and self.not_applied is not None and header.provenance.report:
@@ -177,7 +179,7 @@ class StageRun(Generic[Report]):
                 with writing(self.project.root, self.stage):
                     _, data = read_artifact(self.target, self.kind, blobs=True)
                     drawings = self._write_drawings(list(whole_items(draw(data, report))))
-        return self._result("fresh", header, (), report, drawings), report
+        return self._result("fresh", header, stale_inputs(self.project, self.inputs), report, drawings), report
 
     def _run_locked(
         self,
@@ -271,6 +273,24 @@ def same_inputs(recorded: Sequence[InputRef], asked: Sequence[InputRef]) -> bool
     return matched == ({ref.path for ref in recorded}, {ref.path for ref in asked})
 
 
+def stale_inputs(project: Project, inputs: Sequence[InputRef]) -> list[str]:
+    """Which inputs are stale, by themselves or through inputs of their own: what was made of them is, then, of old."""
+    places = {place.path: place for place in project.iterations()}
+
+    @functools.cache
+    def stale(name: str) -> bool:
+        path = project.root / name
+        try:
+            header = read_header(path)
+            now = wanted_again(project, places.get(path.parent), header.provenance)
+        except R2S2RError:
+            return True  # damaged, or gone: nothing fresh
+        more = [*reasons(project, header, now), *joined(project, places.get(path.parent), header.provenance)]
+        return bool(more) or any(stale(ref.path) for ref in header.provenance.inputs if ref.kind in KINDS)
+
+    return [f"its input {ref.path} is stale itself" for ref in inputs if ref.kind in KINDS and stale(ref.path)]
+
+
 def show_outcome(result: StageResult, console: Console) -> None:
     """Say on stderr what became of the artifact; with --json print the document."""
     console.document(result)
@@ -280,8 +300,10 @@ def show_outcome(result: StageResult, console: Console) -> None:
         "dry_run": f"would write {result.artifact}",
     }
     console.say(words[result.state])
-    for reason in result.reasons:
-        console.say(f"  because {reason}")
+    for reason in brief(result.reasons):
+        console.say(f"  {'but' if result.state == 'fresh' else 'because'} {reason}")
+    if result.state == "fresh" and result.reasons:
+        console.hint("r2s2r status")
     for path in result.drawings:
         console.say(f"  drew {path}")
     if result.state == "dry_run":

@@ -13,10 +13,11 @@ from r2s2r_cli.commands.mend import Mending, mending, sighted
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError, GateError
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
+from r2s2r_cli.store.brief import brief
 from r2s2r_cli.store.header import read_header, sealed_header, whole_header
 from r2s2r_cli.store.lock import writer
 from r2s2r_cli.store.project import Iteration, Project, journal_of
-from r2s2r_cli.store.staleness import reasons
+from r2s2r_cli.store.staleness import joined, reasons
 from schemas.header import Header
 from schemas.results import ArtifactState, StatusResult
 
@@ -64,7 +65,7 @@ def status(
             f"{len(unfit)} of {len(result.artifacts)} artifacts are not fresh",
             where=unfit[0].artifact,
             expected="fresh",
-            received=f"{unfit[0].state}: {'; '.join(unfit[0].reasons)}",
+            received=f"{unfit[0].state}: {'; '.join(brief(unfit[0].reasons))}",
             hint=result.next or "r2s2r status",
         )
 
@@ -129,7 +130,7 @@ def _state(
     else:
         own, upstream = _reasons(project, iteration, header, stale)
         # Stale through an input alone: made from the same input again it would be the same.
-        mend = mending(project, header, path) if own else Mending()
+        mend = mending(project, header, path, own) if own else Mending()
         why = own + ([mend.why_not] if mend.why_not else []) + upstream
         state = "stale" if why else "fresh"
     if state != "fresh":
@@ -150,13 +151,14 @@ def _reasons(
     from r2s2r_cli.commands.stage import wanted_again
 
     found = reasons(project, header, wanted_again(project, iteration, header.provenance))
+    found += joined(project, iteration, header.provenance)
     upstream = [ref.path for ref in header.provenance.inputs if ref.path in stale]
     return found, [f"input {path} is stale itself" for path in upstream]
 
 
 def _remarks(state: ArtifactState) -> str:
     made = [f"made with --set {key}={value}" for key, value in state.overrides.items()]
-    return "; ".join([*state.reasons, *made])
+    return "; ".join([*brief(state.reasons), *made])
 
 
 def _unsealed(project: Project, iteration: Iteration | None, path: Path, busy: str | None) -> ArtifactState:

@@ -70,14 +70,28 @@ def pasted() -> str:
 
 @pytest.mark.parametrize("stage", NAMES)
 def test_states_whose_pictures_are_gone_are_not_asked_for(project: Path, stage: str) -> None:
-    """Their runs are shown instead, without the robot that made them, and why is said. Nor is what was made of the
-    states asked for: of the same states it would be the same."""
+    """Where a setting changed their runs are shown instead, without the robot that made them, and why is said. Nor is
+    what was made of the states asked for: of the same states it would be the same."""
     without_pictures(project, stage)
     recording, estimate = NAMES[stage]
+    config = project / "project.toml"
+    config.write_text(config.read_text().replace("sensor_gap_s = 0.25", "sensor_gap_s = 0.5", 1))
     assert f"the pictures or end caps of iterations/001/{recording} are not kept" in said(estimate)
     assert pasted() == f"r2s2r {stage} gait.toml --repeats 2 --iteration 1 --dry-run"
     (project / "gait.toml").unlink()
     assert document("status")["next"] == ""
+
+
+@pytest.mark.parametrize("stage", NAMES)
+def test_no_robot_is_asked_to_move_for_a_newer_version_of_a_stage(project: Path, stage: str) -> None:
+    """States that an older version made of pictures that are gone remain usable: it is said, and nothing is hinted."""
+    without_pictures(project, stage)
+    recording, estimate = NAMES[stage]
+    why = f"the pictures or end caps of iterations/001/{recording} are not kept"
+    assert f"it cannot be made again here, and remains usable: {why}" in said(estimate)
+    hint = document("status")["next"]
+    assert "--dry-run" not in hint and f"r2s2r {stage}" not in hint
+    assert not hint or invoke(*shlex.split(hint)[1:]).exit_code == 0
 
 
 @pytest.mark.parametrize("kept", [True, False])
@@ -108,6 +122,42 @@ def test_a_missing_input_is_made_first(estimated: Path) -> None:
     assert f"{ESTIMATE} must be made first" in said("30-identify.h5")
     assert pasted() == "r2s2r estimate --iteration 1"
     assert document("status")["next"] == "r2s2r identify --iteration 1"
+
+
+def test_a_floor_that_came_later_is_said(estimated: Path) -> None:
+    """As the command itself says that it would make the comparison again."""
+    made = (ref(estimated, "20-estimate.h5"), ref(estimated, "10-record.h5"))
+    flags = {"models": {}, "of": "record", "own": False}
+    settings = {**wanted(Project.find(estimated), None, "compare", {}, {}).settings, "flags": flags}
+    put(estimated, "60-compare.h5", builders.comparison(), "compare", inputs=made, settings=settings)
+    assert said("60-compare.h5") == ""
+    assert invoke("floor").exit_code == 0
+    assert said("60-compare.h5") == "input floor.h5 is new: this was made without it"
+    assert document("compare", "--dry-run")["reasons"] == ["input floor.h5 is new: this was made without it"]
+
+
+def test_a_fresh_artifact_says_that_its_inputs_are_stale(estimated: Path) -> None:
+    """Through an input of theirs, too; `status` calls it stale, and is named."""
+    assert invoke("floor").exit_code == 0
+    assert (document("floor")["state"], document("floor")["reasons"]) == ("fresh", [])
+    (estimated / "sample.csv").write_text((estimated / "sample.csv").read_text() + "\n")
+    done = invoke("floor")
+    assert done.exit_code == 0
+    assert "floor.h5 is fresh, nothing to do" in done.stderr
+    assert "but its input iterations/001/10-record.h5 is stale itself" in done.stderr
+    assert "but its input iterations/001/20-estimate.h5 is stale itself" in done.stderr
+    assert "hint: r2s2r status" in done.stderr
+
+
+def test_a_calibration_is_one_line_of_the_table(estimated: Path) -> None:
+    """Many numbers of robot.toml changed: the table counts them, the document names each."""
+    text = (estimated / "robot.toml").read_text()
+    (estimated / "robot.toml").write_text(text.replace("[[sensors]]", "[[sensors]]\noffset_f = 1e-11"))
+    assert said("20-estimate.h5").count("offset_f was absent, is 1e-11") == 9
+    shown = " ".join(invoke("status").stdout.split())
+    assert "9 values of robot.toml changed (sensors.*)" in shown
+    assert shown.count("sensors.8") == 0
+    assert "because 9 values of robot.toml changed" in invoke("estimate", "--dry-run").stderr
 
 
 def test_a_log_that_is_gone_is_not_asked_for(estimated: Path) -> None:

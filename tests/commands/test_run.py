@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import pytest
 
 from tests.commands.conftest import invoke
+from tests.commands.test_mend import without_pictures
 
 Calls = list[list[str]]
 
@@ -113,6 +114,20 @@ def test_dry_run_says_the_commands(estimated: Path, calls: Calls) -> None:
     assert result.exit_code == 0
     assert Child.calls == []
     assert "r2s2r identify --iteration 1" in result.stderr
+
+
+@pytest.mark.parametrize("executed", [False, True])
+def test_states_whose_pictures_are_gone_are_left_as_they_are(project: Path, calls: Calls, executed: bool) -> None:
+    """Their stage could only fail; a line says so, and the rest goes on."""
+    without_pictures(project, "execute" if executed else "record")
+    if executed:
+        (project / "iterations/001/10-record.h5").unlink()
+    result = invoke("run", *(["--iteration", "1", "--port", "socket://nowhere:1"] if executed else []))
+    assert result.exit_code == 0, result.stderr
+    name = "51-estimate.h5 is used as it is" if executed else "20-estimate.h5 is used as it is"
+    assert name in result.stderr and "cannot be made again here" in result.stderr
+    assert ("estimate executed" if executed else "estimate") not in stages(Child.calls)
+    assert stages(Child.calls)[-1] == "compare"
 
 
 def test_an_unknown_stage_is_refused(project: Path, calls: Calls) -> None:

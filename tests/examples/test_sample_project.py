@@ -23,7 +23,7 @@ from tests.guards.listing import ROOT
 from tests.support import builders
 
 SAMPLE = ROOT / "examples" / "sample-project" / "project"
-SETTLED = ("was absent", "changed: made by version", "is stale itself", "cannot be made again: the pictures")
+SETTLED = ("was absent", "changed: made by version", "is stale itself", "cannot be made again here")
 """Why a part of it may be stale: r2s2r has got a setting or a stage a version since it was made."""
 again = load("sample-project", "again")
 

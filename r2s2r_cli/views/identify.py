@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.views.figure import legend_beside, new_figure, png_bytes
-from r2s2r_cli.views.identify_data import TRUST_COLORS, TRUST_WORDS, words
+from r2s2r_cli.views.identify_data import TRUST_COLORS, TRUST_WORDS, near_zero, words
 from r2s2r_cli.views.identify_errors import draw_errors
 from r2s2r_cli.views.identify_fits import draw_fit, draw_free_run
 from r2s2r_cli.views.identify_information import draw_information
 from r2s2r_cli.views.identify_search import draw_history, draw_search
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _ZERO = 1e-12
 
@@ -44,6 +49,10 @@ def draw_identification(data: ArtifactData) -> Iterator[tuple[str, str, bytes]]:
 
 
 def _parameters(data: ArtifactData) -> bytes:
+    return png_bytes(parameters_figure(data))
+
+
+def parameters_figure(data: ArtifactData) -> Figure:
     """A row a parameter, in shares of its start (of its unit where that is 0): comparable whatever the unit."""
     table = data.groups["parameters"]
     names, units = words(table, "name"), words(table, "unit")
@@ -53,6 +62,7 @@ def _parameters(data: ArtifactData) -> bytes:
     shares = {name: table[name] / scale for name in ("value", "start", "lower", "upper")}
     ranges = table["range"] / scale[:, None]
     left, right = _limits([*shares.values(), ranges])
+    axes.set_xlim(left, right)
     for row, code in enumerate(table["trust"].tolist()):
         color = TRUST_COLORS[code]
         axes.plot([shares["start"][row]] * 2, [row - 0.3, row + 0.3], color="black", lw=1.2)
@@ -62,22 +72,37 @@ def _parameters(data: ArtifactData) -> bytes:
         for end, mark in zip(ends, "<>", strict=True):
             if not left <= end <= right:  # NaN too, where nothing is drawn
                 axes.plot(np.clip(end, left, right), row, mark, color=color, ms=8, clip_on=False)
-        axes.plot(shares["value"][row], row, "o", color=color, ms=7)
+        _mark(axes, float(shares["value"][row]), row, color)
     for code, word in TRUST_WORDS.items():
         if code in table["trust"]:
             axes.plot([], [], "o", color=TRUST_COLORS[code], label=word)
     axes.plot([], [], "|", color="black", ms=14, label="start")
     axes.plot([], [], "-", color="gray", lw=8, alpha=0.3, label="range over starts\nand re-drawn noise")
     axes.plot([], [], "-", color="gray", lw=1.6, label="95 % interval, with < or >\nwhere it goes on")
-    values = zip(names, table["value"].tolist(), units, strict=True)
+    if any(not left <= share <= right for share in shares["value"].tolist()):
+        axes.plot(
+            [], [], "o", color="gray", mfc="white", ms=9, mew=1.8, label="beyond the axis,\nat the number beside it"
+        )
+    pairs = zip(table["value"].tolist(), table["bounds"].tolist(), strict=True)
+    values = zip(names, (near_zero(value, *bounds) for value, bounds in pairs), units, strict=True)
     labels = [f"{name}\n{value:.4g}{'' if unit == '1' else ' ' + unit}" for name, value, unit in values]
     axes.set_yticks(range(len(names)), labels, fontsize=8)
     axes.set_ylim(len(names) - 0.5, -0.5)
-    axes.set_xlim(left, right)
     axes.grid(axis="x", lw=0.4)
     axes.set_xlabel("value / start (where the start is 0: value)")
     legend_beside(axes)
-    return png_bytes(figure)
+    return figure
+
+
+def _mark(axes: Axes, share: float, row: int, color: str) -> None:
+    """The value: a dot; at the edge of the axis an empty one with its number, where it lies beyond. NaN: nothing."""
+    left, right = axes.get_xlim()
+    if left <= share <= right or not np.isfinite(share):
+        axes.plot(share, row, "o", color=color, ms=7)
+        return
+    edge, side, away = (left, "left", 10) if share < left else (right, "right", -10)
+    axes.plot(edge, row, "o", color=color, mfc="white", ms=9, mew=1.8, clip_on=False, zorder=3)
+    axes.annotate(f"{share:.3g}", (edge, row), (away, 7), textcoords="offset points", ha=side, fontsize=8, color=color)
 
 
 def _limits(shown: list[np.ndarray]) -> tuple[float, float]:

@@ -12,6 +12,7 @@ TRAIN, TEST = 1, 2
 """Codes of `role`."""
 ROLE_WORDS = {0: "not used", TRAIN: "train", TEST: "test"}
 ROLE_COLORS = {0: "#9aa5b1", TRAIN: "#0b5fa5", TEST: "#c1272d"}
+_ROUNDING = 1e-12
 TRUST_COLORS = {0: "#2a7f3e", 1: "#b8860b", 2: "#c1272d", 3: "#6b3fa0", 4: "#9aa5b1"}
 TRUST_WORDS = {0: "identified", 1: "weak", 2: "not identifiable", 3: "on a bound", 4: "fixed"}
 
@@ -40,6 +41,12 @@ def intervals_by_role(data: ArtifactData, run: str) -> dict[int, int]:
 def figure_of(value: float | None, digits: int = 4) -> str:
     """A number as people read it; a dash where there is none."""
     return "-" if value is None or not math.isfinite(value) else f"{value:.{digits}g}"
+
+
+def near_zero(value: float, *bounds: float | None) -> float:
+    """The number, or 0 where it is what rounding leaves of 0, in shares of its bounds."""
+    scale = max((abs(one) for one in bounds if one is not None and math.isfinite(one)), default=1.0)
+    return 0.0 if abs(value) < _ROUNDING * scale else value
 
 
 def millimetres(value: float | None, digits: int = 1) -> str:

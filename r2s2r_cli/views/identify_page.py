@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from r2s2r_cli.artifact import ArtifactData
-from r2s2r_cli.views.identify_data import figure_of, millimetres, spread
+from r2s2r_cli.views.identify_data import figure_of, millimetres, near_zero, spread
 from r2s2r_cli.views.page import Page, PageTable, Picture, counted, render
 from schemas.results_identify import (
     Baseline,
@@ -17,6 +17,8 @@ from schemas.results_identify import (
     SegmentFigures,
 )
 
+_ALONE = "identified"
+"""The simulator with the numbers found, nothing added."""
 _STRONG = 0.9
 """Parameters correlated by more cannot be told apart."""
 
@@ -97,7 +99,8 @@ def _parameter(name: str, found: ParameterFigures) -> list[str]:
     interval = "-" if found.lower is None else f"{figure_of(found.lower)} .. {figure_of(found.upper)}"
     wide = "-" if found.range is None else f"{figure_of(found.range[0])} .. {figure_of(found.range[1])}"
     unit = "" if found.unit == "1" else found.unit
-    numbers = [figure_of(found.value), figure_of(found.sd, 2), interval, wide, unit, figure_of(found.start)]
+    value = figure_of(near_zero(found.value, *found.bounds))
+    numbers = [value, figure_of(found.sd, 2), interval, wide, unit, figure_of(found.start)]
     return [name, *numbers, found.trust, found.reason]
 
 
@@ -113,9 +116,12 @@ def _errors(report: IdentifyReport) -> PageTable:
     held = report.heldout
     if held is not None:
         key, *free = _three(held)
-        rows.append([f"{held.predictor}, held out", key, "-", *free])
+        closed = free.pop()  # of the simulator alone, whoever predicts
+        alone = held.predictor == _ALONE
+        rows.append([f"{held.predictor}, held out", key, "-", *free, closed if alone else "-"])
         for name, one in held.baselines.items():
             key, *free = _three(one)
+            free = [free[0], closed] if name == _ALONE else free
             rows.append([f"{name}, held out{_of_them(name, report)}", key, _against(name, one, report), *free])
         rows.append(["floor", millimetres(held.floor_m), "-", "-", "-"])
     return PageTable("errors of the end caps (95 % interval by bootstrap over segments)", columns, rows)
@@ -172,14 +178,20 @@ def _open(one: Baseline) -> bool:
 
 
 def _segments(report: IdentifyReport) -> PageTable:
-    names = list(dict.fromkeys(name for segment in report.segments for name in segment.baselines))
+    """The simulator alone first, at the key frame and over all frames; then the prediction, where that is another, and
+    its rivals, at the key frame."""
+    names = list(dict.fromkeys(name for segment in report.segments for name in segment.baselines if name != _ALONE))
+    predictor = _ALONE if report.heldout is None else report.heldout.predictor
+    more = [] if predictor == _ALONE else [f"{predictor} [mm]"]
     rows = [
         [f"{s.run}:{s.interval}", s.role, millimetres(s.keyframe_cap_rmse_m), millimetres(s.cap_rmse_m),
+         *(millimetres(s.predicted_cap_rmse_m) for _ in more),
          *(millimetres(s.baselines.get(name)) for name in names), ", ".join(map(str, s.not_white)) or "none"]
         for s in report.segments
     ]  # fmt: skip
-    return PageTable("segments", ["interval", "role", "key frame [mm]", "all frames [mm]",
-                                  *(f"{name} [mm]" for name in names), "caps not white"], rows)  # fmt: skip
+    return PageTable("segments (at their key frames)",
+                     ["interval", "role", f"{_ALONE} [mm]", f"{_ALONE}, all frames [mm]", *more,
+                      *(f"{name} [mm]" for name in names), "caps not white"], rows)  # fmt: skip
 
 
 def _meaning(value: float) -> str:

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
-from r2s2r_cli.views.identify import draw_identification
+from r2s2r_cli.views.identify import draw_identification, parameters_figure
+from r2s2r_cli.views.identify_data import near_zero
 from r2s2r_cli.views.identify_errors import errors_with_repeats, floor_of
 from r2s2r_cli.views.identify_fits import cap_rmse
 from r2s2r_cli.views.identify_information import draw_information, information_figure
@@ -153,6 +154,55 @@ def test_an_endless_interval_does_not_hide_the_others() -> None:
     data = changed("parameters", "upper", np.array([0.82, 1e6, np.nan, np.nan]))
     name, _, png = next(draw_identification(data))
     assert name == "parameters" and len(png) > 5000
+
+
+def test_a_value_beyond_the_axis_is_marked_at_its_edge() -> None:
+    """An empty dot with its number; a value on the axis has a full one and no number."""
+    table = builders.identification(repeating=True).groups["parameters"]
+    value, scale = table["value"].copy(), np.where(table["start"] == 0, 1.0, np.abs(table["start"]))
+    plain = parameters_figure(builders.identification(repeating=True)).axes[0]
+    assert not plain.texts
+    value[0] = 10 * scale[0]
+    axes = parameters_figure(changed("parameters", "value", value)).axes[0]
+    right = axes.get_xlim()[1]
+    (dot,) = [one for one in axes.lines if one.get_markerfacecolor() == "white" and np.size(one.get_xdata())]
+    assert np.ravel(dot.get_data()).tolist() == [right, 0.0] and not dot.get_clip_on()
+    assert [text.get_text() for text in axes.texts] == ["10"]
+
+
+def test_what_rounding_leaves_of_zero_is_zero() -> None:
+    """In shares of the bounds; a small number of a small range stays."""
+    assert near_zero(-5.412e-17, -0.1, 0.1) == 0.0 == near_zero(1e-14)
+    assert near_zero(1e-9, 0.0, 1e-6) == 1e-9 and near_zero(2.0, None, float("inf")) == 2.0
+    said = report(builders.identification(repeating=True))
+    held = said.parameters["restitution"].model_copy(update={"value": -5e-17})
+    table = next(iter(report_tables(said.model_copy(update={"parameters": {"restitution": held}}))))
+    assert table.rows[0][1] == "0"
+
+
+def test_the_simulator_alone_has_its_own_row_and_columns() -> None:
+    """With what repeats as the prediction: the controller in the loop belongs to the simulator, and a test segment has
+    the errors of both."""
+    said = report(builders.identification(repeating=True))
+    assert said.heldout is not None
+    alone = said.heldout.baselines["nominal"].model_copy(update={"keyframe_cap_rmse_m": 0.009})
+    held = said.heldout.model_copy(update={
+        "predictor": "identified + what repeats", "free_run_closed_loop_cap_mean_m": 0.02,
+        "baselines": {"identified": alone, **said.heldout.baselines},
+    })  # fmt: skip
+    test = next(one for one in said.segments if one.role == "test")
+    own = {"identified": test.keyframe_cap_rmse_m, **test.baselines}
+    test = test.model_copy(update={"predicted_cap_rmse_m": 0.004, "baselines": own})
+    train = next(one for one in said.segments if one.role == "train")
+    tables = list(report_tables(said.model_copy(update={"heldout": held, "segments": (train, test)})))
+    errors = next(table for table in tables if table.title.startswith("errors"))
+    closed = {row[0]: row[-1] for row in errors.rows}
+    assert closed["identified, held out"] == "20.0" and closed["identified + what repeats, held out"] == "-"
+    segments = next(table for table in tables if table.title.startswith("segments"))
+    assert len(set(segments.columns)) == len(segments.columns)
+    rows = [dict(zip(segments.columns, row, strict=True)) for row in segments.rows]
+    assert [row["identified + what repeats [mm]"] for row in rows] == ["-", "4.0"]
+    assert rows[1]["identified [mm]"] == f"{1e3 * test.keyframe_cap_rmse_m:.1f}"
 
 
 def test_nothing_known_of_the_information_is_drawn() -> None:

@@ -3,7 +3,6 @@ shrinks."""
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from r2s2r_cli.commands.interrupts import resumable
+from r2s2r_cli.commands.typed import typed_words
 from r2s2r_cli.console import Console
 from r2s2r_cli.options import (
     DrawOption,
@@ -79,6 +79,7 @@ def diagnose(
     Example: r2s2r diagnose
     """
     from r2s2r_cli.commands.diagnose_inputs import Asked
+    from r2s2r_cli.commands.identify_hints import typed_options, whole_hints
     from r2s2r_cli.commands.stage import StageRun, print_config, show_outcome, wanted
     from r2s2r_cli.store.checkpoint import checkpoint_key, checkpoint_of
     from r2s2r_cli.store.checkpoint_arrays import ArrayCheckpoint
@@ -95,27 +96,33 @@ def diagnose(
         here, place, model=model, train=tuple(train or ()), test=tuple(test or ()), healthy=tuple(healthy or ()),
         effects=tuple(effect or ()), also=tuple(also or ()), seed=seed,
     )  # fmt: skip
-    _require_effects(asked.effects)
-    settings = here.config(place, overrides).diagnose
-    unfinished = checkpoint_of(here.artifact("diagnosis", place))
-    if resume and not unfinished.exists():
-        console.say("nothing was interrupted: there is no checkpoint to go on from")
-    run = StageRun(
-        stage="diagnose", kind="diagnosis", project=here, iteration=place, find_inputs=asked.refs,
-        report_model=DiagnoseReport, overrides=overrides, flags=asked.flags(), dry_run=dry_run,
-        force=force or (resume and unfinished.exists()),
+    typed = typed_options(
+        train=train, test=test, healthy=healthy, effect=effect, model=model, also=also, seed=seed or None,
+        project=project, iteration=iteration, set_=set_, resume=resume, no_draw=not draw, json=json, quiet=quiet,
+        force=force, dry_run=dry_run,
     )  # fmt: skip
-    if dry_run:
-        asked.evidence()
-    digests = [ref.sha256 for ref in run.inputs]
-    key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
-    checkpoint = ArrayCheckpoint(unfinished, key, resume)
-    again = [word for word in sys.argv[1:] if word != "--resume"]
-    with resumable(checkpoint, here.relative(unfinished), again, done="simulated"):
-        result, report = run.run(
-            lambda: _compute(asked, settings, checkpoint, console, draw), _draw if draw else None,
-            lambda said: checkpoint.clear(),
+    with whole_hints(typed, asked.artifacts, "r2s2r diagnose"):
+        _require_effects(asked.effects)
+        settings = here.config(place, overrides).diagnose
+        unfinished = checkpoint_of(here.artifact("diagnosis", place))
+        if resume and not unfinished.exists():
+            console.say("nothing was interrupted: there is no checkpoint to go on from")
+        run = StageRun(
+            stage="diagnose", kind="diagnosis", project=here, iteration=place, find_inputs=asked.refs,
+            report_model=DiagnoseReport, overrides=overrides, flags=asked.flags(), dry_run=dry_run,
+            force=force or (resume and unfinished.exists()),
         )  # fmt: skip
+        if dry_run:
+            asked.evidence()
+        digests = [ref.sha256 for ref in run.inputs]
+        key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
+        again = [word for word in typed_words("diagnose") if word != "--resume"]
+        checkpoint = ArrayCheckpoint(unfinished, key, resume, command=again)
+        with resumable(checkpoint, here.relative(unfinished), again, done="simulated"):
+            result, report = run.run(
+                lambda: _compute(asked, settings, checkpoint, console, draw), _draw if draw else None,
+                lambda said: checkpoint.clear(),
+            )  # fmt: skip
     show_outcome(_answer(result, report), console)
     if report is not None:
         _show(report, console)

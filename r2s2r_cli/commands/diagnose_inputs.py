@@ -71,10 +71,13 @@ class Asked:
         from r2s2r_cli.store.staleness import artifact_ref
 
         require_input(self.identification, f"r2s2r identify --iteration {self.iteration.number}")
-        paths = [path for source in self.sources for path in (source.recording, source.estimate)]
-        paths.append(self.identification)
+        paths = [*self.artifacts(), self.identification]
         paths += [path for path in (self.floor_file, self.plan_file) if path.exists()]
         return [artifact_ref(self.project, path, whole_header(path)) for path in paths]
+
+    def artifacts(self) -> list[Path]:
+        """Recordings and estimates that are read, those of the main iteration first."""
+        return [path for source in self.sources for path in (source.recording, source.estimate)]
 
     def evidence(self) -> Evidence:
         """What the diagnosis is made from. Raises ArtifactError, InputError, UsageError."""

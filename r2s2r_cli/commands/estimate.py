@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
@@ -60,6 +59,7 @@ def estimate(
 
     Example: r2s2r estimate --iteration 1
     """
+    from r2s2r_cli.commands.estimate_hints import hints_of
     from r2s2r_cli.commands.stage import StageRun, print_config, require_input, show_outcome, wanted, wanted_again
     from r2s2r_cli.store.header import whole_header
     from r2s2r_cli.store.staleness import artifact_ref, reasons
@@ -93,7 +93,8 @@ def estimate(
         from r2s2r_cli.store.read import read_artifact
 
         _, recording = read_artifact(source, "recording")
-        with PictureFile(source) as file, console.parts() as show, _hints_name(here.relative(source)):
+        hints = hints_of(here.relative(source), source, header.provenance)
+        with PictureFile(source) as file, console.parts() as show, hints:
             return compute_states(
                 recording, here.robot(), here.config(place, overrides).estimate, show=show,
                 pictures=lambda run, name: file.pictures(f"runs/{run}/camera/{name}"),
@@ -103,18 +104,6 @@ def estimate(
     show_outcome(result, console)
     if report is not None:
         _show(report, console)
-
-
-@contextmanager
-def _hints_name(source: str) -> Iterator[None]:
-    """Hints of the stage, which knows no paths, with that of the recording: they can be pasted in the project."""
-    from r2s2r_cli.errors import R2S2RError
-
-    try:
-        yield
-    except R2S2RError as error:
-        error.hint = error.hint.replace("10-record.h5", source)
-        raise
 
 
 def _draw(data: ArtifactData, robot: Robot, report: EstimateReport, source: Path) -> Iterator[tuple[str, bytes]]:

@@ -204,11 +204,13 @@ def _ask(console: Console) -> None:
     """Raises UsageError where nobody can answer, or the answer is no."""
     import sys
 
+    from r2s2r_cli.commands.typed import typed_again
+
     if not sys.stdin.isatty():
         raise UsageError("nobody is there to be asked whether the robot may move", where="r2s2r execute",
                          expected="a terminal, or --yes", received="neither",
-                         hint="r2s2r execute --yes --port ...")  # fmt: skip
+                         hint=typed_again("execute", "--yes"))  # fmt: skip
     console.say("the robot will move now; the space bar stops it")
     if not typer.confirm("run these policies on the robot?", err=True):
         raise UsageError("nothing moved", where="r2s2r execute", expected="yes", received="no",
-                         hint="r2s2r execute --dry-run")  # fmt: skip
+                         hint=typed_again("execute", "--dry-run"))  # fmt: skip

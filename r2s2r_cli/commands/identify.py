@@ -138,14 +138,15 @@ def identify(
         train=train, test=test, free=free, fix=fix, with_effect=with_effect,
         method=None if method == "default" else method, drive=None if drive == "replay" else drive,
         online=online, no_discrepancy=not discrepancy, also=also, self_test=self_test, starts=starts, seed=seed or None,
-        project=project, iteration=iteration, set_=set_, no_draw=not draw,
+        project=project, iteration=iteration, set_=set_, no_draw=not draw, json=json, quiet=quiet, force=force,
+        dry_run=dry_run,
     )  # fmt: skip
     asked = Asked(
         here, place, train=tuple(train or ()), test=tuple(test or ()), free=tuple(free or ()), fix=tuple(fix or ()),
         effects=tuple(with_effect or ()), method=method, drive=DRIVES.get(drive, drive),  # type: ignore[arg-type]
         online=online, discrepancy=discrepancy, also=tuple(also or ()), seed=seed, typed=tuple(typed),
     )  # fmt: skip
-    with whole_hints(typed, asked.artifacts):
+    with whole_hints([*typed, *["--resume"] * resume], asked.artifacts):
         _require_one_of(method, METHODS, "--method")
         _require_one_of(drive, tuple(DRIVES), "--drive")
         if self_test:
@@ -196,8 +197,8 @@ def _fit(asked: Asked, overrides: dict[str, Any], console: Console, how: _Ways) 
         asked.check(settings)
     digests = [ref.sha256 for ref in run.inputs]
     key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
-    checkpoint = CheckpointFile(unfinished, key, resume)
     again = ["identify", *asked.typed]
+    checkpoint = CheckpointFile(unfinished, key, resume, again)
     with resumable(checkpoint, here.relative(unfinished), again):
         result, report = run.run(
             lambda: compute(asked, settings, checkpoint, console),

@@ -1,4 +1,4 @@
-"""Hints of `identify` as whole commands: what was asked for stays, what was wrong goes, files have their path."""
+"""Hints as whole commands: what was asked for stays, what was wrong goes, files have their path."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from r2s2r_cli.errors import R2S2RError
+from r2s2r_cli.store.atomic import PARTIAL
 
 FLAGS = (
     "--online",
@@ -24,19 +25,24 @@ FLAGS = (
     "--draw",
 )
 """Options without a value."""
-SINGLE = ("--method", "--drive", "--seed", "--starts", "--iteration", "--project")
+SINGLE = ("--method", "--drive", "--seed", "--starts", "--iteration", "--project", "--model")
 """Options that are given once."""
+_MANNER = ("--json", "--quiet", "--force", "--dry-run")
+"""How the command goes about it: behind what it is about."""
 _COMMAND = "r2s2r identify"
 Option = tuple[str, str | None]
 
 
 @contextmanager
-def whole_hints(typed: Sequence[str], artifacts: Callable[[], Sequence[Path]]) -> Iterator[None]:
-    """An error on the way leaves with a hint that can be pasted. typed: options as given; artifacts: what is read."""
+def whole_hints(
+    typed: Sequence[str], artifacts: Callable[[], Sequence[Path]], command: str = _COMMAND
+) -> Iterator[None]:
+    """An error on the way leaves with a hint that can be pasted. typed: options as given; artifacts: what is read;
+    command: whose options they are."""
     try:
         yield
     except R2S2RError as error:
-        error.hint = completed(error, typed)
+        error.hint = completed(error, typed, command)
         with suppress(R2S2RError):
             error.hint = located(error.hint, artifacts())
         raise
@@ -54,23 +60,38 @@ def typed_options(**given: object) -> list[str]:
     return words
 
 
-def completed(error: R2S2RError, typed: Sequence[str]) -> str:
-    """The hint with the other options of the command line, where it is about options of `identify`.
+def completed(error: R2S2RError, typed: Sequence[str], command: str = _COMMAND) -> str:
+    """The hint with the other options of the command line, where it is about options of `command`.
 
     An option of the hint takes the place of the one that was wrong: of the same name, run or parameter, of the value
-    that the error received, or of a choice that the error names as its place. A parameter that it fixes is not free.
+    that the error received, or of a choice that the error names as its place. A parameter that it fixes is not free. A
+    value that was received and has nothing in its place goes.
     """
-    command, gap, remark = error.hint.partition("   #")
-    if command.startswith(_COMMAND):
-        command = command[len(_COMMAND) :]
-    elif not command.startswith("--"):
+    said, gap, remark = error.hint.partition("   #")
+    if said.startswith(command):
+        said = said[len(command) :]
+    elif not said.startswith("--"):
         return error.hint
-    new, old = options_of(shlex.split(command)), options_of(typed)
-    new = [_as_typed(one, [other for other in old if _replaces(one, other, error)]) for one in new]
-    kept = [one for one in old if not any(_replaces(other, one, error) for other in new)]
-    kept = [one for one in kept if not (one[0] in (*SINGLE, *FLAGS) and one[0] in error.where)]
-    words = [word for name, value in (*kept, *new) for word in ((name,) if value is None else (name, value))]
-    return f"{_COMMAND} {shlex.join(words)}".rstrip() + gap + remark
+    new, old = options_of(shlex.split(said)), options_of(typed)
+    new = [_as_typed(one, [other for other in old if _replaces(one, other, error)], error) for one in new]
+    kept = [one for one in old if not any(_replaces(other, one, error) for other in new) and not _wrong(one, error)]
+    last = [one for one in (*kept, *new) if one[0] in _MANNER]
+    words = [word for one in (*kept, *new) if one not in last for word in _words(one)]
+    words += [word for one in last for word in _words(one)]
+    return f"{command} {shlex.join(words)}".rstrip() + gap + remark
+
+
+def _wrong(old: Option, error: R2S2RError) -> bool:
+    """Whether an option is what the error is about: by its name or its value, or --resume where the checkpoint is."""
+    name, value = old
+    if name == "--resume" and error.where.endswith(PARTIAL):
+        return True
+    places = error.where.replace(",", " ").split()
+    return name in places and (name in (*SINGLE, *FLAGS) or value == error.received)
+
+
+def _words(option: Option) -> Sequence[str]:
+    return [word for word in option if word is not None]
 
 
 def options_of(words: Sequence[str]) -> list[Option]:
@@ -107,11 +128,18 @@ def _replaces(new: Option, old: Option, error: R2S2RError) -> bool:
     return _about(new[1]) == _about(value) or value == error.received or _about(value) in error.received.split(", ")
 
 
-def _as_typed(new: Option, replaced: Sequence[Option]) -> Option:
-    """With the plus of --free +SPEC, where what it replaces had one."""
+def _as_typed(new: Option, replaced: Sequence[Option], error: R2S2RError) -> Option:
+    """With the plus of --free +SPEC, where what it replaces had one; and where a name alone was wrong, with the numbers
+    that stood behind it."""
     name, value = new
+    if value is None:
+        return new
+    for _, text in replaced:
+        wrong = _about(text)
+        if text and wrong == error.received and wrong != _about(value):
+            value = _about(value) + text.removeprefix("+")[len(wrong) :]
     plus = name == "--free" and any((text or "").startswith("+") for _, text in replaced)
-    return (name, f"+{value}") if plus and value and not value.startswith("+") else new
+    return (name, f"+{value}") if plus and not value.startswith("+") else (name, value)
 
 
 def _about(value: str | None) -> str:

@@ -126,7 +126,7 @@ class Asked:
         others: dict[int, list[Source]] = {}
         for number in self.also:
             if number != main[0].place.number:
-                place = self.project.iteration(number)
+                place = self._also(number)
                 others[number] = _estimated(place) or [Source(place)]
         found = [*main, *(one for part in others.values() for one in part)]
         for one in found:
@@ -134,6 +134,14 @@ class Asked:
             require_input(one.recording, f"r2s2r import run.csv --iteration {number}")
             require_input(one.estimate, f"r2s2r estimate --iteration {number}{of}")
         return tuple(found)
+
+    def _also(self, number: int) -> Iteration:
+        """An iteration of --also. Raises UsageError where there is none."""
+        try:
+            return self.project.iteration(number)
+        except UsageError as error:
+            error.where = "--also"
+            raise
 
     @cached_property
     def last(self) -> Iteration | None:
@@ -232,6 +240,6 @@ def parse_fixed(texts: Sequence[str]) -> dict[str, float]:
             value = math.nan
         if not name or not math.isfinite(value):
             raise UsageError("a fixed parameter has no number", where="--fix", expected="NAME=VALUE", received=text,
-                             hint="--fix friction=0.6")  # fmt: skip
+                             hint=f"--fix {name or 'friction'}=0.6")  # fmt: skip
         fixed[name] = value
     return fixed

@@ -95,8 +95,8 @@ def plan(
     )  # fmt: skip
     digests = [ref.sha256 for ref in run.inputs]
     key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
-    checkpoint = CheckpointFile(unfinished, key, resume)
     again = ["plan", *_typed(behaviour, to, seed, iteration, set_, project)]
+    checkpoint = CheckpointFile(unfinished, key, resume, again)
     with resumable(checkpoint, here.relative(unfinished), again, done="found"):
         result, report = run.run(
             lambda: _compute(asked, settings, checkpoint, console),

@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from r2s2r_cli.commands.typed import typed_words
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.store.lock import writer
 from r2s2r_cli.store.project import Iteration, Project, journal_of
@@ -80,7 +81,7 @@ class Recording:
     def _elsewhere(self) -> str:
         """The command as it was typed, for where there is room: a recording starts a new iteration, what is executed
         belongs to the plan of its own."""
-        words = sys.argv[1:] if sys.argv[1:2] == [self.stage] else [self.stage]
+        words = typed_words(self.stage)
         if self.stage == "execute":
             return shlex.join(["r2s2r", *words, "--force"]) + "   # the old runs stay as .replaced"
         at = next((k for k, word in enumerate(words) if word.split("=")[0] == "--iteration"), None)

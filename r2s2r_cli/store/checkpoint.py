@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,11 +18,13 @@ _FORM = 1
 
 @dataclass(frozen=True)
 class CheckpointFile:
-    """The checkpoint of one artifact. key: digest of the inputs and settings that its values belong to."""
+    """The checkpoint of one artifact. key: digest of the inputs and settings that its values belong to. command: the
+    words that were typed after `r2s2r`, without --resume."""
 
     path: Path
     key: str
     resume: bool = False
+    command: Sequence[str] = ("status",)
 
     def load(self) -> dict[str, Any] | None:
         """The saved values; None where there are none, or where they are not wanted.
@@ -36,11 +39,11 @@ class CheckpointFile:
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise InputError("the checkpoint cannot be read", where=str(self.path), received=type(error).__name__,
                              expected="what an interrupted command left",
-                             hint="run the command without --resume") from error  # fmt: skip
+                             hint=begin_anew(self.command)) from error  # fmt: skip
         if (form, key) != (_FORM, self.key):
             raise UsageError("the checkpoint belongs to another request", where=str(self.path),
                              expected="the inputs, settings and options that it was made with", received="others",
-                             hint="run the command without --resume")  # fmt: skip
+                             hint=begin_anew(self.command))  # fmt: skip
         return values
 
     def kept(self) -> bool:
@@ -57,6 +60,11 @@ class CheckpointFile:
     def clear(self) -> None:
         """Remove it: the artifact stands."""
         self.path.unlink(missing_ok=True)
+
+
+def begin_anew(command: Sequence[str]) -> str:
+    """The hint where a checkpoint is of no use: the command line that takes none up."""
+    return shlex.join(["r2s2r", *(word for word in command if word != "--resume")])
 
 
 def checkpoint_of(artifact: Path) -> Path:

@@ -16,6 +16,7 @@ import numpy as np
 
 from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.atomic import disk_error
+from r2s2r_cli.store.checkpoint import begin_anew
 
 _FORM = "arrays-1"
 MOST_BYTES = 48_000_000
@@ -27,6 +28,7 @@ _RECORD = struct.Struct("<32sQI")
 class ArrayCheckpoint:
     """The checkpoint of one artifact, for work that asks the same questions in the same order when it begins again.
     key: digest of the inputs and settings that it belongs to. most: bytes that it grows to; later work is not kept.
+    command: the words that were typed after `r2s2r`, without --resume.
 
     Results come back bit by bit as long as the questions are the same. From the first other one, or the first that was
     not written whole, the rest is forgotten."""
@@ -35,6 +37,7 @@ class ArrayCheckpoint:
     key: str
     resume: bool = False
     most: int = MOST_BYTES
+    command: Sequence[str] = ("status",)
     _place: int | None = field(default=None, init=False)
     """Where the next result to read begins; None: nothing is read (any more)."""
     _begun: bool = field(default=False, init=False)
@@ -113,14 +116,14 @@ class ArrayCheckpoint:
         if (form, key) != (_FORM, self.key):
             raise UsageError("the checkpoint belongs to another request", where=str(self.path),
                              expected="the inputs, settings and options that it was made with", received="others",
-                             hint="run the command without --resume")  # fmt: skip
+                             hint=begin_anew(self.command))  # fmt: skip
         self._mine = True
         return place
 
     def _unreadable(self, error: Exception) -> InputError:
         return InputError(
             "the checkpoint cannot be read", where=str(self.path), expected="what an interrupted command left",
-            received=type(error).__name__, hint="run the command without --resume",
+            received=type(error).__name__, hint=begin_anew(self.command),
         )  # fmt: skip
 
 

@@ -63,6 +63,29 @@ def test_a_model_without_uncertainty_is_said(estimated: Path) -> None:
     assert evidence.within_run and evidence.floor is None
 
 
+@pytest.mark.parametrize(
+    ("typed", "where", "hint"),
+    [
+        ("--train sample:1 --test sample:2", "--train", "r2s2r diagnose --train sample:1-"),
+        (
+            "--train sample:1-3 --test sample:2-4",
+            "--train, --test",
+            "r2s2r diagnose --test sample:2-4 --train sample:1",
+        ),
+        ("--healthy smaple --seed 4", "--healthy", "r2s2r diagnose --seed 4 --healthy sample --json --dry-run"),
+        ("--also 5", "--also", "r2s2r status"),
+    ],
+)
+def test_a_wrong_request_has_a_command_as_its_hint(estimated: Path, typed: str, where: str, hint: str) -> None:
+    """Whole, with what was asked for; the option that is wrong is named."""
+    asked(estimated)
+    refused = invoke("diagnose", *typed.split(), "--dry-run", "--json")
+    error = json.loads(refused.stdout)
+    assert refused.exit_code in (2, 4) and error["where"] == where
+    assert error["hint"].startswith(hint)
+    assert not artifacts(estimated)
+
+
 def test_another_robot_is_refused(estimated: Path) -> None:
     """Numbers or a run of one are not taken for those of this one: it says whose they are."""
     one = asked(estimated)

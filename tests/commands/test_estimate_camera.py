@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from r2s2r_cli.commands.bench_estimate_case import TUNING_SEEDS, Case, make_case
+from r2s2r_cli.commands.estimate_hints import hints_of
+from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.estimate.unseen import Unseen
 from r2s2r_cli.store.read import read_artifact
 from tests.commands.conftest import invoke
+from tests.support import builders
 
 RUN_S = 3.0
 
@@ -36,6 +41,32 @@ def write_folder(case: Case, folder: Path) -> None:
         (folder / "data" / f"{k:04d}.json").write_text(json.dumps(frame))
 
 
+@pytest.mark.parametrize(
+    ("stage", "flags", "expected"),
+    [
+        ("execute", {"policies": ["straight"], "port": "udp://h:1"},
+         "r2s2r execute straight --port udp://h:1 --iteration 2 --force --camera realsense"),
+        ("execute", {"port": "udp://h:1", "camera": "open3d"},
+         "r2s2r execute --port udp://h:1 --camera open3d --iteration 2 --force"),
+        ("record", {"random": 15, "port": "udp://h:1"},
+         "r2s2r record --random 15 --port udp://h:1 --iteration 2 --force --camera realsense --dry-run   # "),
+        ("bench", {}, "r2s2r import crawl.csv"),
+    ],
+)  # fmt: skip
+def test_runs_that_nobody_saw_have_their_own_command_as_the_hint(
+    tmp_path: Path, stage: str, flags: dict[str, Any], expected: str
+) -> None:
+    """That which moved the robot, with a camera; none that moves it without a question."""
+    path = tmp_path / "iterations/002/50-execute.h5"
+    made = builders.provenance(stage=stage, settings={"flags": flags}, overrides={}, seed=None)
+    with pytest.raises(Unseen) as caught, hints_of("50-execute.h5", path, made):
+        raise Unseen("nothing", hint="r2s2r import crawl.csv")
+    assert caught.value.hint.startswith(expected)
+    with pytest.raises(InputError, match="few") as other, hints_of("50-execute.h5", path, made):
+        raise InputError("few", hint="r2s2r inspect 10-record.h5")
+    assert other.value.hint == "r2s2r inspect 50-execute.h5"
+
+
 @pytest.mark.slow
 def test_a_folder_of_pictures_becomes_states(tmp_path: Path) -> None:
     """Import, estimate, validate: distances of caps true to 3 mm on average, everything drawn, no error."""
@@ -58,14 +89,3 @@ def test_a_folder_of_pictures_becomes_states(tmp_path: Path) -> None:
     apart = [np.linalg.norm(p[:, :, None] - p[:, None], axis=-1) for p in (frames["p_WE"], true)]
     assert np.abs(apart[0] - apart[1]).mean() < 0.003
     assert invoke("validate", "--project", str(project)).exit_code == 0
-
-
-def test_hints_name_the_recording_that_was_read() -> None:
-    """The stage knows no paths; its hints do in the end, and can be pasted in the project."""
-    from r2s2r_cli.commands.estimate import _hints_name
-    from r2s2r_cli.errors import InputError
-
-    source = "iterations/003/50-execute.h5"
-    with pytest.raises(InputError) as caught, _hints_name(source):
-        raise InputError("no", hint="r2s2r doctor camera --camera replay:10-record.h5")
-    assert caught.value.hint == f"r2s2r doctor camera --camera replay:{source}"

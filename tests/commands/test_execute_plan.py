@@ -10,6 +10,7 @@ import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.commands.execute import _long
+from r2s2r_cli.commands.typed import typed_again
 from r2s2r_cli.stages.plan.view import far
 from r2s2r_cli.store.project import journal_of
 from r2s2r_cli.store.write import write_artifact
@@ -76,6 +77,20 @@ def test_a_policy_of_another_robot_is_refused(project: Path, robot: str, target:
     refused = invoke("execute", "gait.toml", "--iteration", "1", "--dry-run")
     assert refused.exit_code == 4 and "policy gait is for another robot" in refused.stderr
     assert not list(project.rglob("50-*"))
+
+
+def test_nobody_to_ask_is_told_the_command_as_typed(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Policy, port and --force stay in the hint, --yes is added; where the answer is no, --dry-run."""
+    place = project / "iterations" / "001"
+    place.mkdir(parents=True)
+    (project / "gait.toml").write_text(GAIT.format(robot="threebar", target=[0.5] * 6))
+    words = ["execute", "gait.toml", "--port", "socket://h:1", "--force"]
+    monkeypatch.setattr("sys.argv", ["r2s2r", *words])
+    refused = invoke(*words)
+    assert refused.exit_code == 2
+    assert refused.stderr.endswith("hint: r2s2r execute gait.toml --port socket://h:1 --force --yes\n")
+    assert typed_again("execute", "--dry-run") == "r2s2r execute gait.toml --port socket://h:1 --force --dry-run"
+    assert typed_again("record", "--yes") == "r2s2r record --yes"
 
 
 @pytest.mark.parametrize("cut_off", [False, True])

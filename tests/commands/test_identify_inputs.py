@@ -150,6 +150,12 @@ def test_online_goes_on_from_the_last_identification(estimated: Path) -> None:
     assert asked(estimated, 1, online=True).last is None
 
 
+def test_an_iteration_of_also_that_is_not_there_is_named_so(estimated: Path) -> None:
+    """Where: --also, not --iteration, which was not typed."""
+    refused = invoke("identify", "--also", "5", "--dry-run")
+    assert refused.exit_code == 2 and "where: --also" in refused.stderr, refused.stderr
+
+
 def test_intervals_are_resolved(estimated: Path) -> None:
     """--train 1-2 leaves the other complete intervals to be predicted."""
     found = asked(estimated, train=("sample:1-2",))
@@ -162,10 +168,14 @@ def test_a_dry_run_checks_what_is_asked_for(estimated: Path) -> None:
     """Names, runs, intervals and what goes together: the same refusal and code as that of the fit."""
     for typed, expected in {
         "--free frictoin": "--free friction",
-        "--fix frictoin=1 --free mass": "--free mass --fix friction=0.5",
-        "--with-effect motor_leg": "--with-effect motor_lag",
+        "--fix frictoin=1 --free mass": "--free mass --fix friction=1 --dry-run",
+        "--fix restitutoin=0.2": "--fix restitution=0.2 --dry-run",
+        "--free +frictoin=0.4,0.1..0.9": "--free +friction=0.4,0.1..0.9 --dry-run",
+        "--with-effect motor_leg": "--with-effect motor_lag --dry-run",
+        "--with-effect dropout": "--dry-run",
+        "--with-effect dropout --with-effect payload": "--with-effect payload --dry-run",
         "--train sampel:1-2 --seed 3": "--seed 3 --train sample:1-2",
-        "--method cma --drive closed-loop": "--drive closed-loop   #",
+        "--method cma --drive closed-loop": "--drive closed-loop --dry-run   #",
         "--method cma --online": "--online",
         "--self-test --free frictoin": "--self-test --free friction",
     }.items():
@@ -175,7 +185,7 @@ def test_a_dry_run_checks_what_is_asked_for(estimated: Path) -> None:
     assert invoke("identify", "--free", "friction=2,3..1", "--dry-run").exit_code == 4
     alone = invoke("identify", "--online", "--dry-run")
     assert alone.exit_code == 4 and alone.stderr.endswith(
-        "hint: r2s2r identify   # without --online: from robot.toml\n"
+        "hint: r2s2r identify --dry-run   # without --online: from robot.toml\n"
     )
     assert "cannot be free in command replay" in invoke("identify", "--free", "com.0", "--dry-run").stderr
     assert invoke("identify", "--test", "sample:99", "--dry-run").exit_code == 2
@@ -204,6 +214,11 @@ def refusal(hint: str, where: str = "--free", received: str = "") -> R2S2RError:
          "--free mass --free motor_speed.2"),
         ("--method paper --online", refusal("r2s2r identify --online", where="--online, --method"), "--online"),
         ("--method papier --online", refusal("r2s2r identify --method paper"), "--online --method paper"),
+        ("--fix f=2 --dry-run --force", refusal("--fix g=0.5", received="f"), "--fix g=2 --dry-run --force"),
+        ("--fix f=2", refusal("--fix f=0.5", received="2"), "--fix f=0.5"),
+        ("--resume --seed 1", refusal("r2s2r identify --seed 1", where="iterations/001/30-identify.partial"),
+         "--seed 1"),
+        ("--resume --fix f=2", refusal("--fix g=0.5", received="f"), "--resume --fix g=2"),
         ("--set identify.start=3", refusal("--set identify.starts=3", received="identify.start"),
          "--set identify.starts=3"),
     ],

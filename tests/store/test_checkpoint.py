@@ -34,8 +34,9 @@ def test_another_request_is_refused(tmp_path: Path) -> None:
     """Work of other inputs or settings is never gone on with."""
     path = tmp_path / "x.partial"
     CheckpointFile(path, checkpoint_key({"starts": 3}, ["sha"])).save(VALUES)
-    with pytest.raises(UsageError, match="another request"):
+    with pytest.raises(UsageError, match="another request") as another:
         CheckpointFile(path, checkpoint_key({"starts": 4}, ["sha"]), resume=True).load()
+    assert another.value.hint == "r2s2r status"
     assert CheckpointFile(path, checkpoint_key({"starts": 3}, ["sha"]), resume=True).load() == VALUES
 
 
@@ -45,8 +46,8 @@ def test_a_broken_file_is_said(tmp_path: Path, content: str) -> None:
     path = tmp_path / "x.partial"
     path.write_text(content)
     with pytest.raises(InputError) as caught:
-        CheckpointFile(path, "a", resume=True).load()
-    assert caught.value.hint == "run the command without --resume"
+        CheckpointFile(path, "a", True, ["plan", "--seed", "3", "--resume"]).load()
+    assert caught.value.hint == "r2s2r plan --seed 3"
 
 
 def test_clear_removes_it(tmp_path: Path) -> None:

@@ -117,5 +117,5 @@ def test_another_request_is_refused_and_a_broken_file_said(tmp_path: Path) -> No
         ArrayCheckpoint(path, "b", resume=True).recall(digest(0))
     path.write_bytes(b"\x00\n" + path.read_bytes())
     with pytest.raises(InputError) as caught:
-        ArrayCheckpoint(path, "a", resume=True).recall(digest(0))
-    assert caught.value.hint == "run the command without --resume"
+        ArrayCheckpoint(path, "a", resume=True, command=["diagnose", "--seed", "3"]).recall(digest(0))
+    assert caught.value.hint == "r2s2r diagnose --seed 3"

@@ -5,6 +5,7 @@ Values only: a project's artifacts and a blind set's logs become the same `Evide
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -14,6 +15,7 @@ from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.floor.runs import SensedRun
 from r2s2r_cli.stages.identified import Identified
 from r2s2r_cli.stages.identify.data import RunData, Selection
+from r2s2r_cli.stages.identify.selection import complete, default_split, in_words
 from schemas.robot import Robot
 
 
@@ -107,12 +109,23 @@ def require_enough(evidence: Evidence) -> None:
                 expected=f"{evidence.robot.n_caps} end caps", received=str(caps),
                 hint="r2s2r diagnose --iteration N   # with runs of one robot",
             )  # fmt: skip
-    fitted = sum(len(one.intervals) for one in evidence.fit)
-    if fitted < 2:
+    if sum(len(one.intervals) for one in evidence.fit) < 2:
+        fitted = ", ".join(f"{one.run}:{in_words(one.intervals)}" for one in evidence.fit if one.intervals)
         raise InputError(
-            "too few target intervals to tell causes apart", where="--train", expected="at least 2",
-            received=str(fitted), hint="r2s2r identify --train RUN:1-7 --test RUN:8-11 --force",
+            "too few target intervals to tell causes apart", where="--train", expected="at least 2 to fit",
+            received=fitted or "none", hint=_enough(evidence.runs),
         )  # fmt: skip
+
+
+def _enough(runs: Sequence[Run]) -> str:
+    """The command that fits the first part of the longest run and judges on the rest."""
+    longest = max((run.caps for run in runs), key=lambda run: len(complete(run)))
+    train, test = default_split(longest)
+    if len(train.intervals) < 2:
+        return "r2s2r inspect 20-estimate.h5   # which intervals there are: record longer runs"
+    split = [f"--{role} {shlex.quote(f'{one.run}:{in_words(one.intervals)}')}"
+             for role, one in (("train", train), ("test", test))]  # fmt: skip
+    return f"r2s2r diagnose {' '.join(split)}"
 
 
 def _exchanged(run: RunData, order: np.ndarray) -> RunData:

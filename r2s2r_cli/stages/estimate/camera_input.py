@@ -13,6 +13,7 @@ from r2s2r_cli.stages.estimate.images import DecodedFrames, Encoded
 from r2s2r_cli.stages.estimate.lengths import readings_of
 from r2s2r_cli.stages.estimate.motion.data import Readings
 from r2s2r_cli.stages.estimate.smooth import MIN_FRAMES
+from r2s2r_cli.stages.estimate.unseen import Unseen
 from r2s2r_cli.stages.frames import KEPT, keep_frames
 from schemas.robot import Robot
 
@@ -34,10 +35,10 @@ def kept_frames(run: str, streams: dict[str, Group], pictures: Pictures) -> tupl
     where = f"runs/{run}/camera"
     if color is None or depth is None or "t" not in camera:
         missing = " and ".join(name for name, found in (("colour", color), ("depth", depth)) if found is None)
-        raise InputError(
+        raise Unseen(
             f"run {run} has no {missing or 'times of its'} pictures: the tracker needs colour and depth", where=where,
             expected="colour and depth images with their times", received=f"no {missing or 't'}",
-            hint="r2s2r record --camera ..., or r2s2r import FOLDER with color/ and depth/",
+            hint="r2s2r import FOLDER   # with color/ and depth/ in it",
         )  # fmt: skip
     facts = camera.attributes
     lost = [name for name in (*_LENS, "depth_scale") if name not in facts]

@@ -16,6 +16,7 @@ from r2s2r_cli.stages.estimate.lengths import SensorLengths, sensor_lengths
 from r2s2r_cli.stages.estimate.noise import observation_noise
 from r2s2r_cli.stages.estimate.rigid import Rods, is_rigid, make_rigid
 from r2s2r_cli.stages.estimate.smooth import MIN_FRAMES, OUTLIER, Tracks, smooth
+from r2s2r_cli.stages.estimate.unseen import Unseen
 from r2s2r_cli.stages.frames import KEPT, fit_rod_length
 from r2s2r_cli.stages.segments import Intervals, Segments, segments, target_intervals
 from schemas.estimate import EstimateSettings
@@ -102,12 +103,12 @@ def observations(run: str, streams: dict[str, Group]) -> tuple[np.ndarray, np.nd
     """Rows, stamps [s] and end caps [m] of the kept frames. Raises InputError where these allow no estimate."""
     if "caps" not in streams:
         held = ", ".join(name for name in streams if name) or "nothing"
-        raise InputError(
+        raise Unseen(
             f"run {run} holds neither observed end caps nor camera images",
             where=f"runs/{run}/caps",
             expected="end caps, as a trajectory CSV brings them, or a camera with colour and depth",
             received=held,
-            hint="r2s2r record --camera ..., or r2s2r import crawl.csv",
+            hint="r2s2r import crawl.csv",
         )
     caps = streams["caps"]
     kept = np.flatnonzero(caps["drop_reason"] == KEPT)

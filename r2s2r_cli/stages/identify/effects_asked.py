@@ -34,8 +34,8 @@ class EffectsAsked:
 
 
 def effects_asked(words: Sequence[str], robot: Robot) -> EffectsAsked:
-    """Of `--with-effect` words. Raises UsageError for an unknown effect, an element that is not there, or `none` beside
-    others."""
+    """Of `--with-effect` words. Raises UsageError for an unknown effect, one without a number that can be fitted, an
+    element that is not there, or `none` beside others."""
     if NONE in words:
         if len(words) > 1:
             raise UsageError("none and an effect", where="--with-effect", expected="none alone, or effects",
@@ -47,6 +47,10 @@ def effects_asked(words: Sequence[str], robot: Robot) -> EffectsAsked:
         require_effects([name])
         ids += [] if name in ids else [name]
         own = [one for one in entries(robot).values() if one.effect == name]
+        if not own:  # it would be in the simulator, and nothing of it would be found
+            fitted = dict.fromkeys(one.effect for one in entries(robot).values() if one.effect)
+            raise UsageError(f"{name} has no number that a fit can find", where="--with-effect", received=word,
+                             expected=", ".join(fitted), hint="r2s2r identify")  # fmt: skip
         families = dict.fromkeys(one.family for one in own)
         for family in families:
             elements = [one.element for one in own if one.family == family and one.element is not None]

@@ -57,8 +57,10 @@ def test_too_little_is_refused() -> None:
     """No run, one interval, another robot: before any work."""
     with pytest.raises(InputError, match="no run"):
         require_enough(evidence(fit=()))
-    with pytest.raises(InputError, match="too few"):
+    with pytest.raises(InputError, match="too few") as caught:
         require_enough(evidence(run_data(), fit=(Selection("walk", (1,)),)))
+    assert caught.value.received == "walk:1"
+    assert caught.value.hint == "r2s2r diagnose --train walk:1-3 --test walk:4"
     with pytest.raises(InputError, match="another robot"):
         require_enough(evidence(run_data(caps=12), fit=(Selection("walk", (1, 2)),)))
 

@@ -57,6 +57,7 @@ def test_an_effect_frees_its_numbers() -> None:
         (["payloda"], "unknown effect", "--with-effect payload"),
         (["payload:7"], "no element '7'", "--with-effect payload:0"),
         (["none", "payload"], "none and an effect", "--with-effect none"),
+        (["payload", "dropout"], "dropout has no number", "r2s2r identify"),
     ],
 )
 def test_what_cannot_be(words: list[str], what: str, hint: str) -> None:

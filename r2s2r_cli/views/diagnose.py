@@ -169,7 +169,7 @@ def _ranking(data: ArtifactData, report: DiagnoseReport) -> bytes:
     handles, labels = left.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", fontsize=8, frameon=False)
     right.set(xlim=(0, 1.15))
-    right.set_xlabel(f"probability ({report.calibrated.split(':')[0]})", fontsize=8)
+    right.set_xlabel("probability", fontsize=8)  # where it comes from is in the table "how"
     return png_bytes(figure)
 
 

@@ -82,13 +82,19 @@ def _ranked(one: RankedName) -> list[str]:
         short = name.split(".")[1]
         unit = "" if one.units.get(name, "1") == "1" else f" {one.units[name]}"
         sizes.append(f"{short} {value:.3g}{unit}")
-        wide.append(f"{one.ci90[name][0]:.3g} .. {one.ci90[name][1]:.3g}")
+        whose = f"{short} " if len(one.size) > 1 else ""
+        wide.append(f"{whose}{one.ci90[name][0]:.3g} .. {one.ci90[name][1]:.3g}{unit}")
     remarks = [_RIVALS[one.effect]] if one.effect in _RIVALS else []
+    remarks += [] if one.fitted else ["not fitted: it promised too little"]
     remarks += [] if one.moved else ["never left its start"]
     remarks += [f"{name.split('.', 1)[1]} on a bound" for name in one.on_bound]
     rmse = "" if one.rmse_m is None else f"{1e3 * one.rmse_m:.1f}"
     where = element_words(one.element) or (f"channel {one.channel}" if one.channel else "")
-    gain = f"{one.elpd_gain:.1f}" + ("" if one.elpd_gain_sd is None else f" +- {one.elpd_gain_sd:.1f}")
+    gain = (
+        "-"
+        if not one.fitted
+        else f"{one.elpd_gain:.1f}" + ("" if one.elpd_gain_sd is None else f" +- {one.elpd_gain_sd:.1f}")
+    )
     return [one.effect, where, gain, f"{one.probability:.2f}", "; ".join(sizes), "; ".join(wide),
             rmse, "; ".join(remarks)]  # fmt: skip
 

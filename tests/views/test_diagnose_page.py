@@ -75,6 +75,25 @@ def test_rivals_and_numbers_say_what_they_are() -> None:
     assert "refit: motor_lag.tau_s | +0.03 +- 0.004 s" in text
 
 
+def test_what_was_not_fitted_has_no_gain() -> None:
+    """Its 0 was never measured; of several numbers the intervals say whose they are, with units."""
+    first, second = report().ranking[0], report().ranking[1]
+    size, units = (
+        {"payload.mass_kg.1": 0.04, "payload.place_m.1": 0.1},
+        {"payload.mass_kg.1": "kg", "payload.place_m.1": "m"},
+    )
+    ci90 = {"payload.mass_kg.1": (0.03, 0.05), "payload.place_m.1": (0.05, 0.15)}
+    ranking = (
+        first.model_copy(update={"size": size, "units": units, "ci90": ci90}),
+        second.model_copy(update={"effect": "dropout", "fitted": False}),
+    )
+    table = next(iter(diagnose_tables(report().model_copy(update={"ranking": ranking}))))
+    rows = {row[0]: row for row in table.rows}
+    assert rows["dropout"][2] == "-" and "not fitted" in rows["dropout"][-1]
+    assert rows["payload"][2].startswith("31.0")
+    assert rows["payload"][5] == "mass_kg 0.03 .. 0.05 kg; place_m 0.05 .. 0.15 m"
+
+
 @pytest.mark.parametrize(
     ("nats", "now", "words"),
     [

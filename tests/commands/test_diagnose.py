@@ -134,7 +134,7 @@ def test_ctrl_c_leaves_what_was_simulated_and_resume_ends_the_same(project: Path
     _, stderr = child.communicate(timeout=300)
     assert child.returncode == 130, stderr
     assert "Traceback" not in stderr
-    assert f"hint: r2s2r diagnose {' '.join(ASK)} --force --no-draw --resume" in stderr
+    assert f"hint: r2s2r diagnose {' '.join(ASK)} --no-draw --resume --force" in stderr
     assert read_header(project / DIAGNOSIS).content_sha256 == before
     refused = invoke("diagnose", *ASK, "--seed", "9", "--resume")
     assert refused.exit_code == 2 and "another request" in refused.stderr
@@ -151,5 +151,5 @@ def test_one_interval_is_too_few(project: Path) -> None:
     result = invoke("diagnose", "--train", "g1:1", "--test", "g2:1", "--force", "--json")
     assert result.exit_code == 4
     error = json.loads(result.stdout)
-    assert (error["where"], error["expected"], error["received"]) == ("--train", "at least 2", "1")
+    assert (error["where"], error["expected"], error["received"]) == ("--train", "at least 2 to fit", "g1:1")
     assert error["hint"].startswith("r2s2r ")

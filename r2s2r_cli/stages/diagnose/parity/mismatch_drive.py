@@ -20,6 +20,8 @@ FAST, SLOW = 1.6, 0.6
 """Winding rates over the nominal, all winches alike, that are a wrong number and no effect."""
 STANDS = 0.05
 """Of the nominal rate: a winch that does not turn has no wrong number, it does not start."""
+WAYS = (1.0, -1.0)
+"""Reeling in, paying out, as commands are signed."""
 TURNS = 0.3
 """Of the nominal rate: the others turn, so power and commands are there."""
 
@@ -98,20 +100,22 @@ def rate(runs: Sequence[Series], robot: Robot, speed: float, missing: list[str])
 def _full_rates(runs: Sequence[Series], robot: Robot) -> dict[int, dict[float, float]]:
     """Winding rate of each winch at full command, way (+1: reeling in) by way, where there is enough of it [m/s]; +: as
     it was told. Runs are taken together."""
+    logs = [(one, CommandLog(one.run.caps)) for one in runs]
     found: dict[int, dict[float, float]] = {}
     for k, cable in enumerate(robot.actuated):
-        for way in (1.0, -1.0):
-            moved, took, rows = 0.0, 0.0, 0
-            for one in runs:
-                t, length = _readings(one, cable)
-                u, past = CommandLog(one.run.caps).at(t)[:, k], np.diff(t)
+        moved, took, rows = dict.fromkeys(WAYS, 0.0), dict.fromkeys(WAYS, 0.0), dict.fromkeys(WAYS, 0)
+        for one, log in logs:
+            t, length = _readings(one, cable)
+            u, past = log.at(t)[:, k], np.diff(t)
+            for way in WAYS:
                 inside = way * u > 0.9
                 steady = inside[1:] & inside[:-1] & (past > 0) & (past < GAP_S)
-                moved += -way * float(np.diff(length)[steady].sum())
-                took += float(past[steady].sum())
-                rows += int(steady.sum())
-            if rows >= LEAST_ROWS:
-                found.setdefault(k, {})[way] = moved / took
+                moved[way] += -way * float(np.diff(length)[steady].sum())
+                took[way] += float(past[steady].sum())
+                rows[way] += int(steady.sum())
+        own = {way: moved[way] / took[way] for way in WAYS if rows[way] >= LEAST_ROWS}
+        if own:
+            found[k] = own
     return found
 
 

@@ -273,6 +273,12 @@ def same_inputs(recorded: Sequence[InputRef], asked: Sequence[InputRef]) -> bool
     return matched == ({ref.path for ref in recorded}, {ref.path for ref in asked})
 
 
+def own_reasons(project: Project, iteration: Iteration | None, header: Header) -> list[str]:
+    """Why an artifact is stale by itself, asked for again as it was made."""
+    made = header.provenance
+    return [*reasons(project, header, wanted_again(project, iteration, made)), *joined(project, iteration, made)]
+
+
 def stale_inputs(project: Project, inputs: Sequence[InputRef]) -> list[str]:
     """Which inputs are stale, by themselves or through inputs of their own: what was made of them is, then, of old."""
     places = {place.path: place for place in project.iterations()}
@@ -282,11 +288,10 @@ def stale_inputs(project: Project, inputs: Sequence[InputRef]) -> list[str]:
         path = project.root / name
         try:
             header = read_header(path)
-            now = wanted_again(project, places.get(path.parent), header.provenance)
+            own = own_reasons(project, places.get(path.parent), header)
         except R2S2RError:
             return True  # damaged, or gone: nothing fresh
-        more = [*reasons(project, header, now), *joined(project, places.get(path.parent), header.provenance)]
-        return bool(more) or any(stale(ref.path) for ref in header.provenance.inputs if ref.kind in KINDS)
+        return bool(own) or any(stale(ref.path) for ref in header.provenance.inputs if ref.kind in KINDS)
 
     return [f"its input {ref.path} is stale itself" for ref in inputs if ref.kind in KINDS and stale(ref.path)]
 

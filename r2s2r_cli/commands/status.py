@@ -17,7 +17,6 @@ from r2s2r_cli.store.brief import brief
 from r2s2r_cli.store.header import read_header, sealed_header, whole_header
 from r2s2r_cli.store.lock import writer
 from r2s2r_cli.store.project import Iteration, Project, journal_of
-from r2s2r_cli.store.staleness import joined, reasons
 from schemas.header import Header
 from schemas.results import ArtifactState, StatusResult
 
@@ -148,12 +147,10 @@ def _reasons(
     project: Project, iteration: Iteration | None, header: Header, stale: set[str]
 ) -> tuple[list[str], list[str]]:
     """Why an artifact is stale: by itself, and through inputs that are."""
-    from r2s2r_cli.commands.stage import wanted_again
+    from r2s2r_cli.commands.stage import own_reasons
 
-    found = reasons(project, header, wanted_again(project, iteration, header.provenance))
-    found += joined(project, iteration, header.provenance)
     upstream = [ref.path for ref in header.provenance.inputs if ref.path in stale]
-    return found, [f"input {path} is stale itself" for path in upstream]
+    return own_reasons(project, iteration, header), [f"input {path} is stale itself" for path in upstream]
 
 
 def _remarks(state: ArtifactState) -> str:

@@ -43,7 +43,8 @@ class PublishedRank(Frozen):
     effect: str
     elpd_gain: float
     elpd_gain_sd: float | None = None
-    linear_gain: float = 0.0
+    linear_gain: float | None = None
+    """Of shards judged before version 7 of `diagnose`; not used."""
     parity_nats: float = 0.0
     fitted: bool = True
     probability: float

@@ -29,8 +29,6 @@ class RankedName(Frozen):
     """Log predictive density over the refit nominal model on gaits that were left out [nats]."""
     elpd_gain_sd: float | None = None
     """Its sd, from how much the left-out parts differ in it; None: one part, or no fit."""
-    linear_gain: float = 0.0
-    """The same of the linearised problem, which is not rough [nats]."""
     parity_nats: float = 0.0
     """What the parity stage says for it, without a simulator [nats]."""
     fitted: bool = True

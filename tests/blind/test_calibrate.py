@@ -13,7 +13,7 @@ from tests.support import blind_bank
 
 EFFECTS = ("backlash", "payload", "motor_lag", "soft_ground")
 TRUE = Calibration(
-    temperature=20.0, linear=1.5, parity=14.0, none=9.0, equivalent=16.0, gap=0.4, unknown=20.0, unknown_share=0.7,
+    temperature=20.0, parity=14.0, none=9.0, equivalent=16.0, gap=0.4, unknown=20.0, unknown_share=0.7,
     left=0.5, lapse=0.05, bias={"soft_ground": -27.0},
 )  # fmt: skip
 
@@ -22,10 +22,9 @@ def scores(by: Calibration, one: Case) -> dict[str, float]:
     """What a diagnosis makes of the evidence of a set."""
     beyond = {"none": one.gap, "unknown": one.left}
     return {
-        name: by.score(name, float(a), linear=float(b), parity=float(c), equivalent=one.equivalent,
-                       beyond=beyond.get(name, 0.0))
-        for name, a, b, c in zip(one.names, one.score, one.linear, one.parity, strict=True)
-    }  # fmt: skip
+        name: by.score(name, float(a), parity=float(b), equivalent=one.equivalent, beyond=beyond.get(name, 0.0))
+        for name, a, b in zip(one.names, one.score, one.parity, strict=True)
+    }
 
 
 def planted(count: int, seed: int = 0) -> list[Case]:
@@ -34,11 +33,10 @@ def planted(count: int, seed: int = 0) -> list[Case]:
     found = []
     for _ in range(count):
         names = (*EFFECTS, "none", "unknown")
-        score = np.array([*rng.normal(30.0, 25.0, len(EFFECTS)), 90.0, rng.uniform(0.0, 300.0)])
-        linear = np.array([*rng.normal(25.0, 25.0, len(EFFECTS)), 0.0, 0.0])
+        score = np.array([*rng.normal(67.0, 45.0, len(EFFECTS)), 90.0, rng.uniform(0.0, 300.0)])
         parity = np.array([*rng.exponential(1.5, len(EFFECTS)), 0.0, 0.0])
         gap = rng.uniform(0.0, 120.0)
-        one = Case(names, score, linear, parity, bool(rng.random() < 0.3), "", gap, gap * rng.uniform(0.0, 1.0))
+        one = Case(names, score, parity, bool(rng.random() < 0.3), "", gap, gap * rng.uniform(0.0, 1.0))
         p = np.array(list(TRUE.probabilities(scores(TRUE, one)).values()))
         found.append(replace(one, truth=names[rng.choice(len(names), p=p)]))
     return found
@@ -48,7 +46,6 @@ def test_planted_numbers_come_back() -> None:
     """Of 2000 sets: temperature, what each kind of evidence is worth, offsets and the effect that wins too easily."""
     found = calibrated(planted(2000), words="test")
     assert found["temperature"] == pytest.approx(TRUE.temperature, rel=0.15)
-    assert found["linear"] == pytest.approx(TRUE.linear, rel=0.15)
     assert found["parity"] == pytest.approx(TRUE.parity, rel=0.15)
     assert found["unknown_share"] == pytest.approx(TRUE.unknown_share, abs=0.15)
     middle = found["unknown_share"] * 150.0 + found["left"] * 30.0 - found["unknown"]  # where `unknown` has a chance
@@ -84,14 +81,14 @@ def test_a_verdict_becomes_a_case() -> None:
     label = {"kind": "single", "effects": [{"id": "payload", "channel": "mass", "element": None, "onset": None}],
              "d": 9.0, "d_each": [9.0], "outside": None}  # fmt: skip
     document = {
-        "ranking": [{"effect": "payload", "elpd_gain": 7.5, "linear_gain": 4.0, "parity_nats": 2.5},
+        "ranking": [{"effect": "payload", "elpd_gain": 7.5, "parity_nats": 2.5},
                     {"effect": "none", "elpd_gain": 0.0},
                     {"effect": "unknown", "elpd_gain": 3.0}, {"effect": "backlash", "elpd_gain": -1e9}],
         "chance_nats": 2.0, "gap_nats": 31.0, "left_nats": -4.0, "refit_upper_m": 0.012, "floor_m": 0.010,
     }  # fmt: skip
     one = case(truth_of(label), document)
     assert one is not None and one.names == ("payload", "none", "unknown") and one.score.tolist() == [7.5, 2.0, 3.0]
-    assert one.linear.tolist() == [4.0, 0.0, 0.0] and one.parity.tolist() == [2.5, 0.0, 0.0]
+    assert one.parity.tolist() == [2.5, 0.0, 0.0]
     assert one.equivalent and one.truth == "payload" and (one.gap, one.left) == (31.0, 0.0)
     pair = next(each for each in blind_bank.bank() if each["kind"] == "pair" and each["d"] > 3)
     assert case(truth_of(pair), document) is None

@@ -1,13 +1,12 @@
 """From verdicts on a calibration bank to the numbers that turn gains into probabilities.
 
-p(name) ~ exp((score + bias) / temperature). The score of an effect is its held-out gain, `linear` times that of the
-linearised problem, and `parity` times what the parity stage says for it; that of `none` what the best of the catalogue
-gains by chance, and `none`, and `equivalent` more where the equivalence test finds no gap, less `gap` for every nat
-that today's pieces cost beyond those of healthy runs; that of `unknown` a share (`unknown_share`) of what a wider floor
-gains, and `left` for every nat that the best effect leaves, less `unknown`. Linear in 1 / temperature and the products
-with it: a multinomial regression, biases drawn to 0, in which any name is the truth once in 20 sets (LAPSE). Thresholds
-come from probabilities of sets left out of the fit. To commit to a name, to `none` and to `unknown` are claims of
-different weight: each has its own.
+p(name) ~ exp((score + bias) / temperature). The score of an effect is its held-out gain, and `parity` times what the
+parity stage says for it; that of `none` what the best of the catalogue gains by chance, and `none`, and `equivalent`
+more where the equivalence test finds no gap, less `gap` for every nat that today's pieces cost beyond those of healthy
+runs; that of `unknown` a share (`unknown_share`) of what a wider floor gains, and `left` for every nat that the best
+effect leaves, less `unknown`. Linear in 1 / temperature and the products with it: a multinomial regression, biases
+drawn to 0, in which any name is the truth once in 20 sets (LAPSE). Thresholds come from probabilities of sets left out
+of the fit. To commit to a name, to `none` and to `unknown` are claims of different weight: each has its own.
 """
 
 from __future__ import annotations
@@ -22,12 +21,12 @@ from r2s2r_cli.blind.score.facts import NONE, UNKNOWN, Truth
 from r2s2r_cli.errors import InputError
 
 LEAST_SETS = 12
-LEARNED = ("sharpness", "linear", "parity", "none", "equivalent", "gap", "unknown", "unknown_share", "left")
+LEARNED = ("sharpness", "parity", "none", "equivalent", "gap", "unknown", "unknown_share", "left")
 """Numbers beside the biases, in the order of the columns; all of them in the exponent."""
-BEFORE = (0.5, 0.5, 0.7, 0.0, 0.0, 0.05, -1.0, 0.3, 0.05)
+BEFORE = (0.5, 0.7, 0.0, 0.0, 0.05, -1.0, 0.3, 0.05)
 """What they are before anything is learned, gains in the unit of SHARPNESS."""
-BEFORE_SD = (0.5, 0.5, 0.3, 2.0, 1.0, 0.1, 2.0, 0.3, 0.1)
-POSITIVE = ("sharpness", "linear", "parity", "gap", "unknown_share", "left")
+BEFORE_SD = (0.5, 0.3, 2.0, 1.0, 0.1, 2.0, 0.3, 0.1)
+POSITIVE = ("sharpness", "parity", "gap", "unknown_share", "left")
 FOLDS = 10
 COVER = 0.90
 PRECISION = {"commit": 0.90, "commit_none": 0.80, "commit_unknown": 0.75}
@@ -46,14 +45,13 @@ SHARPNESS = 1.0 / 15.0
 
 @dataclass(frozen=True)
 class Case:
-    """One set. names: what was ranked; score, linear, parity (n,) [nats]: without the numbers that are learned;
-    equivalent: the test found no gap. truth: the right name, not among `names` where the screening had lost it. gap,
-    left [nats]: what pieces cost beyond those of healthy runs, under the refit model and under the best effect; 0 where
-    they cost less."""
+    """One set. names: what was ranked; score, parity (n,) [nats]: without the numbers that are learned; equivalent:
+    the test found no gap. truth: the right name, not among `names` where the screening had lost it. gap, left [nats]:
+    what pieces cost beyond those of healthy runs, under the refit model and under the best effect; 0 where they cost
+    less."""
 
     names: tuple[str, ...]
     score: np.ndarray
-    linear: np.ndarray
     parity: np.ndarray
     equivalent: bool
     truth: str
@@ -70,10 +68,10 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
     score = [chance if row["effect"] == NONE else float(row["elpd_gain"]) for row in rows]
     upper, floor = document.get("refit_upper_m"), document["floor_m"]
     equivalent = upper is not None and float(upper) < 1.25 * float(floor)
-    linear, parity = (np.array([float(row.get(key, 0.0)) for row in rows]) for key in ("linear_gain", "parity_nats"))
+    parity = np.array([float(row.get("parity_nats", 0.0)) for row in rows])
     gap, left = (max(float(document.get(key) or 0.0), 0.0) for key in ("gap_nats", "left_nats"))
     names = tuple(row["effect"] for row in rows)
-    return Case(names, np.array(score), linear, parity, equivalent, truth.right, gap, left)
+    return Case(names, np.array(score), parity, equivalent, truth.right, gap, left)
 
 
 def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
@@ -101,7 +99,6 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
     sure = np.array([p[name] for name, (_, p) in zip(first, apart, strict=True)])
     return {
         "temperature": 1.0 / sharp,
-        "linear": learned["linear"] * SHARPNESS / sharp,
         "parity": learned["parity"] / sharp,
         "none": learned["none"] / sharp,
         "equivalent": learned["equivalent"] / sharp,
@@ -128,13 +125,13 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
 def _design(one: Case, effects: Sequence[str]) -> np.ndarray:
     """What multiplies LEARNED and the biases in the exponent of every name, (name, LEARNED + effect)."""
     X = np.zeros((len(one.names), len(LEARNED) + len(effects)))
-    for row, name, score, linear, parity in zip(X, one.names, one.score, one.linear, one.parity, strict=True):
+    for row, name, score, parity in zip(X, one.names, one.score, one.parity, strict=True):
         if name == UNKNOWN:
-            row[6:9] = 1.0, score * SHARPNESS, one.left * SHARPNESS
+            row[5:8] = 1.0, score * SHARPNESS, one.left * SHARPNESS
         elif name == NONE:
-            row[[0, 3, 4, 5]] = score * SHARPNESS, 1.0, float(one.equivalent), -one.gap * SHARPNESS
+            row[[0, 2, 3, 4]] = score * SHARPNESS, 1.0, float(one.equivalent), -one.gap * SHARPNESS
         else:
-            row[:3] = score * SHARPNESS, linear * SHARPNESS, parity
+            row[:2] = score * SHARPNESS, parity
             row[len(LEARNED) + effects.index(name)] = 1.0
     return X
 

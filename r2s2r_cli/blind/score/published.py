@@ -27,7 +27,6 @@ _USUAL: tuple[tuple[str, object], ...] = (
     ("moved", True),
     ("fitted", True),
     ("parity_nats", 0.0),
-    ("linear_gain", 0.0),
     ("size", {}),
 )
 """Of a ranked name, left out."""

@@ -8,10 +8,12 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.estimate.causal import Known, known
 from r2s2r_cli.stages.floor.runs import SensedRun
 from r2s2r_cli.stages.identified import Identified
 from r2s2r_cli.stages.identify.data import RunData, Selection
@@ -35,6 +37,16 @@ class Run:
     def name(self) -> str:
         """Of the run, unique in the evidence."""
         return self.caps.name
+
+    @cached_property
+    def known(self) -> Known:
+        """Its caps at every frame, from it and those before."""
+        caps = self.caps
+        row = np.clip(np.searchsorted(caps.t_command, caps.t, side="right") - 1, 0, len(caps.t_command) - 1)
+        ways = np.sign(np.nan_to_num(caps.control[row]))
+        changes = np.flatnonzero(np.any(np.diff(ways, axis=0) != 0, axis=1))
+        noise = caps.noise if caps.observed_sd is None else caps.observed_sd
+        return known(caps.t, caps.observed, noise, caps.quality, changes)
 
 
 @dataclass(frozen=True)

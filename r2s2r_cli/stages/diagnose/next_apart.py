@@ -14,7 +14,8 @@ from itertools import pairwise
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import LOST_M, SECANT, Arena
-from r2s2r_cli.stages.diagnose.which.fit import PRIOR_SCALES, Fit, Fits
+from r2s2r_cli.stages.diagnose.which.fit import PRIOR_SCALES, Fits
+from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.mixture import ENOUGH
 from r2s2r_cli.stages.diagnose.which.pieces import LEAST_SPEED_SD, length_of
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch

@@ -9,10 +9,11 @@ import numpy as np
 
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run
-from r2s2r_cli.stages.diagnose.starts import Starts, as_smoothed
+from r2s2r_cli.stages.diagnose.starts import Starts, as_known
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.before import Healthy
-from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis
+from r2s2r_cli.stages.diagnose.which.fit import Fits
+from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.pieces import pieces
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
 from r2s2r_cli.stages.diagnose.which.stretches import stretches
@@ -22,13 +23,16 @@ from r2s2r_cli.stages.measures.steps import steps_of
 
 NUMERICS_M = 3e-3
 """[m] What two good engines differ by at the end of a step of this robot, beside noise (tier B without an effect)."""
-FLOORS = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.0, 4.0)
-"""Factors on the floor that healthy runs are tried with."""
-NOISES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
+FLOORS_M = (0.4e-3, 0.8e-3, 1.6e-3, 3.2e-3, 6.4e-3, 13e-3)
+"""Floors that healthy runs are tried with."""
+NOISES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
+LASTING = (0.0, 0.1, 0.3)
+"""[s] Times that errors of the caps may last."""
+NEAR = (0.7, 1.0, 1.4)
 FLOOR_SPREAD = 0.5
 """Of the logarithm of the floor, before healthy runs are looked at: noisy ones say little of it."""
 ROUNDS = 2
-"""Times that start states are made anew with the refitted numbers."""
+"""Times that start states are made anew with the refitted numbers, where nothing is known of these to begin with."""
 KEPT = 0.9
 """Share of healthy stretches that the floor is taken from: a tip-over that went the other way is not the floor."""
 NO_FLOOR_M = 1e-4
@@ -78,7 +82,7 @@ def refit(
     simulator = np.sqrt(max(floor.rmse**2 - floor.sensor**2, (0.25 * floor.rmse) ** 2))
     simulator = simulator if with_floor else NO_FLOOR_M
     begin = prior = healthy = None
-    noise = 1.0
+    noise, lasts = 1.0, 0.0
     if evidence.healthy:
         told("healthy runs", 0, 1)
         part = tuple(
@@ -86,9 +90,9 @@ def refit(
             for run in evidence.healthy
         )
         arena, base = _fitted(
-            evidence.healthy, part, replayer, simulator, 1.0, None, starts, None, calibrate=with_floor
+            evidence.healthy, part, replayer, simulator, (1.0, 0.0), None, starts, None, calibrate=with_floor
         )  # fmt: skip
-        simulator, noise = arena.floor_m, arena.noise
+        simulator, noise, lasts = arena.floor_m, arena.noise, arena.lasts
         prior = _posterior(arena, base)
         healthy, begin = Healthy(arena, base), base.z[: arena.shared]
         if evidence.floor is None:
@@ -99,7 +103,7 @@ def refit(
             rmse = float(np.sqrt(np.mean(usual)))
             floor = FloorGiven(rmse, min(sensor, rmse), "the healthy runs, refitted", True, KEPT)
         told("healthy runs", 1, 1)
-    arena, base = _fitted(evidence.runs, evidence.fit, replayer, simulator, noise, prior, starts, begin, told)
+    arena, base = _fitted(evidence.runs, evidence.fit, replayer, simulator, (noise, lasts), prior, starts, begin, told)
     if not again:
         arena, base = _frozen(arena, base, prior)
     asked = sum(len(one.intervals) for one in evidence.fit)
@@ -140,24 +144,27 @@ def _sensor(runs: Sequence[Run]) -> float:
 
 
 def _fitted(
-    runs: Sequence[Run], part: Sequence[Selection], replayer: Replayer, simulator: float, noise: float,
+    runs: Sequence[Run], part: Sequence[Selection], replayer: Replayer, simulator: float, errs: tuple[float, float],
     prior: tuple[np.ndarray, np.ndarray] | None, starts: Starts, begin: np.ndarray | None, told: Told | None = None,
     calibrate: bool = False,
 ) -> tuple[Arena, Fit]:  # fmt: skip
-    """Nuisances and start states in turns. calibrate: with them the floor and the noise, of healthy runs: under a noise
-    that is too small every piece looks like a fall, and a fit of falls learns nothing."""
+    """Nuisances and start states in turns. errs: factor on the noise, and how long it lasts [s]. calibrate: with them
+    the floor and the noise, of healthy runs: under a noise that is too small every piece looks like a fall, and a fit
+    of falls learns nothing."""
     model = replayer.model
+    noise, lasts = errs
     named = {run.name: run for run in runs}
     last = {one.run: max(one.intervals) for one in part if one.intervals}
     z = begin
-    for number in range(ROUNDS):
+    rounds = ROUNDS if begin is None else 1
+    for number in range(rounds):
         if told is not None:
-            told("refit", number, ROUNDS)
+            told("refit", number, rounds)
         values = model.values0.copy()
         if z is not None:
             values[list(model.nuisances)] = z[: len(model.nuisances)]
         states = starts.at([named[name] for name in last], replayer, values, last)
-        states = as_smoothed(states, runs, replayer, values)
+        states = as_known(states, runs, replayer, values)
         whole = stretches(runs, part, states)
         many = pieces(runs, part, states, replayer, values)
         if not whole:
@@ -165,27 +172,29 @@ def _fitted(
                 "the robot tips over in every interval: nothing can be fitted", where="--train",
                 expected="an interval without a tip-over", received="none", hint="r2s2r diagnose --also N",
             )  # fmt: skip
-        arena = Arena(replayer, many, floor_m=simulator, noise=noise, prior=prior, whole=whole)
+        arena = Arena(replayer, many, floor_m=simulator, noise=noise, lasts=lasts, prior=prior, whole=whole)
         z = _begun(arena, z)
-        for _ in range(JACOBIANS if number == ROUNDS - 1 else 1):
+        for again in range(JACOBIANS if number == rounds - 1 else 1):
+            if again:
+                arena.move_starts(arena.away)
             arena.prepare(z)
             if calibrate:
-                _calibrate(arena, z)
+                _calibrate(arena, z, first=number == 0)
             base = _from(arena, z)
             Fits(arena).run([base])
-            z = base.z
-        simulator, noise = arena.floor_m, arena.noise
+            z, arena.away = base.z, base.away
+        simulator, noise, lasts = arena.floor_m, arena.noise, arena.lasts
     if calibrate:
         _calibrate(arena, base.z)
         base = _from(arena, base.z)
     if told is not None:
-        told("refit", ROUNDS, ROUNDS)
+        told("refit", rounds, rounds)
     return arena, base
 
 
 def _from(arena: Arena, z: np.ndarray) -> Fit:
     """The refit nominal model at nuisances z, not moved yet."""
-    return Fits(arena).begin(Hypothesis(), z, np.zeros(0), arena.residuals(arena.values(z[None]), z[None])[0])
+    return Fits(arena).begun([(Hypothesis(), z, np.zeros(0))])[0]
 
 
 def _frozen(arena: Arena, base: Fit, prior: tuple[np.ndarray, np.ndarray] | None) -> tuple[Arena, Fit]:
@@ -206,24 +215,24 @@ def _begun(arena: Arena, z: np.ndarray | None) -> np.ndarray:
     return np.clip(found, arena.lower, arena.upper)
 
 
-def _calibrate(arena: Arena, z: np.ndarray) -> None:
-    """Whitens with the floor and the factor on the noise under which healthy residuals at z are most likely."""
-    own = arena.floor_m
+def _calibrate(arena: Arena, z: np.ndarray, *, first: bool = False) -> None:
+    """Whitens with the floor, the factor on the noise and how long it lasts under which healthy residuals at z are most
+    likely. first: nothing is known of them; else near what they are."""
     raw = arena.raw(arena.values(z[None]), z[None])
 
-    def best(pairs: Iterable[tuple[float, float]]) -> tuple[float, float]:
+    def best(some: Iterable[tuple[float, float, float]]) -> tuple[float, float, float]:
         found = {}
-        for floor, noise in pairs:
-            arena.whiten(floor_m=floor, noise=noise)
+        for floor, noise, lasts in some:
+            arena.whiten(floor_m=floor, noise=noise, lasts=lasts)
             unusual = np.log(floor / NUMERICS_M) / FLOOR_SPREAD
-            found[floor, noise] = float(arena.log_densities(raw).sum()) - 0.5 * unusual**2
+            found[floor, noise, lasts] = float(arena.log_densities(raw).sum()) - 0.5 * unusual**2
         return max(found, key=lambda one: found[one])
 
-    floor, noise = best((factor * own, 1.0) for factor in FLOORS)
-    floor, noise = best((floor, noise) for noise in NOISES)
-    if noise > 1:
-        floor, noise = best((factor * floor, noise) for factor in (0.6, 0.8, 1.0))
-    arena.whiten(floor_m=floor, noise=noise)
+    floor, noise, lasts = best((floor, arena.noise, arena.lasts) for floor in FLOORS_M)
+    around = NOISES if first else tuple(factor * noise for factor in NEAR)
+    floor, noise, lasts = best((floor, noise, lasts) for noise in around for lasts in LASTING)
+    floor, noise, lasts = best((factor * floor, noise, lasts) for factor in NEAR)
+    arena.whiten(floor_m=floor, noise=noise, lasts=lasts)
 
 
 def _posterior(arena: Arena, base: Fit) -> tuple[np.ndarray, np.ndarray]:

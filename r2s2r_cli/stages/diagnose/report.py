@@ -9,9 +9,9 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.diagnosis import Diagnosis
 from r2s2r_cli.stages.diagnose.parity.finding import Element
-from r2s2r_cli.stages.diagnose.which.arena import CAMERA
 from r2s2r_cli.stages.diagnose.which.found import Ranked
 from r2s2r_cli.stages.diagnose.which.numbers import NUISANCES
+from r2s2r_cli.stages.diagnose.which.shifts import CAMERA
 from r2s2r_cli.stages.diagnose.words import sentence
 from r2s2r_cli.stages.effects import all_effects
 from schemas.results_diagnose import (
@@ -65,7 +65,7 @@ def _ranked(one: Ranked) -> RankedName:
     return RankedName(
         effect=one.effect, elpd_gain=_finite(one.gain, -1e9),
         elpd_gain_sd=one.gain_sd if one.gain_sd is not None and math.isfinite(one.gain_sd) else None,
-        linear_gain=_finite(one.linear, -1e9), parity_nats=one.parity, fitted=one.fitted, probability=one.probability,
+        parity_nats=one.parity, fitted=one.fitted, probability=one.probability,
         size=dict(one.size),
         ci90=dict(one.ci90), units=dict(one.units), channel=one.channel,
         element=None if one.element is None else _element(one.element),

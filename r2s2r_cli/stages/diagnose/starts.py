@@ -23,6 +23,9 @@ frames nearer than that say little more."""
 LOOSE_SD, LOOSE_M = 3.0, 3e-3
 """Standard deviations of a distance, and the least, beyond which a cable hangs."""
 
+STANDING = 1.5
+"""Standard deviations above the ground up to which a cap stands on it."""
+
 
 class Starts:
     """Start states of intervals, by run and number. The robot at rest before a run is found once: how it stands hangs
@@ -64,34 +67,36 @@ class Starts:
         return found
 
 
-def as_smoothed(
+def as_known(
     states: dict[tuple[str, int], State], runs: Sequence[Run], predictor: Predictor, values: np.ndarray
 ) -> dict[tuple[str, int], State]:
-    """The states with the poses and velocities that the estimate smoothed: these know later frames, so they are for
-    intervals that are fitted, never for judged ones. Roll is the filter's; rest lengths balance the pose."""
-    named = {run.name: run.caps for run in runs}
-    at = [(named[name], int(named[name].intervals.first[number - 1])) for name, number in states]
+    """The states in the poses and with the velocities that were known by then (`Run.known`). Roll is the filter's; rest
+    lengths balance the pose."""
+    named = {run.name: run for run in runs}
+    at = [(named[name], int(named[name].caps.intervals.first[number - 1])) for name, number in states]
     if not at:
         return {}
-    found = smoothed_at(at, batched(list(states.values())), predictor, values)
+    found = known_at(at, batched(list(states.values())), predictor, values)
     return {place: found.select(k) for k, place in enumerate(states)}
 
 
-def smoothed_at(
-    at: Sequence[tuple[RunData, int]], carried: State, predictor: Predictor, values: np.ndarray
-) -> State:  # fmt: skip
-    """States (a batch) in the smoothed poses and velocities of frames of runs; what these do not show is that of
-    `carried`, a batch as well."""
+def known_at(at: Sequence[tuple[Run, int]], carried: State, predictor: Predictor, values: np.ndarray) -> State:
+    """States (a batch) in the poses and with the velocities known at frames of runs; what these do not show is that of
+    `carried`, a batch as well. A cap that may well stand on the ground does: else noise would lift the robot."""
     import torch
 
     from r2s2r_cli.engine.settle import window_state
 
     theta = predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64))
     up = np.array([0.0, 0.0, predictor.mapping.observation(values).ground_height])
+    radius = predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64)).cap_radius.flatten().numpy()
+    caps = np.array([run.known.p_WE[frame] - up for run, frame in at])
+    sd = np.array([run.known.sd_p[frame, :, 2] for run, frame in at])
+    caps[..., 2] = np.where(caps[..., 2] < radius + STANDING * sd, radius, caps[..., 2])
     with torch.no_grad():
         return window_state(
-            predictor.simulator, theta, torch.as_tensor(np.array([run.p_WE[frame] - up for run, frame in at])), carried,
-            v_WE=torch.as_tensor(np.array([run.v_WE[frame] for run, frame in at])),
+            predictor.simulator, theta, torch.as_tensor(caps), carried,
+            v_WE=torch.as_tensor(np.array([run.known.v_WE[frame] for run, frame in at])),
             loose=float(np.mean([loose(run, frame) for run, frame in at])),
         )  # fmt: skip
 
@@ -108,9 +113,9 @@ def batched(states: Sequence[State]) -> State:
     )
 
 
-def loose(run: RunData, frame: int) -> float:
+def loose(run: Run, frame: int) -> float:
     """How much longer than the distance seen at a frame a rest length must be before the cable surely hangs [m]."""
-    return max(LOOSE_M, LOOSE_SD * float(np.sqrt(2.0 * np.mean(run.sd_p[frame] ** 2))))
+    return max(LOOSE_M, LOOSE_SD * float(np.sqrt(2.0 * np.mean(run.known.sd_p[frame] ** 2))))
 
 
 def thinned(run: RunData) -> RunData:

@@ -99,7 +99,7 @@ def smooth(
     for _ in range(MAX_ROUNDS):
         quality = np.where(found > 0, found, quality).astype(np.uint8)
         used, free = _interventions(y, quality, kick)
-        density = _fit_density(t, used, var, free, last)
+        density = fit_density(t, used, var, free, last)
         _, state = _pass(t, used, var, free, density + np.log10(BURSTS))
         found, last = _breaks(state, quality, limit), density
         if not np.any(found):
@@ -158,8 +158,8 @@ def _pass(
     return fit, backward(t, y, var, free, fit)
 
 
-def _fit_density(
-    t: np.ndarray, y: np.ndarray, var: np.ndarray, free: Disturbances, last: np.ndarray | None
+def fit_density(
+    t: np.ndarray, y: np.ndarray, var: np.ndarray, free: Disturbances, last: np.ndarray | None = None
 ) -> np.ndarray:
     """log10 of each cap's density of highest likelihood inside GRID: quarter decades, then two finer grids.
 

@@ -13,7 +13,7 @@ from r2s2r_cli.stages.diagnose.sample import _at_rest, planted
 from r2s2r_cli.stages.diagnose.stage import library_of
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.candidates import candidates
-from r2s2r_cli.stages.diagnose.which.fit import Fit, Hypothesis
+from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
 from r2s2r_cli.stages.diagnose.which.stretches import stretch_of

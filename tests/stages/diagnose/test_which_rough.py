@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.which.before import Healthy
-from r2s2r_cli.stages.diagnose.which.fit import Fits, Hypothesis
+from r2s2r_cli.stages.diagnose.which.fit import Fits
+from r2s2r_cli.stages.diagnose.which.hypothesis import Hypothesis
 from r2s2r_cli.stages.diagnose.which.left import expected, left
 from r2s2r_cli.stages.diagnose.which.rivals import no_gap
 from r2s2r_cli.stages.diagnose.which.rough import DRAWS, JITTER, around, root_of

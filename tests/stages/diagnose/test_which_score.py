@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.parity.finding import Element
-from r2s2r_cli.stages.diagnose.which.fit import Fits, Hypothesis
+from r2s2r_cli.stages.diagnose.which.fit import Fits
+from r2s2r_cli.stages.diagnose.which.hypothesis import Hypothesis
 from r2s2r_cli.stages.diagnose.which.mixture import ENOUGH, FACTORS, density, minus_log, weight
 from r2s2r_cli.stages.diagnose.which.rivals import chance, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score, gains, scores

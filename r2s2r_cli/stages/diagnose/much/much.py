@@ -12,7 +12,8 @@ from r2s2r_cli.stages.diagnose.much.blackbox import corrected
 from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, foretold, share_with_interval
 from r2s2r_cli.stages.diagnose.starts import Starts
 from r2s2r_cli.stages.diagnose.which.arena import Arena
-from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
+from r2s2r_cli.stages.diagnose.which.fit import Fits
+from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.score import Score, groups_of
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch, stretches
 from r2s2r_cli.stages.diagnose.which.which import Compared

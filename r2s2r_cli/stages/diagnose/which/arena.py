@@ -8,23 +8,18 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.mixture import density
 from r2s2r_cli.stages.diagnose.which.replay import Replayer, Seen
-from r2s2r_cli.stages.diagnose.which.stretches import Stretch
+from r2s2r_cli.stages.diagnose.which.shifts import CAMERA, Shifts, camera_columns
+from r2s2r_cli.stages.diagnose.which.stretches import Stretch, begun_at
 from r2s2r_cli.stages.diagnose.which.white import White, whitened, whites
 
-CAMERA = (("camera_height", "m", 2e-3), ("camera_tilt_x", "rad", 5e-3), ("camera_tilt_y", "rad", 5e-3))
-"""What is left of the rigid alignment of the camera after levelling: name, unit, prior sd. Over the plane it is part of
-where a stretch starts."""
-SENSOR_SD = 3e-3
-"""[m] What a length sensor is off by, the same all the time, before anything is called an effect."""
-SENSOR_LAG_SD = 0.04
-"""[s] By how much all length readings are late, before anything is called an effect: filters, converters and half a
-control tick are in no log, and a lag of 40 ms is 2 to 3 mm on every ramp."""
 SECANT = 0.3
 """Of a nuisance's prior sd, to both sides: over what its derivative is taken."""
+DRAWS = 6
+"""Of starts and nuisances together, for what straight lines do not tell of them."""
+MOST_SD = 2.5
+"""How far from where it is known to be a start may be moved, every coordinate in its sd."""
 LOST_M = 0.25
 """A cap that is simulated so far from where it was is lost, and farther off is not worse."""
-FLOOR_SD = 1e-3
-"""[m] How well the height of the floor is known, run by run: each is levelled by its own lowest caps."""
 
 
 class Arena:
@@ -33,27 +28,24 @@ class Arena:
 
     def __init__(
         self, replayer: Replayer, many: Sequence[Stretch], *, floor_m: float, noise: float = 1.0,
-        prior: tuple[np.ndarray, np.ndarray] | None = None, whole: Sequence[Stretch] = (),
+        lasts: float = 0.0, prior: tuple[np.ndarray, np.ndarray] | None = None, whole: Sequence[Stretch] = (),
     ) -> None:  # fmt: skip
         """many: what is fitted; whole: the target intervals, whose ends are the key frames; empty: those of `many`.
-        floor_m: of the simulator alone, cap RMSE after FLOOR_S. noise: factor on the stated noise. prior:
-        mean and precision matrix of the nuisances, of healthy runs; None: nominal."""
+        floor_m: of the simulator alone, cap RMSE after FLOOR_S. noise: factor on the stated noise; lasts [s]: how long
+        errors of the caps last. prior: mean and precision matrix of the nuisances, of healthy runs; None: nominal."""
         self.replayer, self.model, self.many = replayer, replayer.model, tuple(many)
         self.whole = tuple(whole) or self.many
-        self.floor_m, self.noise = floor_m, noise
+        self.floor_m, self.noise, self.lasts = floor_m, noise, lasts
         self.sensors = next((one.sensors for one in many if one.length is not None), ())
         self.engine = list(self.model.nuisances)
         self.runs = tuple(dict.fromkeys(one.run for one in many))
-        shared = (
-            *(self.model.names[k] for k in self.engine), *(name for name, _, _ in CAMERA),
-            *(f"sensor_bias_{k}" for k in self.sensors), *(("sensor_lag",) if self.sensors else ()),
-        )  # fmt: skip
-        self.shared = len(shared)
+        self.shifts = Shifts(self.sensors, self.runs)
+        engine = tuple(self.model.names[k] for k in self.engine)
+        self.names = (*engine, *self.shifts.names)
+        self.shared = len(engine) + len(self.shifts.shared)
         """How many nuisances are the same in every run; the others are the heights of the runs' floors."""
-        self.names = (*shared, *(f"floor_{run}" for run in self.runs))
         own = [self.model.numbers[k] for k in self.engine]
-        sd = np.array([n.sd for n in own] + [sd for _, _, sd in CAMERA] + [SENSOR_SD] * len(self.sensors)
-                      + [SENSOR_LAG_SD] * bool(self.sensors) + [FLOOR_SD] * len(self.runs))  # fmt: skip
+        sd = np.array([n.sd for n in own] + self.shifts.sd)
         low, high = np.array([n.within for n in own]).T
         self.lower = np.concatenate([low, np.full(len(sd) - len(own), -np.inf)])
         self.upper = np.concatenate([high, np.full(len(sd) - len(own), np.inf)])
@@ -66,8 +58,12 @@ class Arena:
         self.gait = np.array([self.gaits.index(one.gait) for one in many])
         self.white: tuple[White, ...] = ()
         self.by_nuisance = np.zeros((0, 0))
-        self._length: list[np.ndarray] = []
-        self._shifts = [self._shift_columns(k) for k in range(len(self.many))]
+        offsets = next((len(one.start_sd) for one in self.many if one.start_sd is not None), 0)
+        self.away = np.zeros((len(self.many), offsets))
+        """Where hypotheses begin that do not say, in sd from the starts, (stretch, offset)."""
+        self._settled = np.zeros((len(self.many), offsets))
+        self._by_settled: list[np.ndarray] = [np.zeros((1, 1)) for _ in self.many]
+        self._shifts = [self.shifts.columns(one, None) for one in self.many]
 
     def values(self, z: np.ndarray) -> np.ndarray:
         """Values (k, n) of the model at nuisances z (k, p + q), effects off."""
@@ -81,10 +77,12 @@ class Arena:
         step."""
         sd = [one.start_sd for one in self.many if one.start_sd is not None]
         assert len(sd) == len(self.many)  # noqa: S101 - whole intervals are never prepared, only pieces
-        seen = self.replayer.around(self.many, self.values(z[None])[0], sd)
-        self._by_offset = [self._responses(one) for one in seen]
-        self._length = [one.length[0] for one in seen]
-        self._shifts = [self._shift_columns(k) for k in range(len(self.many))]
+        each = [np.concatenate([np.zeros((1, len(own))), np.diag(own)]) for own in sd]
+        seen = self.replayer.around(self.many, np.repeat(self.values(z[None]), len(each[0]), axis=0), each)
+        self._by_start = [self._responses(one) for one in seen]
+        self._by_offset = self._by_start
+        self._by_settled = [np.einsum("o,ocf->cf", *both) for both in zip(self._settled, self._by_start, strict=True)]
+        self._shifts = [self.shifts.columns(one, own.length[0]) for one, own in zip(self.many, seen, strict=True)]
         p = len(self.engine)
         by = SECANT * np.array([self.model.numbers[k].sd for k in self.engine])
         low, high = np.maximum(z[:p] - by, self.lower[:p]), np.minimum(z[:p] + by, self.upper[:p])
@@ -94,13 +92,58 @@ class Arena:
         width = (high - low)[:, None, None]
         self._by_engine = [np.nan_to_num((one[p:] - one[:p]) / width, posinf=0.0, neginf=0.0) for one in raw]
         self.whiten(floor_m=floor_m, noise=noise)
+        if DRAWS:
+            self._roughen(z, sd, seen)
+            self.whiten()
 
-    def whiten(self, *, floor_m: float | None = None, noise: float | None = None) -> None:
-        """Covariances anew, with another floor [m] or factor on the noise, at the same derivatives."""
+    def move_starts(self, away: np.ndarray) -> None:
+        """Lets all stretches begin so far (stretch, offset) [sd] away from where they did. What is known of the starts
+        stays what it was. Derivatives are to be taken anew (`prepare`)."""
+        self._settled = self._settled + away
+        self.many = tuple(
+            begun_at(self.replayer.structure, one, by * one.start_sd) if by.any() else one
+            for one, by in zip(self.many, away, strict=True)
+        )
+        self.away = np.zeros_like(away)
+
+    def _roughen(self, z: np.ndarray, sd: Sequence[np.ndarray], seen: Sequence[Seen]) -> None:
+        """Adds to the covariance what straight lines do not tell of starts and nuisances near these."""
+        rng = np.random.default_rng(0)
+        J = self.by_nuisance
+        rows = slice(0, self.white[-1].kinds[0].rows.stop)
+        H = J[rows].T @ J[rows] + self.precision
+        p = len(self.engine)
+        value, vector = np.linalg.eigh(np.linalg.inv(H)[:p, :p])
+        root = vector * np.sqrt(np.maximum(value, 0.0))
+        points = np.repeat(z[None], DRAWS, axis=0)
+        points[:, :p] = np.clip(z[:p] + rng.standard_normal((DRAWS, p)) @ root.T, self.lower[:p], self.upper[:p])
+        by = [rng.standard_normal((DRAWS, len(own))) for own in sd]
+        far = [one * own for one, own in zip(by, sd, strict=True)]
+        there = self.replayer.around(self.many, self.values(points), far)
+        found = []
+        for k, (one, here) in enumerate(zip(there, seen, strict=True)):
+            first = Seen(here.caps[:1], here.length[:1])
+            change = self._clipped(self._residual(k, one, points)) - self._clipped(self._residual(k, first, z[None]))
+            change -= np.einsum("ko,ocf->kcf", by[k], self._by_start[k])
+            change -= np.einsum("kp,pcf->kcf", points[:, :p] - z[:p], self._by_engine[k])
+            found.append(np.clip(change, -LOST_M, LOST_M) / np.sqrt(DRAWS))
+        self._by_offset = [np.concatenate(both) for both in zip(self._by_start, found, strict=True)]
+
+    @staticmethod
+    def _clipped(residual: np.ndarray) -> np.ndarray:
+        return np.clip(np.nan_to_num(residual, nan=LOST_M), -LOST_M, LOST_M)
+
+    def whiten(
+        self, *, floor_m: float | None = None, noise: float | None = None, lasts: float | None = None
+    ) -> None:  # fmt: skip
+        """Covariances anew, with another floor [m], factor on the noise or time that it lasts [s], at the same
+        derivatives."""
         self.floor_m = self.floor_m if floor_m is None else floor_m
         self.noise = self.noise if noise is None else noise
+        self.lasts = self.lasts if lasts is None else lasts
         self.white = whites(
-            self.many, self._by_offset, sensors=len(self.sensors), floor_m=self.floor_m, noise=self.noise
+            self.many, self._by_offset, sensors=len(self.sensors), floor_m=self.floor_m, noise=self.noise,
+            lasts=self.lasts,
         )  # fmt: skip
         own = [np.concatenate([e, s], axis=0) for e, s in zip(self._by_engine, self._shifts, strict=True)]
         self.by_nuisance = whitened(self.white, own).T  # (M, p + q)
@@ -110,10 +153,13 @@ class Arena:
         """Data of every stretch, (stretch,)."""
         return np.array([white.size for white in self.white], dtype=float)
 
-    def residuals(self, values: np.ndarray, z: np.ndarray, only: Sequence[int] | None = None) -> np.ndarray:
+    def residuals(
+        self, values: np.ndarray, z: np.ndarray, only: Sequence[int] | None = None, away: np.ndarray | None = None
+    ) -> np.ndarray:  # fmt: skip
         """Residuals (k, M), simulated minus observed, white under each kind of error, at values (k, n) of the model,
-        with the shifts of z. only: places of the stretches that are simulated, whole intervals; the others' are 0."""
-        raw = self.raw(values, z, only)
+        with the shifts of z. only: places of the stretches that are simulated, whole intervals; the others' are 0.
+        away: as `raw`."""
+        raw = self.raw(values, z, only, away)
         if only is None:
             return whitened(self.white, raw)
         found = np.zeros((len(values), self.by_nuisance.shape[0]))
@@ -122,13 +168,37 @@ class Arena:
                 found[:, kind.rows] = kind.white(one)
         return found
 
-    def raw(self, values: np.ndarray, z: np.ndarray, only: Sequence[int] | None = None) -> list[np.ndarray]:
+    def raw(
+        self, values: np.ndarray, z: np.ndarray, only: Sequence[int] | None = None, away: np.ndarray | None = None
+    ) -> list[np.ndarray]:  # fmt: skip
         """Residuals as they are, of every stretch (k, channel, F) [m]: caps by axis, then sensors; at most LOST_M.
-        only: places of those that are asked for."""
+        only: places of those that are asked for. away (k, stretch, offset): where each hypothesis begins, in sd from
+        the starts; None: `self.away` for all. Residuals are those of what is known of the starts, along straight lines
+        from where they begin."""
         only = range(len(self.many)) if only is None else only
-        seen = self.replayer.seen([self.many[k] for k in only], values)
+        if away is None and self.away.any():
+            away = np.repeat(self.away[None], len(values), axis=0)
+        by = None if away is None else [away[:, k] * self.many[k].start_sd for k in only]
+        seen = self.replayer.seen([self.many[k] for k in only], values, by)
         found = [self._residual(k, one, z) for k, one in zip(only, seen, strict=True)]
-        return [np.clip(np.nan_to_num(one, nan=LOST_M), -LOST_M, LOST_M) for one in found]
+        if away is not None:
+            found = [
+                one - np.einsum("ko,ocf->kcf", away[:, k], self._by_start[k])
+                for k, one in zip(only, found, strict=True)
+            ]
+        return [self._clipped(one) for one in found]
+
+    def likely_starts(self, raw: Sequence[np.ndarray]) -> np.ndarray:
+        """Where stretches most likely begin that leave residuals raw, of every stretch (channel, F): in sd from the
+        starts, (stretch, offset)."""
+        found = np.zeros((len(self.many), len(self._by_start[0])))
+        for k, one in enumerate(raw):
+            own = self.white[k].kinds
+            rooted = [kind.rooted(one[None])[0] for kind in own]
+            squares = [np.sum(kind.off_start(r) ** 2) for kind, r in zip(own, rooted, strict=True)]
+            i = int(np.argmin(np.array(squares) + self.white[k].logdet))
+            found[k] = np.clip(own[i].start(rooted[i])[: found.shape[1]], -MOST_SD, MOST_SD) - self._settled[k]
+        return found
 
     def keys(self, values: np.ndarray, z: np.ndarray, only: Sequence[int] | None = None) -> np.ndarray:
         """Simulated minus observed caps [m] at the ends of whole target intervals, the key frames, (k, interval, cap,
@@ -136,7 +206,7 @@ class Arena:
         whole = self.whole if only is None else [self.whole[k] for k in only]
         seen = self.replayer.seen(whole, values)
         caps = np.stack([s.caps[:, -1] - one.caps[-1] for s, one in zip(seen, whole, strict=True)], axis=1)
-        columns = np.array([self._camera_columns(one.caps[-1]) for one in whole])
+        columns = np.array([camera_columns(one.caps[-1]) for one in whole])
         camera = z[:, len(self.engine) : len(self.engine) + len(CAMERA)]
         return np.asarray(caps + np.einsum("kq,sqci->ksci", camera, columns))
 
@@ -148,6 +218,14 @@ class Arena:
     def log_densities(self, raw: Sequence[np.ndarray]) -> np.ndarray:
         """Of one hypothesis's residuals under the covariance as it is, (stretch,) [nats]."""
         return -density(self.squares(whitened(self.white, raw))[0], self.logdets)
+
+    def by_row(self, chosen: np.ndarray) -> np.ndarray:
+        """What is said of stretches (stretch,), for each of their residuals (M,)."""
+        kinds = range(len(self.white[0].kinds))
+        return np.concatenate(
+            [np.full(white.kinds[c].rows.stop - white.kinds[c].rows.start, one)
+             for c in kinds for white, one in zip(self.white, chosen.tolist(), strict=True)]
+        )  # fmt: skip
 
     def squares(self, residual: np.ndarray) -> np.ndarray:
         """Sums of squares (k, stretch, kind) of white residuals (k, M)."""
@@ -167,7 +245,7 @@ class Arena:
                 parts.append(np.where(np.isfinite(one.length)[None], gap, 0.0).transpose(0, 2, 1))
         found = np.concatenate(parts, axis=1)
         shift = z[:, len(self.engine) :]
-        return found + np.einsum("kq,qcf->kcf", shift, self._shifts[k])
+        return found + np.einsum("kq,qcf->kcf", shift, self._shifts[k]) - self._by_settled[k]
 
     def _responses(self, seen: Seen) -> np.ndarray:
         """What moving a start by one sd changes in all channels, (offset, channel, F), from what was seen without and
@@ -176,24 +254,3 @@ class Arena:
         both = np.concatenate([caps, seen.length], axis=-1).transpose(0, 2, 1)
         by = both[1:] - both[:1]
         return np.clip(np.nan_to_num(by, nan=LOST_M), -LOST_M, LOST_M)
-
-    def _shift_columns(self, k: int) -> np.ndarray:
-        """What camera and sensors add per unit, (q, channel, F). A reading that is late shows a length that was, as
-        fast as the simulated one changes."""
-        one = self.many[k]
-        F, caps = len(one.t), one.caps.shape[1]
-        found = np.zeros((len(self.names) - len(self.engine), 3 * caps + len(self.sensors), F))
-        found[: len(CAMERA), : 3 * caps] = self._camera_columns(one.caps).reshape(len(CAMERA), F, -1).transpose(0, 2, 1)
-        for s in range(len(self.sensors)):
-            found[len(CAMERA) + s, 3 * caps + s] = 1.0
-        found[self.shared - len(self.engine) + self.runs.index(one.run), 2 : 3 * caps : 3] = 1.0
-        if self.sensors and self._length and F > 1:
-            found[self.shared - len(self.engine) - 1, 3 * caps :] = -np.gradient(self._length[k], one.t, axis=0).T
-        return found
-
-    @staticmethod
-    def _camera_columns(caps: np.ndarray) -> np.ndarray:
-        """What height and tilts of CAMERA add to caps (..., cap, 3), per unit, (3, ..., cap, 3)."""
-        found = np.zeros((len(CAMERA), *caps.shape))
-        found[0, ..., 2], found[1, ..., 2], found[2, ..., 2] = 1.0, caps[..., 1], -caps[..., 0]
-        return found

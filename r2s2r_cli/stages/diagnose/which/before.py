@@ -13,10 +13,14 @@ from functools import cached_property
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
-from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis, unlikely
+from r2s2r_cli.stages.diagnose.which.fit import Fits, unlikely
+from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
 from r2s2r_cli.stages.diagnose.which.rough import DRAWS, around, root_of
 from r2s2r_cli.stages.diagnose.which.score import ENOUGH, Score, groups_of, scores
+
+FOLLOWED = 1
+"""Steps in which the nuisances follow an effect."""
 
 
 @dataclass(frozen=True)
@@ -52,33 +56,34 @@ def before(healthy: Healthy, fits: Sequence[Fit]) -> np.ndarray:
     weights = solver.likely(base) ** 2
     root = root_of(solver.normal(base)[0])
     nominal = replace(base, hypothesis=Hypothesis(), x=np.zeros(0))
-    own = _costs(solver, [nominal], base, base.z[None], root)[0][0]
-    z0 = np.repeat(base.z[None], len(fits), axis=0)
-    there, residuals = _costs(solver, fits, base, z0, root)
-    z1 = np.array([
-        _followed(solver, base, fit, residual, weights) for fit, residual in zip(fits, residuals, strict=True)
-    ])  # fmt: skip
-    after, _ = _costs(solver, fits, base, z1, root)
-    return np.maximum(_gain(arena, own, base.z, z0, there), _gain(arena, own, base.z, z1, after))
+    own = _costs(solver, [nominal], base, root)[0]
+    now = solver.begun([(fit.hypothesis, base.z, fit.x) for fit in fits])
+    solver.settle(now)
+    gain = _gain(arena, own, base.z, now, _costs(solver, now, base, root))
+    for _ in range(FOLLOWED):
+        z = [_followed(solver, base, fit, weights) for fit in now]
+        points = [(fit.hypothesis, own, fit.x) for fit, own in zip(now, z, strict=True)]
+        now = solver.begun(points, [fit.away for fit in now])
+        solver.settle(now)
+        gain = np.maximum(gain, _gain(arena, own, base.z, now, _costs(solver, now, base, root)))
+    return gain
 
 
-def _costs(
-    solver: Fits, fits: Sequence[Fit], base: Fit, z: np.ndarray, root: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Minus log densities of the pieces (fit, piece) with the nuisances about z (fit, p + q), and mean residuals
-    (fit, M)."""
+def _costs(solver: Fits, fits: Sequence[Fit], base: Fit, root: np.ndarray) -> np.ndarray:
+    """Minus log densities of the pieces (fit, piece) with the nuisances about those of each fit."""
     arena = solver.arena
-    points = np.array([around(one, root, arena.lower, arena.upper) for one in z])
-    flat = points.reshape(-1, z.shape[1])
+    points = np.array([around(fit.z, root, arena.lower, arena.upper) for fit in fits])
+    flat = points.reshape(-1, points.shape[-1])
     values = np.concatenate([
         solver.values(fit.hypothesis, own, np.repeat(fit.x[None], DRAWS, axis=0))
         for fit, own in zip(fits, points, strict=True)
     ])  # fmt: skip
-    found = arena.residuals(values, flat).reshape(len(fits), DRAWS, -1)
+    away = np.repeat(np.array([fit.away for fit in fits]), DRAWS, axis=0)
+    found = arena.residuals(values, flat, away=away).reshape(len(fits), DRAWS, -1)
     for fit, residual, own in zip(fits, found, points, strict=True):
         residual -= (own - own[0]) @ _derivatives(solver, base, fit).T
     costs = minus_log(arena.squares(found.reshape(len(flat), -1)), arena.logdets, arena.sizes)
-    return np.asarray(costs.reshape(len(fits), DRAWS, -1).mean(axis=1)), found.mean(axis=1)
+    return np.asarray(costs.reshape(len(fits), DRAWS, -1).mean(axis=1))
 
 
 def _derivatives(solver: Fits, base: Fit, fit: Fit) -> np.ndarray:
@@ -88,15 +93,16 @@ def _derivatives(solver: Fits, base: Fit, fit: Fit) -> np.ndarray:
     return J
 
 
-def _followed(solver: Fits, base: Fit, fit: Fit, residual: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def _followed(solver: Fits, base: Fit, fit: Fit, weights: np.ndarray) -> np.ndarray:
     """Nuisances of the healthy runs after one Gauss-Newton step with the effect there."""
     arena = solver.arena
     J = _derivatives(solver, base, fit)
     normal = (J * weights[:, None]).T @ J + arena.precision
-    pull = J.T @ (weights * residual) + arena.precision @ (base.z - arena.mean)
-    return np.clip(base.z - np.linalg.solve(normal, pull), arena.lower, arena.upper)
+    pull = J.T @ (weights * fit.residual) + arena.precision @ (fit.z - arena.mean)
+    return np.clip(fit.z - np.linalg.solve(normal, pull), arena.lower, arena.upper)
 
 
-def _gain(arena: Arena, own: np.ndarray, z_own: np.ndarray, z: np.ndarray, costs: np.ndarray) -> np.ndarray:
+def _gain(arena: Arena, own: np.ndarray, z_own: np.ndarray, fits: Sequence[Fit], costs: np.ndarray) -> np.ndarray:
     by_piece = np.clip(own[None] - costs, -ENOUGH, ENOUGH).sum(axis=1)
+    z = np.array([fit.z for fit in fits])
     return np.asarray(by_piece + unlikely(arena, z_own[None]) - unlikely(arena, z))

@@ -67,10 +67,12 @@ def placed(structure: Structure, theta: Parameters, start: Tensor, up: float) ->
         return found
 
 
-def carried(structure: Structure, one: Stretch, start: Tensor, before: Tensor) -> Tensor:
+def carried(
+    structure: Structure, one: Stretch, start: Tensor, before: Tensor, let_out: Tensor | float = 0.0
+) -> Tensor:  # fmt: skip
     """Starts (k, NS) with what no cap shows from the states (k, NS) before: rest lengths of cables that hang, by
     each hypothesis's own account, winding rates, the memory of effects. What left the finite numbers hands nothing
-    on."""
+    on. let_out: what the starts have more of winched cables [m], (k, actuated)."""
     import torch
 
     from r2s2r_cli.engine.flat import state_slots
@@ -82,7 +84,7 @@ def carried(structure: Structure, one: Stretch, start: Tensor, before: Tensor) -
     found = torch.where(own, before, start)
     if one.taut is not None:
         rest = slice(slots["rest"].start, slots["rest"].start + slots["rest"].size)
-        taut = torch.as_tensor(one.taut).expand(len(before), -1)
+        taut = torch.as_tensor(one.taut).expand(len(before), -1) + let_out
         found[:, rest] = torch.where(before[:, rest] > taut + one.margin, before[:, rest], taut)
     return torch.where(before.isfinite().all(dim=1, keepdim=True), found, start)
 

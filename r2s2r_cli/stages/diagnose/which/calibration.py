@@ -20,8 +20,8 @@ FILE = "calibration.json"
 class Calibration:
     """What turns evidence into probabilities.
 
-    temperature [nats]: of the softmax over names. linear: nats of gain that a nat of a linear gain is worth; parity:
-    the same of the parity stage, which needs no simulator and errs far less. none, equivalent [nats]: what `none`
+    temperature [nats]: of the softmax over names. parity: nats of gain that a nat of the parity stage is worth, which
+    needs no simulator and errs far less. none, equivalent [nats]: what `none`
     gains, and more where the equivalence test finds no gap; gap: what it loses for every nat that the refit model costs
     more than in healthy runs. unknown_share, left: what `unknown` has of what a wider floor gains and of every nat that
     the best effect leaves; unknown [nats]: what that must exceed. bias [nats]: of a name, what its gains are short of.
@@ -32,7 +32,6 @@ class Calibration:
     """
 
     temperature: float = 25.0
-    linear: float = 1.0
     parity: float = 15.0
     none: float = 20.0
     equivalent: float = 6.0
@@ -50,7 +49,7 @@ class Calibration:
     sets: int = 0
 
     def score(
-        self, name: str, gain: float, *, linear: float = 0.0, parity: float = 0.0, equivalent: bool = False,
+        self, name: str, gain: float, *, parity: float = 0.0, equivalent: bool = False,
         beyond: float = 0.0,
     ) -> float:  # fmt: skip
         """What a name is worth without its bias [nats]. gain: held out; of `none` what chance reaches, of `unknown`
@@ -60,7 +59,7 @@ class Calibration:
             return gain + self.none + (self.equivalent if equivalent else 0.0) - self.gap * max(beyond, 0.0)
         if name == UNKNOWN:
             return self.unknown_share * gain + self.left * max(beyond, 0.0) - self.unknown
-        return gain + self.linear * linear + self.parity * parity
+        return gain + self.parity * parity
 
     def absolute(self) -> Calibration:
         """For a diagnosis without healthy runs."""

@@ -7,83 +7,23 @@ many effects have no derivative where they are off. Both follow the fit by Broyd
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
-from r2s2r_cli.stages.diagnose.which.candidates import Candidate
+from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log, weight
+from r2s2r_cli.stages.diagnose.which.white import whitened
 
 ITERATIONS = 6
 LENGTHS = (1.0, 0.3)
 """Shares of a step that are tried together."""
 SECANT = 0.25
 """Of a number's scale: length of a secant."""
-DAMPING = 1e-3
-"""To begin with, over the diagonal of the scaled normal matrix."""
 LEAST_GAIN = 0.3
 """[nats] A fit that gains less in a step has ended."""
 PRIOR_SCALES = 2.0
 """Prior sd of an effect's number, in its scale."""
-MOVED = 0.02
-"""Of the scale: an effect that ends nearer to where it started has not moved."""
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """What a fit is of. parts: no effect (the refit nominal model), one, or two."""
-
-    parts: tuple[Candidate, ...] = ()
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Ids of the effects."""
-        return tuple(part.effect for part in self.parts)
-
-    @property
-    def label(self) -> str:
-        """`cap_friction, cap 3`, or `none`."""
-        return " + ".join(part.label for part in self.parts) or "none"
-
-    def stack(self, name: str) -> np.ndarray:
-        """A field of all parts, one after the other."""
-        return np.concatenate([getattr(part, name) for part in self.parts]) if self.parts else np.zeros(0)
-
-    @property
-    def spread(self) -> list[tuple[int, ...]]:
-        """Of each of its numbers the places among those of the model."""
-        return [places for part in self.parts for places in part.spread]
-
-
-@dataclass
-class Fit:
-    """A hypothesis on its way. z (p + q,): nuisances; x (k,): the effect's numbers. residual (M,): white; jacobian
-    (M, p + q + k). cost: robust, with priors. start (k,): where it began. on_bound: numbers that ended on a bound."""
-
-    hypothesis: Hypothesis
-    z: np.ndarray
-    x: np.ndarray
-    residual: np.ndarray
-    jacobian: np.ndarray
-    cost: float
-    start: np.ndarray
-    damping: float = DAMPING
-    ended: bool = False
-
-    @property
-    def moved(self) -> bool:
-        """Whether the effect's numbers left their start; a fit that never did says nothing of the size."""
-        scale = self.hypothesis.stack("scale")
-        return bool(np.any(np.abs(self.x - self.start) > MOVED * scale)) if len(self.x) else True
-
-    @property
-    def on_bound(self) -> tuple[str, ...]:
-        """Names of the effect's numbers that ended on a bound."""
-        names = [name for part in self.hypothesis.parts for name in part.names]
-        low, high = self.hypothesis.stack("lower"), self.hypothesis.stack("upper")
-        at = np.isclose(self.x, low, rtol=0, atol=1e-9) | np.isclose(self.x, high, rtol=0, atol=1e-9)
-        return tuple(name for name, bound in zip(names, at, strict=True) if bound)
 
 
 class Fits:
@@ -108,13 +48,24 @@ class Fits:
             found[:, list(places)] = x[:, k : k + 1]
         return found
 
-    def begin(self, hypothesis: Hypothesis, z: np.ndarray, x: np.ndarray, residual: np.ndarray) -> Fit:
-        """A fit at a point of which the residual (M,) is known; derivatives by the effect are those towards off."""
-        k = len(x)
-        jacobian = np.concatenate([self.arena.by_nuisance, np.zeros((len(residual), k))], axis=1)
+    def begin(
+        self, hypothesis: Hypothesis, z: np.ndarray, x: np.ndarray, raw: Sequence[np.ndarray], away: np.ndarray
+    ) -> Fit:  # fmt: skip
+        """A fit at a point of which the residuals as they are, (channel, F) of every stretch, are known; derivatives by
+        the effect are those towards off."""
+        residual = whitened(self.arena.white, [one[None] for one in raw])[0]
+        jacobian = np.concatenate([self.arena.by_nuisance, np.zeros((len(residual), len(x)))], axis=1)
         jacobian[:, self.overruled(hypothesis)] = 0.0
         cost = float(self.cost(hypothesis, z[None], x[None], residual[None])[0])
-        return Fit(hypothesis, z.copy(), x.copy(), residual, jacobian, cost, x.copy())
+        return Fit(hypothesis, z.copy(), x.copy(), residual, jacobian, cost, x.copy(), away.copy(), list(raw))
+
+    def begun(
+        self, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]], away: Sequence[np.ndarray] | None = None
+    ) -> list[Fit]:  # fmt: skip
+        """Fits at points (hypothesis, z, x), whose stretches begin `away` (`Fit.away`), as the arena says if None."""
+        own = [self.arena.away] * len(points) if away is None else list(away)
+        raw = self._raw(points, own)
+        return [self.begin(h, z, x, [one[i] for one in raw], own[i]) for i, (h, z, x) in enumerate(points)]
 
     def overruled(self, hypothesis: Hypothesis) -> list[int]:
         """Places in z of nuisances that are the hypothesis's own numbers: it sets them, whatever z says."""
@@ -135,12 +86,33 @@ class Fits:
             for fit, step in zip(going, steps, strict=True):
                 for length in LENGTHS:
                     points.append(self._moved(fit, length * step))
-            residuals = self._evaluate([(fit.hypothesis, *point) for fit, point in _spread(going, points)])
+            raw = self._raw(
+                [(fit.hypothesis, *point) for fit, point in _spread(going, points)],
+                [fit.away for fit in going for _ in LENGTHS],
+            )
             for i, fit in enumerate(going):
                 rows = slice(i * len(LENGTHS), (i + 1) * len(LENGTHS))
-                self._take(fit, points[rows], residuals[rows])
+                self._take(fit, points[rows], [one[rows] for one in raw])
+            self.settle(going)
             if told is not None:
                 told(iteration + 1, iterations)
+
+    def settle(self, fits: Sequence[Fit]) -> None:
+        """Lets the stretches of all fits begin where they most likely did, those that are better for it."""
+        wanted = [self.arena.likely_starts(fit.raw) for fit in fits]
+        raw = self._raw([(fit.hypothesis, fit.z, fit.x) for fit in fits], wanted)
+        white = whitened(self.arena.white, raw)
+        own = np.array([fit.residual for fit in fits])
+        costs = [minus_log(self.arena.squares(one), self.arena.logdets, self.arena.sizes) for one in (own, white)]
+        better = costs[1] < costs[0]
+        for i, fit in enumerate(fits):
+            rows = self.arena.by_row(better[i])
+            fit.residual = np.where(rows, white[i], fit.residual)
+            fit.away = np.where(better[i][:, None], wanted[i], fit.away)
+            fit.raw = [new[i] if yes else old for new, old, yes in zip(raw, fit.raw, better[i], strict=True)]
+            gain = float(np.sum((costs[0] - costs[1])[i][better[i]]))
+            fit.cost -= gain
+            fit.ended = fit.ended and gain < LEAST_GAIN
 
     def _step(self, fit: Fit) -> np.ndarray:
         """The damped step (p + q + k,)."""
@@ -194,12 +166,17 @@ class Fits:
         x = np.clip(fit.x + step[p:], fit.hypothesis.stack("lower"), fit.hypothesis.stack("upper"))
         return z, x
 
-    def _evaluate(self, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]]) -> np.ndarray:
+    def _raw(
+        self, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]], away: Sequence[np.ndarray]
+    ) -> list[np.ndarray]:  # fmt: skip
         values = np.concatenate([self.values(h, z[None], x[None]) for h, z, x in points])
-        return self.arena.residuals(values, np.array([z for _, z, _ in points]))
+        return self.arena.raw(values, np.array([z for _, z, _ in points]), away=np.array(away))
 
-    def _take(self, fit: Fit, points: Sequence[tuple[np.ndarray, np.ndarray]], residuals: np.ndarray) -> None:
+    def _take(
+        self, fit: Fit, points: Sequence[tuple[np.ndarray, np.ndarray]], raw: Sequence[np.ndarray]
+    ) -> None:  # fmt: skip
         """Go to the best point, if it is better, and mend the derivatives by what was seen."""
+        residuals = whitened(self.arena.white, raw)
         z, x = np.array([point[0] for point in points]), np.array([point[1] for point in points])
         costs = self.cost(fit.hypothesis, z, x, residuals)
         best = int(np.argmin(costs))
@@ -215,6 +192,7 @@ class Fits:
             missing = residuals[best] - fit.residual - fit.jacobian @ by
             fit.jacobian = fit.jacobian + np.outer(missing, unit / scale / (unit @ unit))
         fit.z, fit.x, fit.residual, fit.cost = z[best], x[best], residuals[best], float(costs[best])
+        fit.raw = [one[best] for one in raw]
         fit.damping = max(1e-6, fit.damping / 3.0 if best == 0 else fit.damping * 3.0)
         fit.ended = gain < LEAST_GAIN
 
@@ -232,7 +210,8 @@ class Fits:
                 where.append((fit, i, by[i]))
         if not points:
             return
-        for (fit, i, by), residual in zip(where, self._evaluate(points), strict=True):
+        residuals = whitened(self.arena.white, self._raw(points, [fit.away for fit, _, _ in where]))
+        for (fit, i, by), residual in zip(where, residuals, strict=True):
             column = (residual - fit.residual) / by
             fit.jacobian[:, len(fit.z) + i] = np.where(np.isfinite(column), column, 0.0)
 

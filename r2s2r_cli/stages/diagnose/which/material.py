@@ -9,7 +9,7 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
-from r2s2r_cli.stages.diagnose.which.fit import Fit
+from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.left import Left
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap
 from r2s2r_cli.stages.diagnose.which.score import Score
@@ -37,8 +37,6 @@ class Material:
     """What of the gain of each fit was there before (`before.chronic`) [nats]."""
     asked: tuple[str, ...] | None = None
     """Ids of the effects that may be named; None: all."""
-    linear: Mapping[str, Mapping[int | None, float]] = field(default_factory=dict)
-    """Held-out gains of the linearised problem (`linear_gains`), by effect and element [nats]."""
     parity: Mapping[str, Mapping[int | None, float]] = field(default_factory=dict)
     """What the parity stage says for effects, by element (`Parity.nats`) [nats]."""
 
@@ -51,8 +49,3 @@ class Material:
         """The same of an effect at an element; of one without number the most of any."""
         own = self.parity.get(effect, {})
         return max([own.get(None, 0.0), *((own.get(index, 0.0),) if index is not None else own.values())])
-
-    def foretold(self, i: int) -> float:
-        """The linear gain of the fit i [nats]."""
-        one = self.fits[i].hypothesis.parts[0]
-        return self.linear.get(one.effect, {}).get(one.number, 0.0)

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Run
-from r2s2r_cli.stages.diagnose.starts import loose, smoothed_at
+from r2s2r_cli.stages.diagnose.starts import known_at, loose
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch, stretch_of
+from r2s2r_cli.stages.diagnose.which.white import OFFSET_SHARE
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.offsets import StartSpread
 from r2s2r_cli.stages.identify.windows import Window
@@ -32,7 +33,7 @@ LEAST_FRAMES = 3
 ROLL_RAD, ROLL_RATE = 0.08, 0.1
 """Of a rod about its own axis, which no cap shows."""
 LEAST_SPEED_SD = 5e-3
-"""[m/s] The smoother takes motion for smoother than a fall is."""
+"""[m/s] The filter takes motion for smoother than a fall is."""
 LEAST_REST_M = 1e-3
 
 
@@ -109,16 +110,19 @@ def _piece(cut: _Cut, state: State, taut: np.ndarray | None, replayer: Replayer)
     )  # fmt: skip
     made = stretch_of(cut.run, cut.interval, own, 0)
     return replace(
-        made, piece=cut.piece, taut=taut, margin=loose(caps, cut.first), start_sd=_start_sd(caps, cut.first, replayer)
-    )
+        made, piece=cut.piece, taut=taut, margin=loose(cut.run, cut.first),
+        start_sd=_start_sd(cut.run, cut.first, replayer),
+    )  # fmt: skip
 
 
-def _start_sd(run: RunData, frame: int, replayer: Replayer) -> np.ndarray:
-    """Sd of the start state, as the smoother knows the caps."""
+def _start_sd(run: Run, frame: int, replayer: Replayer) -> np.ndarray:
+    """Sd of the start state, as the caps are known by then."""
     rods = replayer.structure.n_rods
-    position = float(np.sqrt(np.mean(run.sd_p[frame] ** 2)))
-    speed = float(np.hypot(np.sqrt(np.mean(run.sd_v[frame] ** 2)), LEAST_SPEED_SD))
-    ends = run.p_WE[frame].reshape(rods, 2, 3)
+    known = run.known
+    offset = OFFSET_SHARE * np.sqrt(np.mean(run.caps.noise**2))
+    position = float(np.hypot(np.sqrt(np.mean(known.sd_p[frame] ** 2)), offset))
+    speed = float(np.hypot(np.sqrt(np.mean(known.sd_v[frame] ** 2)), LEAST_SPEED_SD))
+    ends = known.p_WE[frame].reshape(rods, 2, 3)
     length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1).mean())
     spread = StartSpread(
         position=position / np.sqrt(2.0), tilt=np.sqrt(2.0) * position / length, roll=ROLL_RAD,
@@ -131,14 +135,14 @@ def _start_sd(run: RunData, frame: int, replayer: Replayer) -> np.ndarray:
 def _begun(
     cuts: Sequence[_Cut], after: State, replayer: Replayer, values: np.ndarray
 ) -> tuple[list[State], np.ndarray]:
-    """Starts of the next pieces: smoothed poses, what they do not show from the pieces before (a batch of states); and
+    """Starts of the next pieces: known poses, what they do not show from the pieces before (a batch of states); and
     the rest lengths of winched cables that are just taut there [m], (piece, actuated)."""
     import torch
 
     from r2s2r_cli.engine.reading import read
 
     theta = replayer.mapping.theta(torch.as_tensor(values, dtype=torch.float64))
-    state = smoothed_at([(cut.run.caps, int(cut.frames[-1])) for cut in cuts], after, replayer, values)
+    state = known_at([(cut.run, int(cut.frames[-1])) for cut in cuts], after, replayer, values)
     with torch.no_grad():
         reading, winched = read(replayer.structure, theta, state), list(replayer.structure.actuated)
         just = state.rest + (reading.length - reading.rest)[:, winched]  # effects may add to what the winches give

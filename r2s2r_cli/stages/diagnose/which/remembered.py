@@ -38,13 +38,15 @@ class Remembered(Replayer):
         super().__init__(model, **how)
         self._checkpoint = checkpoint
 
-    def seen(self, many: Sequence[Stretch], values: np.ndarray) -> list[Seen]:
+    def seen(
+        self, many: Sequence[Stretch], values: np.ndarray, by: Sequence[np.ndarray] | None = None
+    ) -> list[Seen]:  # fmt: skip
         """As `Replayer`."""
-        return self._views("seen", many, [values], lambda: Replayer.seen(self, many, values))
+        return self._views("seen", many, [values, *(by or ())], lambda: Replayer.seen(self, many, values, by))
 
-    def around(self, many: Sequence[Stretch], values: np.ndarray, sd: Sequence[np.ndarray]) -> list[Seen]:
+    def around(self, many: Sequence[Stretch], values: np.ndarray, by: Sequence[np.ndarray]) -> list[Seen]:
         """As `Replayer`."""
-        return self._views("around", many, [values, *sd], lambda: Replayer.around(self, many, values, sd))
+        return self._views("around", many, [values, *by], lambda: Replayer.around(self, many, values, by))
 
     def finals(self, many: Sequence[Stretch], values: np.ndarray) -> State:
         """As `Replayer`."""

@@ -17,6 +17,7 @@ from r2s2r_cli.stages.identify.commands import CommandLog
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.offsets import displaced
 from r2s2r_cli.stages.identify.predict import Predictor, alike
+from r2s2r_cli.stages.identify.windows import Window
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -27,6 +28,8 @@ EVERY = 10
 """Engine steps between stored states."""
 MOST = 256
 """Simulations in one batch."""
+FEW = 4
+"""Hypotheses whose stretches are all simulated in one batch."""
 
 
 class Replayer(Predictor):
@@ -37,17 +40,22 @@ class Replayer(Predictor):
         self.model = model
         self._logs: dict[int, tuple[RunData, CommandLog]] = {}
 
-    def seen(self, many: Sequence[Stretch], values: np.ndarray) -> list[Seen]:
+    def seen(
+        self, many: Sequence[Stretch], values: np.ndarray, by: Sequence[np.ndarray] | None = None
+    ) -> list[Seen]:  # fmt: skip
         """Of every stretch at values (k, n). A piece that comes after another one of `many` goes on with what that left
-        of slack cables and the memory of effects, each hypothesis with its own."""
+        of slack cables and the memory of effects, each hypothesis with its own. by: of every stretch what each
+        hypothesis begins away from its start, (k, offset) (`offsets.displaced`)."""
         parts: dict[int, Seen] = {}
         after: dict[tuple[str, int, int], Tensor] = {}
         for depth in sorted({one.piece for one in many}):
             rows = [k for k, one in enumerate(many) if one.piece == depth]
-            for group in alike([many[k].window for k in rows]):
+            for group in _groups([many[k].window for k in rows], len(values)):
                 own = [rows[i] for i in group]
                 begin = [after.get((many[k].run, many[k].interval, depth - 1)) for k in own]
-                found = self._chunked([many[k] for k in own], values, begin)
+                found = self._chunked(
+                    [many[k] for k in own], values, begin, by=None if by is None else [by[k] for k in own]
+                )
                 for k, (one, last) in zip(own, found, strict=True):
                     parts[k] = one
                     after[many[k].run, many[k].interval, depth] = last
@@ -63,32 +71,19 @@ class Replayer(Predictor):
                 found[k] = last
         return unpack_state(self.structure, _cat([found[k] for k in range(len(many))]))
 
-    def around(self, many: Sequence[Stretch], values: np.ndarray, sd: Sequence[np.ndarray]) -> list[Seen]:
-        """Of every stretch, at values (n,), from its own start and with each offset of the start (`offsets.displaced`)
-        moved by its sd (offset,): (1 + offset, ...). Finite steps, because where caps slip and stick a derivative at a
-        point may be a thousand times what a millimetre does."""
-        import torch
-
-        from r2s2r_cli.engine.flat import pack_state
-
+    def around(self, many: Sequence[Stretch], values: np.ndarray, by: Sequence[np.ndarray]) -> list[Seen]:
+        """As `seen`, but every stretch stands alone, with nothing handed on to it. Finite steps, because where caps
+        slip and stick a derivative at a point may be a thousand times what a millimetre does."""
         parts: dict[int, Seen] = {}
-        for group in alike([one.window for one in many]):
-            own = [many[k] for k in group]
-            starts = [
-                displaced(
-                    self.structure, pack_state(self.structure, many[k].window.state).expand(1 + len(sd[k]), -1),
-                    torch.nn.functional.pad(torch.diag(torch.as_tensor(sd[k])), (0, 0, 1, 0)),
-                )
-                for k in group
-            ]  # fmt: skip
-            alone = np.repeat(values[None], len(starts[0]), axis=0)
-            for k, (one, _) in zip(group, self._chunked(own, alone, starts=starts), strict=True):
+        for group in _groups([one.window for one in many], len(values)):
+            found = self._chunked([many[k] for k in group], values, by=[by[k] for k in group])
+            for k, (one, _) in zip(group, found, strict=True):
                 parts[k] = one
         return [parts[k] for k in range(len(many))]
 
     def _chunked(
         self, many: Sequence[Stretch], values: np.ndarray, begin: Sequence[Tensor | None] = (), *,
-        starts: Sequence[Tensor] = (),
+        by: Sequence[np.ndarray] | None = None,
     ) -> list[tuple[Seen, Tensor]]:  # fmt: skip
         """`_batch`, at most MOST simulations at a time."""
         together = max(1, MOST // len(many))
@@ -98,7 +93,7 @@ class Replayer(Predictor):
             chunks.append(
                 self._batch(
                     many, values[rows], [None if one is None else one[rows] for one in begin],
-                    starts=[one[rows] for one in starts],
+                    by=None if by is None else [one[rows] for one in by],
                 )
             )  # fmt: skip
         return [
@@ -113,11 +108,11 @@ class Replayer(Predictor):
 
     def _batch(
         self, many: Sequence[Stretch], values: np.ndarray, begin: Sequence[Tensor | None] = (), *,
-        starts: Sequence[Tensor] = (),
+        by: Sequence[np.ndarray] | None = None,
     ) -> list[tuple[Seen, Tensor]]:  # fmt: skip
         """K hypotheses of some stretches of about the same length: what is seen, and states (k, NS) at the last frame.
-        begin: states (k, NS) that the piece before each ended in, None: its own start is all there is. starts: those of
-        each hypothesis (k, NS), by stretch, instead."""
+        begin: states (k, NS) that the piece before each ended in, None: its own start is all there is. by: as
+        `seen`."""
         import torch
 
         from r2s2r_cli.engine import delay_of
@@ -126,10 +121,13 @@ class Replayer(Predictor):
         structure, step, k = self.structure, self.step, len(values)
         own, behind = self._undelayed(self.model.theta(values), k)
         theta = own.map(lambda x: x.expand(k, *x.shape[1:]).repeat_interleave(len(many), dim=0))
-        starts = list(starts) or [pack_state(structure, one.window.state).expand(k, -1) for one in many]
+        starts = [pack_state(structure, one.window.state).expand(k, -1) for one in many]
+        if by is not None:
+            starts = [displaced(structure, start, torch.as_tensor(one)) for start, one in zip(starts, by, strict=True)]
         for i, before in enumerate(begin):
             if before is not None:
-                starts[i] = carried(structure, many[i], starts[i], before)
+                let_out = 0.0 if by is None else torch.as_tensor(by[i][:, -structure.n_actuated :])
+                starts[i] = carried(structure, many[i], starts[i], before, let_out)
         late = self.model.observation()
         s0 = placed(structure, theta, torch.stack(starts, dim=1).flatten(0, 1), late.ground_height)
         lasting = max(one.window.duration for one in many) + max(0.0, float(behind.max()))
@@ -178,6 +176,12 @@ class Replayer(Predictor):
         if id(run) not in self._logs:
             self._logs[id(run)] = (run, CommandLog(run))  # the run is kept: no other one gets its id
         return self._logs[id(run)][1]
+
+
+def _groups(windows: Sequence[Window], count: int) -> list[list[int]]:
+    """Numbers of the windows in groups that are simulated together: of about the same length, but for so few
+    hypotheses that a batch costs more than what it simulates beyond the end of some."""
+    return [list(range(len(windows)))] if count <= FEW else alike(windows)
 
 
 def _rows(hypotheses: np.ndarray, stretches: int) -> Tensor:

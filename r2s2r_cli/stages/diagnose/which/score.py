@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import LOST_M, Arena
-from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
+from r2s2r_cli.stages.diagnose.which.fit import Fits
+from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
 from r2s2r_cli.stages.diagnose.which.rough import DRAWS, around, root_of
 from r2s2r_cli.stages.diagnose.which.white import White
@@ -98,6 +99,7 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: b
     elpd, misfit = np.full((n, len(groups)), -np.inf), np.full((n, len(groups)), np.inf)
     key = np.full((n, len(of_whole), caps, 3), np.nan)
     without: list[list[np.ndarray]] = [[] for _ in fits]
+    away = np.repeat(np.array([fit.away for fit in fits]), DRAWS, axis=0)
     for name in names:
         own, ends = np.flatnonzero(groups == name), np.flatnonzero(of_whole == name)
         out = own if held_out else own[:0]
@@ -106,7 +108,7 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: b
             for fit, (by, pull, H, gradient) in zip(fits, normals, strict=True)
         ]
         values, z = _at(solver, fits, [one.points for one in left])
-        white = arena.residuals(values, z, own.tolist()).reshape(n, DRAWS, -1)
+        white = arena.residuals(values, z, own.tolist(), away).reshape(n, DRAWS, -1)
         first = slice(None, None, DRAWS)
         key[:, ends] = arena.keys(values[first], z[first], ends.tolist())
         for i, (fit, one) in enumerate(zip(fits, left, strict=True)):

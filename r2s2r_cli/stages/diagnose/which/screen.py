@@ -9,7 +9,8 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.candidates import Candidate
-from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits, Hypothesis, unlikely
+from r2s2r_cli.stages.diagnose.which.fit import Fits, unlikely
+from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
 
 LEAST_RESPONSE = 1.0
@@ -25,7 +26,8 @@ class Response:
     """One candidate in the screening.
 
     gain: robust log likelihood over the refit nominal model at its best try or a share of it, nuisances fitted
-    linearly [nats]; size (k,): there; start_z (p + q,): nuisances there. seen: whitened length of its largest response;
+    linearly [nats]; size (k,): there, tried (k,): the whole
+    try; start_z (p + q,): nuisances there. seen: whitened length of its largest response;
     absorbed: share of its square that the nuisances explain; direction (M,): that response per unit length, nuisances
     taken off.
     """
@@ -33,6 +35,7 @@ class Response:
     candidate: Candidate
     gain: float
     size: np.ndarray
+    tried: np.ndarray
     start_z: np.ndarray
     seen: float
     absorbed: float
@@ -64,7 +67,7 @@ def screen(arena: Arena, base: Fit, candidates: Sequence[Candidate]) -> tuple[Re
     Jn = base.jacobian[:, : len(base.z)]
     plain = _Projection(Jn, by_row, arena.precision)
     pull = arena.precision @ (base.z - arena.mean)
-    best: dict[int, tuple[float, np.ndarray, np.ndarray]] = {}
+    best: dict[int, tuple[float, np.ndarray, np.ndarray, np.ndarray]] = {}
     shown: dict[int, tuple[float, float, np.ndarray]] = {}
     for first in range(0, len(rows), CHUNK):
         some = rows[first : first + CHUNK]
@@ -90,10 +93,10 @@ def screen(arena: Arena, base: Fit, candidates: Sequence[Candidate]) -> tuple[Re
             gains = base.cost - data - unlikely(arena, z)
             k = int(np.argmax(gains))
             if i not in best or gains[k] > best[i][0]:
-                best[i] = (float(gains[k]), candidates[i].share(size, float(SHARES[k])), z[k])
+                best[i] = (float(gains[k]), candidates[i].share(size, float(SHARES[k])), size, z[k])
     found = []
     for i, one in enumerate(candidates):
         length, share, direction = shown.get(i, (0.0, 0.0, np.zeros(len(base.residual))))
-        gain, size, z = best.get(i, (-np.inf, one.off, base.z))
-        found.append(Response(one, gain, size, z, length, share, direction.astype(np.float32)))
+        gain, size, tried, z = best.get(i, (-np.inf, one.off, one.off, base.z))
+        found.append(Response(one, gain, size, tried, z, length, share, direction.astype(np.float32)))
     return tuple(sorted(found, key=lambda one: -one.gain))

@@ -13,7 +13,7 @@ from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.identify.windows import Window, window
 
 if TYPE_CHECKING:
-    from r2s2r_cli.engine import State
+    from r2s2r_cli.engine import State, Structure
 
 APART_S = 0.08
 """Frames nearer than this are averaged: errors of a simulator last longer, and half the frames say as much."""
@@ -55,9 +55,26 @@ class Stretch:
         return self.window.run.t[self.window.frames]
 
     @property
+    def frame_noise(self) -> np.ndarray:
+        """Sd of one frame's caps, (cap, 3) [m]; `noise` is of what is averaged of some."""
+        return np.maximum(self.window.run.noise, LEAST_NOISE_M)
+
+    @property
     def name(self) -> str:
         """`RUN:3`."""
         return f"{self.run}:{self.interval}"
+
+
+def begun_at(structure: Structure, one: Stretch, by: np.ndarray) -> Stretch:
+    """The stretch from a start with offsets `by` (offset,) (`offsets.displaced`)."""
+    import torch
+
+    from r2s2r_cli.engine.flat import pack_state, unpack_state
+    from r2s2r_cli.stages.identify.offsets import displaced
+
+    flat = displaced(structure, pack_state(structure, one.window.state), torch.as_tensor(by)[None])
+    taut = None if one.taut is None else one.taut + by[-structure.n_actuated :]
+    return replace(one, window=replace(one.window, state=unpack_state(structure, flat)), taut=taut)
 
 
 def stretches(

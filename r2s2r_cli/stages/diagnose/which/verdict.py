@@ -10,8 +10,9 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.parity.finding import Element
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
-from r2s2r_cli.stages.diagnose.which.fit import Fit, Fits
+from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked, Screened, Shift, Which
+from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.material import Material
 from r2s2r_cli.stages.diagnose.which.score import Score, gain_sds, gains as gains_of
 from r2s2r_cli.stages.diagnose.which.screen import Response
@@ -33,19 +34,14 @@ def concluded(m: Material) -> Which:
     calibration = m.calibration
     order = sorted(gains, key=lambda i: -gains[i])
     singles = [i for i in order if len(m.fits[i].hypothesis.parts) == 1]
-    worth = {
-        i: calibration.score(m.fits[i].hypothesis.effects[0], gains[i], linear=m.foretold(i), parity=m.said(i))
-        for i in singles
-    }
+    worth = {i: calibration.score(m.fits[i].hypothesis.effects[0], gains[i], parity=m.said(i)) for i in singles}
     best: dict[str, int] = {}
     for i in sorted(singles, key=lambda i: -worth[i]):
         best.setdefault(m.fits[i].hypothesis.effects[0], i)
     names = {name: gains[i] for name, i in best.items()}
     others = _not_fitted(m, names)
     table = {name: worth[i] for name, i in best.items()}
-    table |= {
-        one.effect: calibration.score(one.effect, one.gain, linear=one.linear, parity=one.parity) for one in others
-    }
+    table |= {one.effect: calibration.score(one.effect, one.gain, parity=one.parity) for one in others}
     table[NONE] = calibration.score(NONE, m.chance, equivalent=m.no_gap.equivalent, beyond=m.left.refit)
     table[UNKNOWN] = calibration.score(UNKNOWN, m.unexplained, beyond=m.left.best)
     probability = calibration.probabilities(table)
@@ -55,7 +51,6 @@ def concluded(m: Material) -> Which:
         replace(
             _ranked(m, i, gains[i], probability[name], singles, gains),
             gain_sd=sds[i],
-            linear=m.foretold(i),
             parity=m.said(i),
         )
         for name, i in best.items()
@@ -96,7 +91,6 @@ def _not_fitted(m: Material, fitted: Mapping[str, float]) -> list[Ranked]:
             channel=_channel(name),
             fitted=False,
             parity=m.says(name),
-            linear=max(m.linear.get(name, {None: 0.0}).values()),
         )
         for name, gain in screened.items()
         if name not in fitted
@@ -188,7 +182,8 @@ def _confusable(m: Material, rows: list[int]) -> tuple[tuple[str, str, float], .
         J = likely[:, None] * fit.jacobian
         Q, _ = np.linalg.qr(J[:, :p])
         off = fit.hypothesis.stack("off")[None]
-        without = m.arena.residuals(solver.values(fit.hypothesis, fit.z[None], off), fit.z[None])[0]
+        values = solver.values(fit.hypothesis, fit.z[None], off)
+        without = m.arena.residuals(values, fit.z[None], away=fit.away[None])[0]
         response = likely * (fit.residual - without)
         responses[i] = (response - Q @ (Q.T @ response), J[:, p:] - Q @ (Q.T @ J[:, p:]))
     found = []

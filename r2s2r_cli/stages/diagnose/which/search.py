@@ -1,0 +1,126 @@
+"""Which candidates are fitted, and how far: many from where the screening left them, fewer of them further."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.candidates import Candidate
+from r2s2r_cli.stages.diagnose.which.fit import Fits
+from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
+from r2s2r_cli.stages.diagnose.which.screen import Response
+
+WIDE = 32
+"""Candidates that are looked into."""
+TWICE = 16
+"""Of them, from two starts."""
+ELEMENTS = 2
+"""Of an effect, at most."""
+ROUNDS = ((1, 14), (3, 10), (4, 10))
+"""Iterations, and fits that go on after them."""
+SUSPECTED, LEAST_SAID = 3, 2.0
+"""Effects that are fitted because the parity stage speaks for them, with so many nats at least."""
+PAIRED = 5
+"""Effects that are tried beside the best one."""
+PAIR_ITERATIONS = 4
+
+Told = Callable[[str, int, int], None]
+Said = Mapping[str, Mapping[int | None, float]]
+"""Nats of the parity stage, by effect and element (`Parity.nats`)."""
+
+
+def picked_of(responses: Sequence[Response], told_by: Said) -> list[Response]:
+    """What is looked into: the best element of every effect, those that the parity stage speaks for, and then the best
+    of the others, ELEMENTS of an effect at most."""
+    testable = [one for one in responses if one.testable]
+    best = list(dict.fromkeys(one.candidate.effect for one in testable))
+    said = {name: max(told_by.get(name, {None: 0.0}).values()) for name in best}
+    suspected = sorted((name for name in best if said[name] >= LEAST_SAID), key=lambda name: -said[name])
+    own = {name: [one for one in testable if one.candidate.effect == name] for name in best}
+    found = [max(own[name], key=lambda one: told_by[name].get(one.candidate.number, 0.0))
+             for name in suspected[:SUSPECTED]]  # fmt: skip
+    found += [own[name][0] for name in best]
+    found += testable
+    kept: dict[int, Response] = {}
+    count: dict[str, int] = {}
+    for one in found:
+        name = one.candidate.effect
+        if id(one) not in kept and count.get(name, 0) < ELEMENTS and len(kept) < WIDE:
+            kept[id(one)] = one
+            count[name] = count.get(name, 0) + 1
+    return list(kept.values())
+
+
+def fitted(arena: Arena, base: Fit, picked: Sequence[Response], told_by: Said, told: Told) -> tuple[Fit, list[Fit]]:
+    """The refit nominal model and fits of the picked candidates, all from the same start: else who goes on gains what
+    the other left. What has gained least after a few iterations goes no further. Best first."""
+    fits = Fits(arena)
+    points: list[tuple[Hypothesis, np.ndarray, np.ndarray]] = [(Hypothesis(), base.z, base.x)]
+    points += [(Hypothesis((one.candidate,)), one.start_z, one.size) for one in picked]
+    # The refit nominal model has made up for what is wrong: the same from what the numbers were before, and larger.
+    was = np.where(np.arange(len(base.z)) < arena.shared, np.clip(arena.mean, arena.lower, arena.upper), base.z)
+    points += [(Hypothesis((one.candidate,)), was, one.tried) for one in picked[:TWICE]]
+    points += [(Hypothesis((own,)), was, own.tries[0]) for own in _said(picked, told_by)]
+    nominal, *going = fits.begun(points)
+    told("fits", 0, len(ROUNDS))
+    fits.settle([nominal, *going])
+    for number, (iterations, kept) in enumerate(ROUNDS):
+        for fit in (nominal, *going):
+            fit.ended = False
+        fits.run([nominal, *going], iterations=iterations)
+        going = _kept(_best_of(going), told_by, kept)
+        told("fits", number + 1, len(ROUNDS))
+    return nominal, going
+
+
+def _said(picked: Sequence[Response], told_by: Said) -> list[Candidate]:
+    """Candidates that the parity stage speaks for: their first tries are at the sizes that it says."""
+    return [
+        one.candidate for one in picked
+        if told_by.get(one.candidate.effect, {}).get(one.candidate.number, 0.0) >= LEAST_SAID
+        and len(one.candidate.tries)
+    ]  # fmt: skip
+
+
+def _kept(fits: Sequence[Fit], told_by: Said, count: int) -> list[Fit]:
+    """The first fits, and those of the effects that the parity stage speaks for most."""
+    said = {name: max(told_by.get(name, {None: 0.0}).values()) for name in {fit.hypothesis.effects[0] for fit in fits}}
+    spoken = sorted((name for name in said if said[name] >= LEAST_SAID), key=lambda name: -said[name])[:SUSPECTED]
+    also = {next(id(fit) for fit in fits if fit.hypothesis.effects[0] == name) for name in spoken}
+    return [fit for k, fit in enumerate(fits) if k < count or id(fit) in also]
+
+
+def _best_of(fits: Sequence[Fit]) -> list[Fit]:
+    """Of every hypothesis the fit of least cost, best first."""
+    best: dict[str, Fit] = {}
+    for fit in fits:
+        label = fit.hypothesis.label
+        if label not in best or fit.cost < best[label].cost:
+            best[label] = fit
+    return sorted(best.values(), key=lambda fit: fit.cost)
+
+
+def pairs_of(arena: Arena, base: Fit, fits: Sequence[Fit], gained: np.ndarray) -> list[Fit]:
+    """The best single effect with the next PAIRED ones: where one effect leaves something, two may not.
+    gained (fit,): by each [nats]."""
+    if len(fits) < 2:
+        return []
+    order = np.argsort(-gained, kind="stable")
+    first = fits[order[0]]
+    others = [fits[i] for i in order[1:] if fits[i].hypothesis.effects != first.hypothesis.effects]
+    seen: set[str] = set()
+    points = []
+    for other in others:
+        if other.hypothesis.effects[0] in seen or len(seen) == PAIRED:
+            continue
+        seen.add(other.hypothesis.effects[0])
+        both = Hypothesis((*first.hypothesis.parts, *other.hypothesis.parts))
+        z = np.clip(first.z + other.z - base.z, arena.lower, arena.upper)
+        points.append((both, z, np.concatenate([first.x, other.x])))
+        points.append((both, first.z, np.concatenate([first.x, 0.5 * (other.x + other.hypothesis.stack("off"))])))
+    fits_of = Fits(arena)
+    begun = fits_of.begun(points)
+    fits_of.run(begun, iterations=PAIR_ITERATIONS)
+    return _best_of(begun)[:3]

@@ -9,16 +9,20 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.candidates import Candidate
 from r2s2r_cli.stages.diagnose.which.mixture import FACTORS
-from r2s2r_cli.stages.diagnose.which.white import Kind, White
+from r2s2r_cli.stages.diagnose.which.white import Kind, White, whitened
 
 STRETCHES, EACH = 6, 60
 
 
 class LinearArena:
     """residual = A z + B x - y, white; stretches of EACH numbers, two a gait. The model's values are [z | x]. Of the
-    kinds of errors each is FACTORS times as large as the first."""
+    kinds of errors each is FACTORS times as large as the first. begins: responses C (EACH,) to offsets a of the
+    starts, bends: D (EACH,), which add C a + D a^2; `began`: where they really are."""
 
-    def __init__(self, truth: float, *, noise: float = 1.0, seed: int = 0) -> None:
+    def __init__(
+        self, truth: float, *, noise: float = 1.0, seed: int = 0, begins: Sequence[np.ndarray] = (),
+        bends: Sequence[np.ndarray] = (),
+    ) -> None:  # fmt: skip
         rng = np.random.default_rng(seed)
         M = STRETCHES * EACH
         self.A, self.B = rng.standard_normal((M, 2)), rng.standard_normal((M, 2))
@@ -30,12 +34,13 @@ class LinearArena:
         self.many = tuple(SimpleNamespace(run="a", interval=k + 1, caps=np.zeros((1, 1, 3))) for k in range(STRETCHES))
         self.whole = self.many
         self.gait = np.arange(STRETCHES) // 2
+        self.away = np.zeros((STRETCHES, len(begins)))
+        self.C = np.array(begins).reshape(len(begins), 1, EACH)
+        self.D = np.array(bends).reshape(len(begins), 1, EACH)
+        self.began = np.zeros((STRETCHES, len(begins)))
         self.white = [
-            White(tuple(
-                Kind(np.zeros((0, 0, 0)), np.zeros((0, 0)), np.zeros(0),
-                     slice(c * M + k * EACH, c * M + (k + 1) * EACH), 2 * EACH * float(np.log(factor)))
-                for c, factor in enumerate(FACTORS)
-            ), EACH)
+            White(tuple(_kind(factor, slice(c * M + k * EACH, c * M + (k + 1) * EACH), self.C)
+                        for c, factor in enumerate(FACTORS)), EACH)
             for k in range(STRETCHES)
         ]  # fmt: skip
         self.logdets = np.array([white.logdet for white in self.white])
@@ -45,9 +50,33 @@ class LinearArena:
         """Off."""
         return np.concatenate([z, np.zeros((len(z), 2))], axis=1)
 
-    def residuals(self, values: np.ndarray, z: np.ndarray, only: object = None) -> np.ndarray:
+    def raw(
+        self, values: np.ndarray, z: np.ndarray, only: object = None, away: np.ndarray | None = None
+    ) -> list[np.ndarray]:  # fmt: skip
+        """By stretch, (k, 1, EACH): of the first starts, along straight lines."""
+        whole = values[:, :2] @ self.A.T + values[:, 2:] @ self.B.T - self.y
+        there = np.repeat(self.away[None], len(values), axis=0) if away is None else away
+        bent = there**2 - self.began**2
+        parts = whole.reshape(len(values), STRETCHES, 1, EACH).transpose(1, 0, 2, 3)
+        return [
+            one - np.einsum("o,ocf->cf", self.began[k], self.C) + np.einsum("ko,ocf->kcf", bent[:, k], self.D)
+            for k, one in enumerate(parts)
+        ]  # fmt: skip
+
+    def residuals(
+        self, values: np.ndarray, z: np.ndarray, only: object = None, away: np.ndarray | None = None
+    ) -> np.ndarray:  # fmt: skip
         """White under each kind, (k, kind M)."""
-        return _kinds(values[:, :2] @ self.A.T + values[:, 2:] @ self.B.T - self.y)
+        return whitened(self.white, self.raw(values, z, only, away))
+
+    def likely_starts(self, raw: Sequence[np.ndarray]) -> np.ndarray:
+        """As `Arena`, of the first kind."""
+        return np.array([white.kinds[0].start(white.kinds[0].rooted(one[None])[0])
+                         for white, one in zip(self.white, raw, strict=True)])  # fmt: skip
+
+    def by_row(self, chosen: np.ndarray) -> np.ndarray:
+        """As `Arena`."""
+        return np.tile(np.repeat(chosen, EACH), len(FACTORS))
 
     def keys(self, values: np.ndarray, z: np.ndarray, only: Sequence[int]) -> np.ndarray:
         """Key frames of one cap."""
@@ -61,6 +90,17 @@ class LinearArena:
 
 def _kinds(residual: np.ndarray) -> np.ndarray:
     return np.concatenate([residual / factor for factor in FACTORS], axis=1)
+
+
+def _kind(factor: float, rows: slice, C: np.ndarray) -> Kind:
+    """Of noise `factor`, with one sd of the starts' offsets along C (offset, 1, EACH); the columns are orthogonal."""
+    V = C.reshape(len(C), EACH) / factor
+    square = np.maximum(np.sum(V**2, axis=1), 1e-12)
+    return Kind(
+        roots=np.eye(EACH)[None] / factor, U=V.T / np.sqrt(square), shrink=1.0 - 1.0 / np.sqrt(1.0 + square), rows=rows,
+        logdet=2 * EACH * float(np.log(factor)) + float(np.log1p(square).sum()),
+        to_start=V / (1.0 + square)[:, None],
+    )  # fmt: skip
 
 
 def candidate(name: str, place: int) -> Candidate:

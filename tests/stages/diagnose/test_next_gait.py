@@ -83,7 +83,9 @@ def test_motors_that_run_tell_a_late_one_from_a_slow_one(tmp_path: Path) -> None
 
     def fit(effect: str, tau_s: float) -> Fit:
         x = np.array([tau_s])
-        return Fit(Hypothesis((found[effect],)), arena.mean.copy(), x, np.zeros(0), np.zeros((0, 0)), 0.0, x)
+        return Fit(
+            Hypothesis((found[effect],)), arena.mean.copy(), x, np.zeros(0), np.zeros((0, 0)), 0.0, x, np.zeros(0), []
+        )
 
     late, slow = fit("command_latency", 0.2), fit("motor_lag", 0.2)
     six = tuple(tuple(float((k + i) % 2) for i in range(6)) for k in range(6))

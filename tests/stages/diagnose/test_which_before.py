@@ -20,19 +20,14 @@ QUIET = 0.5
 def healthy(arena: LinearArena) -> Healthy:
     """Its runs, the nuisances where half the squares and their prior are least."""
     z = np.linalg.solve(arena.A.T @ arena.A + arena.precision, arena.A.T @ arena.y + arena.precision @ arena.mean)
-    base = Fits(arena).begin(Hypothesis(), z, np.zeros(0), residuals(arena, z, np.zeros(2)))  # type: ignore[arg-type]
+    (base,) = Fits(arena).begun([(Hypothesis(), z, np.zeros(0))])  # type: ignore[arg-type]
     return Healthy(arena, base)  # type: ignore[arg-type]
-
-
-def residuals(arena: LinearArena, z: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """At one point."""
-    return arena.residuals(np.concatenate([z, x])[None], z[None])[0]
 
 
 def fitted(x: float, place: int = 0) -> Fit:
     """What the runs of today gave the effect: all that counts is its size."""
     one, none = np.array([x]), np.zeros(0)
-    return Fit(Hypothesis((candidate("effect", place),)), none, one, none, np.zeros((0, 0)), 0.0, one)
+    return Fit(Hypothesis((candidate("effect", place),)), none, one, none, np.zeros((0, 0)), 0.0, one, none, [])
 
 
 def squared(arena: LinearArena, y: np.ndarray, columns: list[int]) -> float:
@@ -116,10 +111,8 @@ def test_what_was_there_before_is_no_news(seed: int) -> None:
     """The same effect in the healthy runs takes nearly all of today's gain; in runs that lack it, none."""
     today = LinearArena(0.5, seed=seed)
     solver = Fits(today)  # type: ignore[arg-type]
-    fits = []
-    for hypothesis in (Hypothesis(), Hypothesis((candidate("effect", 0),))):
-        x = np.zeros(len(hypothesis.parts))
-        fits.append(solver.begin(hypothesis, np.zeros(2), x, residuals(today, np.zeros(2), np.zeros(2))))
+    both = (Hypothesis(), Hypothesis((candidate("effect", 0),)))
+    fits = solver.begun([(one, np.zeros(2), np.zeros(len(one.parts))) for one in both])
     solver.run(fits)
     found = scores(today, fits, today.gait)  # type: ignore[arg-type]
     (gain,) = gains(found[0], found[1:])

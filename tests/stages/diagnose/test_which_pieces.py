@@ -18,7 +18,7 @@ from r2s2r_cli.stages.diagnose.evidence import Run
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.pieces import pieces
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
-from r2s2r_cli.stages.diagnose.which.stretches import Stretch
+from r2s2r_cli.stages.diagnose.which.stretches import Stretch, begun_at
 from r2s2r_cli.stages.identified import nominal
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.model import rest_state
@@ -181,9 +181,12 @@ def test_offsets_of_a_start_move_what_is_seen(walked: Walked) -> None:
     """Without an offset the same as ever; a rod put 2 mm along x moves its own caps by that at first; one that moves
     faster is farther off the later it is."""
     one = walked.pieces[-1]
-    sd = np.zeros(42)
-    sd[0], sd[18] = 2e-3, 0.02  # place and velocity of rod 0 along x
-    (around,) = walked.replayer.around([one], walked.values, [sd])
+    by = np.zeros((43, 42))
+    by[1, 0], by[19, 18] = 2e-3, 0.02  # place and velocity of rod 0 along x
+    values = np.repeat(walked.values[None], 43, axis=0)
+    (around,) = walked.replayer.around([one], values, [by])
+    (alike,) = walked.replayer.seen([replace(one, piece=0)], values, [by])
+    assert np.array_equal(alike.caps, around.caps) and np.array_equal(alike.length, around.length)
     (seen,) = walked.replayer.seen([replace(one, piece=0)], walked.values[None])
     assert np.array_equal(around.caps[0], seen.caps[0]) and np.array_equal(around.length[0], seen.length[0])
     still = [k for k in range(42) if k not in (0, 18)]
@@ -191,6 +194,19 @@ def test_offsets_of_a_start_move_what_is_seen(walked: Walked) -> None:
     moved = np.abs(around.caps - around.caps[:1]).max(axis=(2, 3))
     assert 1e-4 < moved[1, 0] < 4e-3
     assert moved[19].max() > 1e-4
+
+
+def test_a_stretch_that_begins_elsewhere_is_one_that_was_moved(walked: Walked) -> None:
+    """Offsets in a question and offsets in the stretch itself are the same, also of cables that a piece before it
+    hands on."""
+    before, one = walked.pieces[-2:]
+    by = 1e-3 * np.random.default_rng(0).standard_normal(42)
+    structure = walked.replayer.structure
+    asked = walked.replayer.seen([before, one], walked.values[None], [np.zeros((1, 42)), by[None]])
+    moved = walked.replayer.seen([before, begun_at(structure, one, by)], walked.values[None])
+    for a, b in zip(asked, moved, strict=True):
+        assert a.caps == pytest.approx(b.caps, abs=1e-9) and a.length == pytest.approx(b.length, abs=1e-9)
+    assert np.abs(asked[1].caps - walked.replayer.seen([before, one], walked.values[None])[1].caps).max() > 3e-4
 
 
 def test_a_late_camera_shows_what_was(walked: Walked) -> None:

@@ -67,13 +67,15 @@ def asked(monkeypatch: pytest.MonkeyPatch, model: Model) -> list[str]:
         return [Seen(r.standard_normal((6, 3, FRAMES, len(total))).T, r.standard_normal((len(total), FRAMES, SENSORS)))
                 for r in rng]  # fmt: skip
 
-    def seen(self: Replayer, many: Sequence[Stretch], values: np.ndarray) -> list[Seen]:
+    def seen(
+        self: Replayer, many: Sequence[Stretch], values: np.ndarray, by: Sequence[np.ndarray] | None = None
+    ) -> list[Seen]:
         done.append("seen")
-        return views(self, many, values)
+        return views(self, many, values + sum(float(one.sum()) for one in by or ()))
 
-    def around(self: Replayer, many: Sequence[Stretch], values: np.ndarray, sd: Sequence[np.ndarray]) -> list[Seen]:
+    def around(self: Replayer, many: Sequence[Stretch], values: np.ndarray, by: Sequence[np.ndarray]) -> list[Seen]:
         done.append("around")
-        return views(self, many, values[None] + sum(float(one.sum()) for one in sd))
+        return views(self, many, values + sum(float(one.sum()) for one in by))
 
     def finals(self: Replayer, many: Sequence[Stretch], values: np.ndarray) -> Any:
         done.append("finals")
@@ -99,9 +101,9 @@ def diagnosis(model: Model, kept: Kept) -> tuple[list[np.ndarray], int]:
     many = [stretch(0), stretch(1)]
     values = model.values0[None] + np.arange(3.0)[:, None] / 10
     found = [part for one in replayer.seen(many, values) for part in (one.caps, one.length)]
-    found += [one.caps for one in replayer.around(many, values[0], [np.ones(4), np.full(4, 0.5)])]
+    found += [one.caps for one in replayer.around(many, values[:1], [np.ones((1, 4)), np.full((1, 4), 0.5)])]
     found.append(pack_state(model.structure, replayer.finals(many, values[1])).numpy())
-    found += [one.length for one in replayer.seen(many[1:], values[:1])]
+    found += [one.length for one in replayer.seen(many[1:], values[:1], [np.ones((1, 4))])]
     return found, replayer.rollouts
 
 
@@ -139,24 +141,24 @@ def test_another_stretch_is_another_question(model: Model, asked: list[str], cha
 
 
 def test_other_numbers_starts_and_questions_are_asked(model: Model, asked: list[str]) -> None:
-    """The last bit of a value, of a start or of its sd, and another question at the same numbers: none is answered from
-    memory."""
+    """The last bit of a value, of a start or of what is begun away from it, and another question at the same numbers:
+    none is answered from memory."""
     kept = Kept()
-    values, sd = model.values0[None], np.ones(4)
-    Remembered(model, kept, threads=1).around([stretch()], values[0], [sd])
+    values, by = model.values0[None], np.ones((1, 4))
+    Remembered(model, kept, threads=1).around([stretch()], values, [by])
     moved = stretch()
     state = moved.window.state
     moved.window.state = replace(state, p_WB=torch.nextafter(state.p_WB, state.p_WB + 1.0))
     near = np.nextafter(values, 1.0)
 
-    def ask(one: Stretch, at: np.ndarray, spread: np.ndarray) -> int:
+    def ask(one: Stretch, at: np.ndarray, away: np.ndarray) -> int:
         asked.clear()
-        Remembered(model, kept.after(1), threads=1).around([one], at[0], [spread])
+        Remembered(model, kept.after(1), threads=1).around([one], at, [away])
         return len(asked)
 
-    assert ask(stretch(), values, sd) == 0
-    assert ask(moved, values, sd) == ask(stretch(), near, sd) == ask(stretch(), values, np.nextafter(sd, 2.0)) == 1
-    for replay in (lambda r: r.seen([stretch()], values), lambda r: r.finals([stretch()], values[0])):
+    assert ask(stretch(), values, by) == 0
+    assert ask(moved, values, by) == ask(stretch(), near, by) == ask(stretch(), values, np.nextafter(by, 2.0)) == 1
+    for replay in (lambda r: r.seen([stretch()], values, [by]), lambda r: r.finals([stretch()], values[0])):
         asked.clear()
         replay(Remembered(model, kept.after(1), threads=1))
         assert len(asked) == 1

@@ -22,12 +22,15 @@ class RoughArena(LinearArena):
 
     luck = 0.0
 
-    def residuals(self, values: np.ndarray, z: np.ndarray, only: object = None) -> np.ndarray:
+    def raw(
+        self, values: np.ndarray, z: np.ndarray, only: object = None, away: np.ndarray | None = None
+    ) -> list[np.ndarray]:  # fmt: skip
         """As of the linear arena, and luck."""
-        found = super().residuals(values, z)
-        for row, own in zip(found, values, strict=True):
-            seed = np.abs(np.round(own * 1e6)).astype(int)
-            row += self.luck * np.random.default_rng(seed).standard_normal(len(row))
+        found = super().raw(values, z, only, away)
+        for row, own in enumerate(values):
+            rng = np.random.default_rng(np.abs(np.round(own * 1e6)).astype(int))
+            for one in found:
+                one[row] += self.luck * rng.standard_normal(one[row].shape)
         return found
 
 
@@ -53,11 +56,7 @@ def test_luck_is_worth_less_than_in_one_simulation() -> None:
         arena = RoughArena(0.0, seed=seed)
         arena.luck = 0.5
         solver = Fits(arena)  # type: ignore[arg-type]
-        fits = []
-        for by in (0.0, 1e-5):
-            z = np.full((1, 2), by)
-            residual = arena.residuals(arena.values(z), z)[0]
-            fits.append(solver.begin(Hypothesis(), z[0], np.zeros(0), residual))
+        fits = solver.begun([(Hypothesis(), np.full(2, by), np.zeros(0)) for by in (0.0, 1e-5)])
         one, other = scores(arena, fits, arena.gait)  # type: ignore[arg-type]
         single = [arena.squares(fit.residual[None])[0, :, 0].sum() for fit in fits]
         return float(one.elpd.sum() - other.elpd.sum()), 0.5 * float(single[1] - single[0])
@@ -73,11 +72,8 @@ def test_what_is_left_is_what_no_hypothesis_explains() -> None:
 
     def of(arena: LinearArena, healthy: Healthy) -> tuple[float, float, float]:
         solver = Fits(arena)  # type: ignore[arg-type]
-        fits = []
-        for hypothesis in (Hypothesis(), Hypothesis((candidate("right", 0),))):
-            x = np.zeros(len(hypothesis.parts))
-            residual = arena.residuals(solver.values(hypothesis, np.zeros((1, 2)), x[None]), np.zeros((1, 2)))[0]
-            fits.append(solver.begin(hypothesis, np.zeros(2), x, residual))
+        both = (Hypothesis(), Hypothesis((candidate("right", 0),)))
+        fits = solver.begun([(one, np.zeros(2), np.zeros(len(one.parts))) for one in both])
         solver.run(fits)
         refit, own = scores(arena, fits, arena.gait)  # type: ignore[arg-type]
         found = left(expected(arena), refit, [own], healthy)  # type: ignore[arg-type]
@@ -86,7 +82,7 @@ def test_what_is_left_is_what_no_hypothesis_explains() -> None:
 
     well = LinearArena(0.0, seed=5)
     solver = Fits(well)  # type: ignore[arg-type]
-    begun = solver.begin(Hypothesis(), np.zeros(2), np.zeros(0), well.residuals(np.zeros((1, 4)), np.zeros((1, 2)))[0])
+    (begun,) = solver.begun([(Hypothesis(), np.zeros(2), np.zeros(0))])
     solver.run([begun])
     healthy = Healthy(well, begun)  # type: ignore[arg-type]
     refit, best, sd = of(LinearArena(0.8), healthy)

@@ -14,7 +14,7 @@ from r2s2r_cli.stages.diagnose.which.mixture import ENOUGH, FACTORS, density, mi
 from r2s2r_cli.stages.diagnose.which.rivals import chance, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score, gains, scores
 from r2s2r_cli.stages.diagnose.which.screen import Response, screen
-from r2s2r_cli.stages.diagnose.which.which import FITTED, _picked
+from r2s2r_cli.stages.diagnose.which.search import WIDE, picked_of
 from tests.support.linear_arena import EACH, LinearArena, candidate
 
 
@@ -33,9 +33,7 @@ def tried(truth: float, seed: int = 0) -> Tried:
     solver = Fits(arena)  # type: ignore[arg-type]
     made = []
     for hypothesis in (Hypothesis(), Hypothesis((candidate("right", 0),)), Hypothesis((candidate("wrong", 1),))):
-        x = np.zeros(len(hypothesis.parts))
-        residual = arena.residuals(solver.values(hypothesis, np.zeros((1, 2)), x[None]), np.zeros((1, 2)))[0]
-        made.append(solver.begin(hypothesis, np.zeros(2), x, residual))
+        made += solver.begun([(hypothesis, np.zeros(2), np.zeros(len(hypothesis.parts)))])
     solver.run(made)
     return Tried(arena, made, scores(arena, made, arena.gait))  # type: ignore[arg-type]
 
@@ -79,22 +77,19 @@ def test_an_effect_far_smaller_than_what_is_tried_is_seen_in_the_screening() -> 
 
 
 def test_what_parity_speaks_for_is_fitted_at_its_element() -> None:
-    """Beyond the FITTED best of the screening, with parity's element first; a whisper is not heard."""
-    arena = LinearArena(0.0)
+    """However many the screening has before it; and the best element of every effect before second ones."""
 
     def response(name: str, index: int | None, gain: float) -> Response:
         one = candidate(name, 0)
         element = None if index is None else Element("sensor", index)
-        return Response(replace(one, element=element), gain, one.scale, arena.mean, 9.0, 0.0, np.zeros(1))
+        return Response(replace(one, element=element), gain, one.scale, one.scale, np.zeros(2), 9.0, 0.0, np.zeros(1))
 
-    many = [response(f"e{k}", None, 50.0 - k) for k in range(FITTED + 2)]
+    many = [response(f"e{k}", i, 90.0 - k - 0.1 * i) for k in range(WIDE - 1) for i in range(2)]
     sensors = [response("sensor_bias", k, 5.0 - k) for k in range(4)]
-    told = {"sensor_bias": {3: 20.0, 1: 0.3}, f"e{FITTED}": {None: 0.5}}
-    picked = _picked([*many, *sensors], told)
-    names = [one.candidate.effect for one in picked]
-    assert names[:FITTED] == [f"e{k}" for k in range(FITTED)]
-    assert [one.candidate.number for one in picked[FITTED:]] == [3, 0]
-    assert f"e{FITTED}" not in names
+    picked = picked_of([*many, *sensors], {"sensor_bias": {3: 20.0, 1: 0.3}, "e7": {0: 0.5}})
+    assert len(picked) == WIDE
+    assert [one.candidate.number for one in picked if one.candidate.effect == "sensor_bias"][:1] == [3]
+    assert {one.candidate.effect for one in picked} == {"sensor_bias", *(f"e{k}" for k in range(WIDE - 1))}
 
 
 def test_without_an_effect_chance_is_not_beaten_often() -> None:
@@ -170,7 +165,7 @@ def test_a_response_that_nuisances_explain_is_absorbed() -> None:
     arena = LinearArena(0.0)
     arena.B[:, 0] = arena.A[:, 0]
     solver = Fits(arena)  # type: ignore[arg-type]
-    base = solver.begin(Hypothesis(), np.zeros(2), np.zeros(0), arena.residuals(np.zeros((1, 4)), np.zeros((1, 2)))[0])
+    (base,) = solver.begun([(Hypothesis(), np.zeros(2), np.zeros(0))])
     found: dict[str, Response] = {
         one.candidate.effect: one
         for one in screen(arena, base, [candidate("along", 0), candidate("across", 1)])  # type: ignore[arg-type]

@@ -47,5 +47,5 @@ def test_without_healthy_runs_the_parity_stage_counts_for_less() -> None:
     assert own.score("payload", 7.0, parity=8.0) - 7.0 == pytest.approx(
         ABSOLUTE * (BY.score("payload", 7.0, parity=8.0) - 7.0)
     )
-    assert own.score("payload", 7.0, linear=3.0) == BY.score("payload", 7.0, linear=3.0)
+    assert own.score("payload", 7.0) == BY.score("payload", 7.0)
     assert "healthy runs" in own.words and own.commit == BY.commit

@@ -20,8 +20,8 @@ class Ranked:
     gain: held-out log predictive density over the refit nominal model [nats]. size, ci90: of its numbers, by name, in
     `units`. moved: the fit left its start; on_bound: names of numbers that ended on a bound. rmse: of the caps at the
     ends of stretches left out [m]. misfit: squares over what noise and floor explain, median over stretches.
-    gain_sd: of the gain, from how much what was left out differs in it [nats]. parity: what the parity stage says for it [nats]. fitted: False, the screening left it out, and it counts
-    as gaining nothing.
+    gain_sd: of the gain, from how much what was left out differs in it [nats]. parity: what the parity stage says for
+    it [nats]. fitted: False, the screening left it out, and it counts as gaining nothing.
     """
 
     effect: str

@@ -75,7 +75,9 @@ def calibrate(
 
     Example: r2s2r calibrate --points points.csv --use monday
     """
-    from r2s2r_cli.commands.stage import StageRun, print_config, show_outcome, wanted
+    from r2s2r_cli.commands.outcome import print_config, show_outcome
+    from r2s2r_cli.commands.stage import StageRun
+    from r2s2r_cli.commands.wanted import wanted
     from schemas.results_calibrate import CalibrationReport
 
     console = Console(json=json, quiet=quiet)

@@ -67,7 +67,8 @@ def compare(
     Example: r2s2r compare --iteration 2
     """
     from r2s2r_cli.commands.compare_inputs import Asked
-    from r2s2r_cli.commands.stage import StageRun, show_outcome
+    from r2s2r_cli.commands.outcome import show_outcome
+    from r2s2r_cli.commands.stage import StageRun
     from schemas.results_compare import CompareReport
 
     console = Console(json=json, quiet=quiet)

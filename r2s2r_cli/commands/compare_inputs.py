@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.commands.compare_models import learned_names, require_current
-from r2s2r_cli.commands.stage import require_input
+from r2s2r_cli.commands.outcome import require_input
 from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef

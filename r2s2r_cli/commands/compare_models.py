@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from r2s2r_cli.commands.stage import robot_part
+from r2s2r_cli.commands.wanted import robot_part
 from r2s2r_cli.errors import InputError, R2S2RError
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project

@@ -80,7 +80,9 @@ def diagnose(
     """
     from r2s2r_cli.commands.diagnose_inputs import Asked
     from r2s2r_cli.commands.identify_hints import typed_options, whole_hints
-    from r2s2r_cli.commands.stage import StageRun, print_config, show_outcome, wanted
+    from r2s2r_cli.commands.outcome import print_config, show_outcome
+    from r2s2r_cli.commands.stage import StageRun
+    from r2s2r_cli.commands.wanted import wanted
     from r2s2r_cli.store.checkpoint import checkpoint_key, checkpoint_of
     from r2s2r_cli.store.checkpoint_arrays import ArrayCheckpoint
     from schemas.results_diagnose import DiagnoseReport

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.commands.identify_inputs import Asked as IdentifyAsked, Source, named_runs, require_robot
-from r2s2r_cli.commands.stage import require_input
+from r2s2r_cli.commands.outcome import require_input
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef

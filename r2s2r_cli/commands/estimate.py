@@ -60,7 +60,9 @@ def estimate(
     Example: r2s2r estimate --iteration 1
     """
     from r2s2r_cli.commands.estimate_hints import hints_of
-    from r2s2r_cli.commands.stage import StageRun, print_config, require_input, show_outcome, wanted, wanted_again
+    from r2s2r_cli.commands.outcome import print_config, require_input, show_outcome
+    from r2s2r_cli.commands.stage import StageRun
+    from r2s2r_cli.commands.wanted import wanted, wanted_again
     from r2s2r_cli.store.header import whole_header
     from r2s2r_cli.store.staleness import artifact_ref, reasons
     from schemas.results_estimate import EstimateReport

@@ -83,8 +83,8 @@ def execute(
     """  # fmt: skip
     from r2s2r_cli.commands.cameras import stored_camera
     from r2s2r_cli.commands.execute_outcome import expect
+    from r2s2r_cli.commands.outcome import require_input
     from r2s2r_cli.commands.record_run import Wish, carry_out, look
-    from r2s2r_cli.commands.stage import require_input
     from r2s2r_cli.stages.record import plans
     from r2s2r_cli.store.header import whole_header
     from r2s2r_cli.store.staleness import artifact_ref
@@ -128,8 +128,8 @@ def execute(
 
 def _chosen(project: Project, place: Iteration, names: Sequence[str]) -> tuple[list[PolicyFile], list[InputRef]]:
     """The policies, each for this robot, and the plan where they are of it. Raises InputError, UsageError."""
+    from r2s2r_cli.commands.outcome import require_input
     from r2s2r_cli.commands.simulate_inputs import Asked, read_policies, split_name
-    from r2s2r_cli.commands.stage import require_input
     from r2s2r_cli.stages.simulate.policies import sequence
 
     plan = place.artifact("plan")
@@ -185,7 +185,7 @@ def _long(plan: Path) -> list[str]:
 
 def _require_fresh(project: Project, place: Iteration, plan: Path) -> None:
     """Raises InputError where the plan was made for another robot.toml, model or settings than there are now."""
-    from r2s2r_cli.commands.stage import wanted_again
+    from r2s2r_cli.commands.wanted import wanted_again
     from r2s2r_cli.errors import InputError
     from r2s2r_cli.store.header import whole_header
     from r2s2r_cli.store.staleness import reasons

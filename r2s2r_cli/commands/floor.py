@@ -57,7 +57,8 @@ def floor(
 
     Example: r2s2r floor --iteration 1
     """
-    from r2s2r_cli.commands.stage import StageRun, show_outcome
+    from r2s2r_cli.commands.outcome import show_outcome
+    from r2s2r_cli.commands.stage import StageRun
     from schemas.results_floor import FloorReport
 
     console = Console(json=json, quiet=quiet)

@@ -123,7 +123,8 @@ def identify(
     """
     from r2s2r_cli.commands.identify_hints import typed_options, whole_hints
     from r2s2r_cli.commands.identify_inputs import Asked
-    from r2s2r_cli.commands.stage import print_config, wanted
+    from r2s2r_cli.commands.outcome import print_config
+    from r2s2r_cli.commands.wanted import wanted
 
     console = Console(json=json, quiet=quiet)
     here = Project.find(project)
@@ -178,7 +179,8 @@ def _plant(asked: Asked, overrides: dict[str, Any], console: Console, dry_run: b
 
 def _fit(asked: Asked, overrides: dict[str, Any], console: Console, how: _Ways) -> None:
     from r2s2r_cli.commands.identify_run import compute
-    from r2s2r_cli.commands.stage import StageRun, show_outcome
+    from r2s2r_cli.commands.outcome import show_outcome
+    from r2s2r_cli.commands.stage import StageRun
     from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_key, checkpoint_of
     from schemas.results_identify import IdentifyReport
 

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from r2s2r_cli.commands.stage import require_input
+from r2s2r_cli.commands.outcome import require_input
 from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef

@@ -74,7 +74,9 @@ def import_(
 
     Example: r2s2r import crawl.csv
     """
-    from r2s2r_cli.commands.stage import StageRun, print_config, show_outcome, wanted
+    from r2s2r_cli.commands.outcome import print_config, show_outcome
+    from r2s2r_cli.commands.stage import StageRun
+    from r2s2r_cli.commands.wanted import wanted
     from schemas.results_import import ImportReports
 
     console = Console(json=json, quiet=quiet)
@@ -132,7 +134,7 @@ def _refs(project: Project, sources: list[Path], format_: Format) -> list[InputR
 
 def _guard(project: Project, place: Iteration, sources: list[Path], format_: Format) -> Callable[[Header | None], None]:
     """A recording is replaced only by one that holds all its runs."""
-    from r2s2r_cli.commands.stage import identity
+    from r2s2r_cli.commands.freshness import identity
 
     def guard(present: Header | None) -> None:
         if not place.artifact("recording").exists():

@@ -32,7 +32,7 @@ class Mending:
 
 def mending(project: Project, header: Header, path: Path, reasons: Sequence[str]) -> Mending:
     """What mends the stale artifact at `path`. reasons: why it is stale, other than through a stale input."""
-    from r2s2r_cli.commands.stage import MEASURED
+    from r2s2r_cli.commands.wanted import MEASURED
 
     made = header.provenance
     if made.stage in MEASURED:  # nothing makes it again: a robot must move

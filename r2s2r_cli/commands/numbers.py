@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def read_numbers(project: Project, path: Path) -> ArtifactData:
     """The identification at `path`. Raises ArtifactError; InputError where robot.toml was changed since, in a part that
     the numbers depend on: they would then be mixed with others; or where another version of `identify` made them."""
-    from r2s2r_cli.commands.stage import robot_part
+    from r2s2r_cli.commands.wanted import robot_part
     from r2s2r_cli.store.read import read_artifact
     from schemas.versions import STAGE_VERSIONS
 

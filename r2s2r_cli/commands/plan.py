@@ -71,8 +71,10 @@ def plan(
 
     Example: r2s2r plan --to 0.5,1,90
     """
+    from r2s2r_cli.commands.outcome import print_config, show_outcome
     from r2s2r_cli.commands.plan_inputs import Asked
-    from r2s2r_cli.commands.stage import StageRun, print_config, show_outcome, wanted
+    from r2s2r_cli.commands.stage import StageRun
+    from r2s2r_cli.commands.wanted import wanted
     from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_key, checkpoint_of
     from schemas.results_plan import PlanReport
 

@@ -98,9 +98,10 @@ def record(
     Example: r2s2r record --random 15 --repeats 3 --port /dev/ttyUSB0
     """
     from r2s2r_cli.commands.cameras import stored_camera
+    from r2s2r_cli.commands.outcome import print_config
     from r2s2r_cli.commands.record_run import Wish, carry_out, look
     from r2s2r_cli.commands.simulate_inputs import stored_names
-    from r2s2r_cli.commands.stage import print_config, wanted
+    from r2s2r_cli.commands.wanted import wanted
     from r2s2r_cli.stages.record import plans
 
     console = Console(json=json, quiet=quiet)

@@ -117,7 +117,7 @@ class Recording:
         return seal(journal_of(self.target), self.target, late=late)
 
     def _head(self, streams: Sequence[StreamLayout], groups: Mapping[str, Mapping[str, Any]]) -> JournalHead:
-        from r2s2r_cli.commands.stage import wanted
+        from r2s2r_cli.commands.wanted import wanted
         from r2s2r_cli.store.journal import Field, JournalHead, Stream
         from r2s2r_cli.store.provenance import build_provenance
 

@@ -215,7 +215,7 @@ def _finish(
     wish: Wish, report: RecordReport, result: StageResult | None, ended: BaseException | None, console: Console
 ) -> None:
     """Say what there is; then raise what ended the recording early."""
-    from r2s2r_cli.commands.stage import show_outcome
+    from r2s2r_cli.commands.outcome import show_outcome
     from r2s2r_cli.views.record_page import report_tables
 
     if ended is None and result is not None:

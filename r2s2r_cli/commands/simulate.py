@@ -80,8 +80,10 @@ def simulate(
 
     Example: r2s2r simulate policies/crawl.toml
     """
+    from r2s2r_cli.commands.outcome import print_config, show_outcome
     from r2s2r_cli.commands.simulate_inputs import Asked
-    from r2s2r_cli.commands.stage import StageRun, print_config, show_outcome, wanted
+    from r2s2r_cli.commands.stage import StageRun
+    from r2s2r_cli.commands.wanted import wanted
     from schemas.results_simulate import SimulateReport
 
     console = Console(json=json, quiet=quiet)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import os
 import sys
 import time
@@ -15,79 +14,20 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 from pydantic import BaseModel
 
+from r2s2r_cli.commands.freshness import same_inputs, stale_inputs
 from r2s2r_cli.commands.interrupts import whole_items
-from r2s2r_cli.console import Console
-from r2s2r_cli.errors import ArtifactError, InputError, R2S2RError, UsageError
+from r2s2r_cli.commands.wanted import wanted
+from r2s2r_cli.errors import InputError, R2S2RError, UsageError
 from r2s2r_cli.store.atomic import sweep, write_bytes
-from r2s2r_cli.store.brief import brief
 from r2s2r_cli.store.header import read_header, sealed_header
 from r2s2r_cli.store.lock import writing
 from r2s2r_cli.store.project import Iteration, Project
-from r2s2r_cli.store.staleness import Wanted, joined, reasons
-from schemas.header import Header, InputRef, Provenance
+from r2s2r_cli.store.staleness import joined, reasons
+from schemas.header import Header, InputRef
 from schemas.results import StageResult
-from schemas.versions import KINDS, STAGE_VERSIONS
 
 if TYPE_CHECKING:
     from r2s2r_cli.artifact import ArtifactData
-    from schemas.robot import Robot
-
-ROBOT_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
-    "import": {"name": (), "rods": ("length_m", "cap_radius_m"), "cables": ("caps", "kind"), "sensors": ("cable",),
-               "rest_caps_m": ()},
-    "calibrate": {"name": (), "rods": ("name", "length_m", "cap_radius_m"), "sensors": ("cable",),
-                  "cables": ("caps", "kind", "rest_length_m"), "pid": (), "limits": ()},
-    "record": {"name": (), "motors": (), "pid": (), "limits": (), "sensors": ("cable", "slope_f_per_m", "offset_f")},
-    "estimate": {"name": (), "rods": ("name", "length_m", "cap_radius_m", "radius_m", "parts"), "colors": (),
-                 "cables": ("caps", "kind"), "sensors": ("cable", "slope_f_per_m", "offset_f"), "rest_caps_m": ()},
-    "compare": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),
-                "sensors": ("cable", "stiffness_n_per_m", "rest_length_m"), "rest_caps_m": ()},
-    "floor": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "contact": (), "sensors": (),
-              "rest_caps_m": ()},
-    "simulate": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),
-                 "sensors": ("cable", "stiffness_n_per_m", "rest_length_m"), "rest_caps_m": ()},
-    "plan": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),
-             "sensors": ("cable", "stiffness_n_per_m", "rest_length_m"), "rest_caps_m": ()},
-    "identify": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),
-                 "sensors": ("cable", "stiffness_n_per_m", "rest_length_m"), "rest_caps_m": ()},
-    "diagnose": {"name": (), "rods": (), "cables": (), "motors": (), "pid": (), "limits": (), "contact": (),
-                 "sensors": (), "rest_caps_m": ()},
-}  # fmt: skip
-"""Which part of robot.toml each stage uses; a change elsewhere does not make its results stale."""
-
-
-MEASURED = ("record", "execute")
-"""Stages whose artifacts are measurements."""
-
-
-def robot_part(stage: str, robot: Robot) -> dict[str, Any]:
-    """The part of the robot description that `stage` uses, as JSON values."""
-    everything = robot.model_dump(mode="json")
-    part: dict[str, Any] = {}
-    for name, keys in ROBOT_PARTS.get(stage, {}).items():
-        value = everything[name]
-        part[name] = [{key: item[key] for key in keys} for item in value] if keys else value
-    return part
-
-
-def wanted(
-    project: Project, iteration: Iteration | None, stage: str, overrides: dict[str, Any], flags: Mapping[str, Any]
-) -> Wanted:
-    """What `stage` would use if it ran now. Raises InputError or UsageError for wrong settings."""
-    config = project.config(iteration, overrides).model_dump(mode="json", by_alias=True)
-    settings = {**config.get(stage, {}), "flags": dict(flags)}
-    return Wanted(STAGE_VERSIONS.get(stage, 1), settings, robot_part(stage, project.robot()))
-
-
-def wanted_again(project: Project, iteration: Iteration | None, made: Provenance) -> Wanted:
-    """What the stage that made an artifact would use now, with the same overrides and flags.
-
-    A measurement does not go stale: what a robot did stays what it did, whatever the settings have become.
-    """
-    if made.stage in MEASURED:
-        return Wanted(made.stage_version, made.settings, made.robot)
-    return wanted(project, iteration, made.stage, made.overrides, made.settings.get("flags", {}))
-
 
 Report = TypeVar("Report", bound=BaseModel)
 Drawings = Iterable[tuple[str, bytes]]
@@ -257,85 +197,3 @@ class StageRun(Generic[Report]):
             content_sha256=header.content_sha256 if header else None, inputs=tuple(ref.path for ref in self.inputs),
             drawings=tuple(drawings), report=report.model_dump(mode="json") if report else None,
         )  # fmt: skip
-
-
-def identity(ref: InputRef) -> tuple[str, str]:
-    """What makes two inputs the same wherever they lie: file name (it names the run) and content."""
-    if ref.kind in KINDS:
-        return ref.path, ""  # `reasons` compares its content, through its migrations
-    return Path(ref.path).name, ref.sha256
-
-
-def same_inputs(recorded: Sequence[InputRef], asked: Sequence[InputRef]) -> bool:
-    """Whether both name the same inputs, each by its path (its content is compared elsewhere) or its identity."""
-    pairs = [(one, two) for one in recorded for two in asked if one.path == two.path or identity(one) == identity(two)]
-    matched = ({one.path for one, _ in pairs}, {two.path for _, two in pairs})
-    return matched == ({ref.path for ref in recorded}, {ref.path for ref in asked})
-
-
-def own_reasons(project: Project, iteration: Iteration | None, header: Header) -> list[str]:
-    """Why an artifact is stale by itself, asked for again as it was made."""
-    made = header.provenance
-    return [*reasons(project, header, wanted_again(project, iteration, made)), *joined(project, iteration, made)]
-
-
-def stale_inputs(project: Project, inputs: Sequence[InputRef]) -> list[str]:
-    """Which inputs are stale, by themselves or through inputs of their own: what was made of them is, then, of old."""
-    places = {place.path: place for place in project.iterations()}
-
-    @functools.cache
-    def stale(name: str) -> bool:
-        path = project.root / name
-        try:
-            header = read_header(path)
-            own = own_reasons(project, places.get(path.parent), header)
-        except R2S2RError:
-            return True  # damaged, or gone: nothing fresh
-        return bool(own) or any(stale(ref.path) for ref in header.provenance.inputs if ref.kind in KINDS)
-
-    return [f"its input {ref.path} is stale itself" for ref in inputs if ref.kind in KINDS and stale(ref.path)]
-
-
-def show_outcome(result: StageResult, console: Console) -> None:
-    """Say on stderr what became of the artifact; with --json print the document."""
-    console.document(result)
-    words = {
-        "done": f"wrote {result.artifact}",
-        "fresh": f"{result.artifact} is fresh, nothing to do",
-        "dry_run": f"would write {result.artifact}",
-    }
-    console.say(words[result.state])
-    for reason in brief(result.reasons):
-        console.say(f"  {'but' if result.state == 'fresh' else 'because'} {reason}")
-    if result.state == "fresh" and result.reasons:
-        console.hint("r2s2r status")
-    for path in result.drawings:
-        console.say(f"  drew {path}")
-    if result.state == "dry_run":
-        for path in result.inputs:
-            console.say(f"  from {path}")
-
-
-def require_input(path: Path, command: str) -> None:
-    """Raises ArtifactError where the stage before has not run."""
-    if not path.exists():
-        raise ArtifactError(
-            "the artifact of the stage before is missing",
-            where=str(path),
-            expected=path.name,
-            received="nothing",
-            hint=command,
-        )
-
-
-def print_config(stage: str, settings: Mapping[str, Any], console: Console) -> None:
-    """The effective settings on stdout, as a section of project.toml, or JSON with --json."""
-    section = {key: value for key, value in settings.items() if key != "flags"}
-    if console.json:
-        import json
-
-        console.raw(json.dumps(section, indent=2))
-        return
-    import tomlkit
-
-    console.raw(tomlkit.dumps({stage: section}).rstrip())

@@ -147,7 +147,7 @@ def _reasons(
     project: Project, iteration: Iteration | None, header: Header, stale: set[str]
 ) -> tuple[list[str], list[str]]:
     """Why an artifact is stale: by itself, and through inputs that are."""
-    from r2s2r_cli.commands.stage import own_reasons
+    from r2s2r_cli.commands.freshness import own_reasons
 
     upstream = [ref.path for ref in header.provenance.inputs if ref.path in stale]
     return own_reasons(project, iteration, header), [f"input {path} is stale itself" for path in upstream]
@@ -205,7 +205,7 @@ def _planned(project: Project, place: Iteration, kinds: Sequence[str]) -> str:
 
 def _moved_by_us(project: Project) -> bool:
     """Whether any run of the project was recorded here: a robot can be asked for more, a log cannot."""
-    from r2s2r_cli.commands.stage import MEASURED
+    from r2s2r_cli.commands.wanted import MEASURED
 
     places = project.iterations()
     found = [place.artifact("recording", executed=executed) for place in places for executed in (False, True)]

@@ -62,7 +62,7 @@ def test_an_estimate_that_is_gone_is_not_looked_into(looped: Project) -> None:
 
 def test_numbers_of_another_robot_or_version_are_refused(looped: Project) -> None:
     """Exit code 4, what differs, and the command that mends it."""
-    from r2s2r_cli.commands.stage import robot_part
+    from r2s2r_cli.commands.wanted import robot_part
 
     path = looped.root / "iterations" / "001" / "30-identify.h5"
     part = robot_part("identify", looped.robot())
@@ -81,7 +81,7 @@ def test_numbers_of_another_robot_or_version_are_refused(looped: Project) -> Non
 
 def test_changed_inputs_are_told_and_do_not_stop_it(looped: Project) -> None:
     """Another estimate since does not make it another simulator; of another project nothing can be said."""
-    from r2s2r_cli.commands.stage import robot_part
+    from r2s2r_cli.commands.wanted import robot_part
 
     part = robot_part("identify", looped.robot())
     one = header(looped.root, "iterations/001/20-estimate.h5", robot=part)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from r2s2r_cli.artifact import ArtifactData
-from r2s2r_cli.commands.stage import wanted
+from r2s2r_cli.commands.wanted import wanted
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.staleness import artifact_ref

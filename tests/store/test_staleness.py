@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from r2s2r_cli.commands.stage import wanted
+from r2s2r_cli.commands.wanted import wanted
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.init.robots import robot_toml
 from r2s2r_cli.store.header import read_header

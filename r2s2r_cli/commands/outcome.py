@@ -1,0 +1,57 @@
+"""What stage commands say: what became of an artifact, their settings, and that the stage before has not run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from r2s2r_cli.console import Console
+from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.store.brief import brief
+from schemas.results import StageResult
+
+
+def show_outcome(result: StageResult, console: Console) -> None:
+    """Say on stderr what became of the artifact; with --json print the document."""
+    console.document(result)
+    words = {
+        "done": f"wrote {result.artifact}",
+        "fresh": f"{result.artifact} is fresh, nothing to do",
+        "dry_run": f"would write {result.artifact}",
+    }
+    console.say(words[result.state])
+    for reason in brief(result.reasons):
+        console.say(f"  {'but' if result.state == 'fresh' else 'because'} {reason}")
+    if result.state == "fresh" and result.reasons:
+        console.hint("r2s2r status")
+    for path in result.drawings:
+        console.say(f"  drew {path}")
+    if result.state == "dry_run":
+        for path in result.inputs:
+            console.say(f"  from {path}")
+
+
+def require_input(path: Path, command: str) -> None:
+    """Raises ArtifactError where the stage before has not run."""
+    if not path.exists():
+        raise ArtifactError(
+            "the artifact of the stage before is missing",
+            where=str(path),
+            expected=path.name,
+            received="nothing",
+            hint=command,
+        )
+
+
+def print_config(stage: str, settings: Mapping[str, Any], console: Console) -> None:
+    """The effective settings on stdout, as a section of project.toml, or JSON with --json."""
+    section = {key: value for key, value in settings.items() if key != "flags"}
+    if console.json:
+        import json
+
+        console.raw(json.dumps(section, indent=2))
+        return
+    import tomlkit
+
+    console.raw(tomlkit.dumps({stage: section}).rstrip())

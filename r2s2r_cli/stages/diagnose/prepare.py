@@ -23,7 +23,7 @@ from r2s2r_cli.stages.measures.steps import steps_of
 
 NUMERICS_M = 3e-3
 """[m] What two good engines differ by at the end of a step of this robot, beside noise (tier B without an effect)."""
-FLOORS_M = (0.4e-3, 0.8e-3, 1.6e-3, 3.2e-3, 6.4e-3, 13e-3)
+FLOORS_M = (0.8e-3, 1.6e-3, 3.2e-3, 6.4e-3, 13e-3)
 """Floors that healthy runs are tried with."""
 NOISES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
 LASTING = (0.0, 0.1, 0.3)

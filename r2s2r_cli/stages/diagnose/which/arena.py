@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from r2s2r_cli.stages.diagnose.which.mixture import density
+from r2s2r_cli.stages.diagnose.which.mixture import density, minus_log
 from r2s2r_cli.stages.diagnose.which.replay import Replayer, Seen
 from r2s2r_cli.stages.diagnose.which.shifts import CAMERA, Shifts, camera_columns
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch, begun_at
@@ -117,7 +117,7 @@ class Arena:
         root = vector * np.sqrt(np.maximum(value, 0.0))
         points = np.repeat(z[None], DRAWS, axis=0)
         points[:, :p] = np.clip(z[:p] + rng.standard_normal((DRAWS, p)) @ root.T, self.lower[:p], self.upper[:p])
-        by = [rng.standard_normal((DRAWS, len(own))) for own in sd]
+        by = [rng.standard_normal((DRAWS, len(white.kinds[0].known))) @ white.kinds[0].known for white in self.white]
         far = [one * own for one, own in zip(by, sd, strict=True)]
         there = self.replayer.around(self.many, self.values(points), far)
         found = []
@@ -188,17 +188,40 @@ class Arena:
             ]
         return [self._clipped(one) for one in found]
 
+    def settled(self, values: np.ndarray, z: np.ndarray, only: Sequence[int], away: np.ndarray) -> np.ndarray:
+        """As `residuals`, of every stretch and row the better of two: from `away`, and from where it then most likely
+        began."""
+        wanted = away.copy()
+        white = []
+        for at in (away, wanted):
+            raw = self.raw(values, z, only, at)
+            white.append([[kind.white(one) for kind in self.white[k].kinds] for k, one in zip(only, raw, strict=True)])
+            if at is away:
+                for k, one in zip(only, raw, strict=True):
+                    wanted[:, k] = [self._likely_start(k, row) for row in one]
+        found = np.zeros((len(values), self.by_nuisance.shape[0]))
+        for k, first, second in zip(only, *white, strict=True):
+            own = self.white[k]
+            costs = np.array([
+                minus_log(np.stack([np.sum(one**2, axis=1) for one in kinds], axis=1), own.logdet, np.array(own.size))
+                for kinds in (first, second)
+            ])  # fmt: skip
+            better = (costs[1] < costs[0])[:, None]
+            for kind, one, other in zip(own.kinds, first, second, strict=True):
+                found[:, kind.rows] = np.where(better, other, one)
+        return found
+
     def likely_starts(self, raw: Sequence[np.ndarray]) -> np.ndarray:
         """Where stretches most likely begin that leave residuals raw, of every stretch (channel, F): in sd from the
         starts, (stretch, offset)."""
-        found = np.zeros((len(self.many), len(self._by_start[0])))
-        for k, one in enumerate(raw):
-            own = self.white[k].kinds
-            rooted = [kind.rooted(one[None])[0] for kind in own]
-            squares = [np.sum(kind.off_start(r) ** 2) for kind, r in zip(own, rooted, strict=True)]
-            i = int(np.argmin(np.array(squares) + self.white[k].logdet))
-            found[k] = np.clip(own[i].start(rooted[i])[: found.shape[1]], -MOST_SD, MOST_SD) - self._settled[k]
-        return found
+        return np.array([self._likely_start(k, one) for k, one in enumerate(raw)])
+
+    def _likely_start(self, k: int, raw: np.ndarray) -> np.ndarray:
+        kinds = self.white[k].kinds
+        rooted = [kind.rooted(raw[None])[0] for kind in kinds]
+        squares = [np.sum(kind.off_start(r) ** 2) for kind, r in zip(kinds, rooted, strict=True)]
+        i = int(np.argmin(np.array(squares) + self.white[k].logdet))
+        return np.clip(kinds[i].start(rooted[i])[: self.away.shape[1]], -MOST_SD, MOST_SD) - self._settled[k]
 
     def keys(self, values: np.ndarray, z: np.ndarray, only: Sequence[int] | None = None) -> np.ndarray:
         """Simulated minus observed caps [m] at the ends of whole target intervals, the key frames, (k, interval, cap,

@@ -63,9 +63,20 @@ class Fits:
         self, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]], away: Sequence[np.ndarray] | None = None
     ) -> list[Fit]:  # fmt: skip
         """Fits at points (hypothesis, z, x), whose stretches begin `away` (`Fit.away`), as the arena says if None."""
+        if not points:
+            return []
         own = [self.arena.away] * len(points) if away is None else list(away)
         raw = self._raw(points, own)
         return [self.begin(h, z, x, [one[i] for one in raw], own[i]) for i, (h, z, x) in enumerate(points)]
+
+    def costs(
+        self, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]], away: Sequence[np.ndarray]
+    ) -> np.ndarray:  # fmt: skip
+        """At points as of `begun`, (point,)."""
+        white = whitened(self.arena.white, self._raw(points, away))
+        return np.array([
+            self.cost(h, z[None], x[None], white[i : i + 1])[0] for i, (h, z, x) in enumerate(points)
+        ])  # fmt: skip
 
     def overruled(self, hypothesis: Hypothesis) -> list[int]:
         """Places in z of nuisances that are the hypothesis's own numbers: it sets them, whatever z says."""

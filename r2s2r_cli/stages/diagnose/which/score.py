@@ -108,7 +108,7 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: b
             for fit, (by, pull, H, gradient) in zip(fits, normals, strict=True)
         ]
         values, z = _at(solver, fits, [one.points for one in left])
-        white = arena.residuals(values, z, own.tolist(), away).reshape(n, DRAWS, -1)
+        white = arena.settled(values, z, own.tolist(), away).reshape(n, DRAWS, -1)
         first = slice(None, None, DRAWS)
         key[:, ends] = arena.keys(values[first], z[first], ends.tolist())
         for i, (fit, one) in enumerate(zip(fits, left, strict=True)):

@@ -8,8 +8,8 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.candidates import Candidate
-from r2s2r_cli.stages.diagnose.which.fit import Fits
-from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
+from r2s2r_cli.stages.diagnose.which.fit import LEAST_GAIN, Fits
+from r2s2r_cli.stages.diagnose.which.hypothesis import DAMPING, Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.screen import Response
 
 WIDE = 32
@@ -18,8 +18,10 @@ TWICE = 16
 """Of them, from two starts."""
 ELEMENTS = 2
 """Of an effect, at most."""
-ROUNDS = ((1, 14), (3, 10), (4, 10))
+ROUNDS = ((1, 14), (3, 8))
 """Iterations, and fits that go on after them."""
+LAST = 6
+"""Iterations of those that are left."""
 SUSPECTED, LEAST_SAID = 3, 2.0
 """Effects that are fitted because the parity stage speaks for them, with so many nats at least."""
 PAIRED = 5
@@ -64,15 +66,34 @@ def fitted(arena: Arena, base: Fit, picked: Sequence[Response], told_by: Said, t
     points += [(Hypothesis((one.candidate,)), was, one.tried) for one in picked[:TWICE]]
     points += [(Hypothesis((own,)), was, own.tries[0]) for own in _said(picked, told_by)]
     nominal, *going = fits.begun(points)
-    told("fits", 0, len(ROUNDS))
+    told("fits", 0, len(ROUNDS) + 1)
     fits.settle([nominal, *going])
     for number, (iterations, kept) in enumerate(ROUNDS):
-        for fit in (nominal, *going):
-            fit.ended = False
         fits.run([nominal, *going], iterations=iterations)
         going = _kept(_best_of(going), told_by, kept)
-        told("fits", number + 1, len(ROUNDS))
-    return nominal, going
+        nominal, *going = _exchanged(fits, [nominal, *going])
+        told("fits", number + 1, len(ROUNDS) + 1)
+    fits.run([nominal, *going], iterations=LAST)
+    told("fits", len(ROUNDS) + 1, len(ROUNDS) + 1)
+    return nominal, _best_of(going)
+
+
+def _exchanged(fits: Fits, found: Sequence[Fit]) -> list[Fit]:
+    """The fits, each with the nuisances and starts of whichever of them serves it best. Costs are rough: one that has
+    found a better place shows it to the others, the refit nominal model above all, else everything gains against it."""
+    points = [(one.hypothesis, other.z, one.x) for one in found for other in found]
+    away = [other.away for _ in found for other in found]
+    costs = fits.costs(points, away).reshape(len(found), len(found))
+    costs[np.diag_indices(len(found))] = [one.cost for one in found]
+    best = costs.argmin(axis=1)
+    moved = [i for i, one in enumerate(found) if costs[i, best[i]] < one.cost - LEAST_GAIN]
+    begun = fits.begun([points[i * len(found) + best[i]] for i in moved], [found[best[i]].away for i in moved])
+    new = dict(zip(moved, begun, strict=True))
+    for one in (*found, *begun):
+        one.ended, one.damping = False, DAMPING
+    for i, one in new.items():
+        one.start = found[i].start
+    return [new.get(i, one) for i, one in enumerate(found)]
 
 
 def _said(picked: Sequence[Response], told_by: Said) -> list[Candidate]:

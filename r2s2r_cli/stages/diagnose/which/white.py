@@ -28,7 +28,8 @@ FLOOR_S = 1.0
 class Kind:
     """Residuals white under one kind of error. roots (channel, F, F): inverse Cholesky factors of noise and floor; U
     (channel F, offset), shrink (offset,): what is taken off along the offsets of the start. rows: their place among all
-    white residuals; logdet: of the covariance. to_start (offset, channel F): from rooted residuals to the offsets."""
+    white residuals; logdet: of the covariance. to_start (offset, channel F): from rooted residuals to the offsets;
+    known (offset, offset): root of their covariance once the residuals are seen."""
 
     roots: np.ndarray
     U: np.ndarray
@@ -36,6 +37,7 @@ class Kind:
     rows: slice
     logdet: float
     to_start: np.ndarray
+    known: np.ndarray
 
     def rooted(self, residual: np.ndarray) -> np.ndarray:
         """(k, channel, F) -> (k, channel F), white but for the start."""
@@ -99,7 +101,8 @@ def whites(
             logdet = float(np.log1p(square).sum() - 2.0 * np.log(np.diagonal(roots, axis1=1, axis2=2)).sum())
             first = c * total + begin
             to_start = (W / (1.0 + square)) @ W.T @ V
-            kinds.append(Kind(roots, U, shrink, slice(first, first + count), logdet, to_start))
+            known = (W / np.sqrt(1.0 + square)) @ W.T
+            kinds.append(Kind(roots, U, shrink, slice(first, first + count), logdet, to_start, known))
         found.append(White(tuple(kinds), size))
         begin += count
     return tuple(found)

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.candidates import Candidate
-from r2s2r_cli.stages.diagnose.which.mixture import FACTORS
+from r2s2r_cli.stages.diagnose.which.mixture import FACTORS, minus_log
 from r2s2r_cli.stages.diagnose.which.white import Kind, White, whitened
 
 STRETCHES, EACH = 6, 60
@@ -69,6 +69,15 @@ class LinearArena:
         """White under each kind, (k, kind M)."""
         return whitened(self.white, self.raw(values, z, only, away))
 
+    def settled(self, values: np.ndarray, z: np.ndarray, only: object, away: np.ndarray) -> np.ndarray:
+        """As `Arena`: of each stretch the better of two starts."""
+        raw = self.raw(values, z, None, away)
+        wanted = np.array([self.likely_starts([one[i] for one in raw]) for i in range(len(values))])
+        both = [self.residuals(values, z, None, at) for at in (away, wanted)]
+        costs = [minus_log(self.squares(one), self.logdets, self.sizes) for one in both]
+        rows = np.array([self.by_row(one) for one in costs[1] < costs[0]])
+        return np.where(rows, both[1], both[0])
+
     def likely_starts(self, raw: Sequence[np.ndarray]) -> np.ndarray:
         """As `Arena`, of the first kind."""
         return np.array([white.kinds[0].start(white.kinds[0].rooted(one[None])[0])
@@ -99,7 +108,7 @@ def _kind(factor: float, rows: slice, C: np.ndarray) -> Kind:
     return Kind(
         roots=np.eye(EACH)[None] / factor, U=V.T / np.sqrt(square), shrink=1.0 - 1.0 / np.sqrt(1.0 + square), rows=rows,
         logdet=2 * EACH * float(np.log(factor)) + float(np.log1p(square).sum()),
-        to_start=V / (1.0 + square)[:, None],
+        to_start=V / (1.0 + square)[:, None], known=np.diag(1.0 / np.sqrt(1.0 + square)),
     )  # fmt: skip
 
 

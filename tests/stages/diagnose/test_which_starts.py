@@ -7,6 +7,7 @@ import pytest
 
 from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
+from r2s2r_cli.stages.diagnose.which.search import exchanged
 from tests.support.linear_arena import EACH, STRETCHES, LinearArena, candidate
 
 RIGHT = Hypothesis((candidate("right", 0),))
@@ -68,3 +69,20 @@ def test_settling_never_costs_anything(bend: float) -> None:
             again = arena.residuals(values, fit.z[None], away=fit.away[None])
             assert again[0] == pytest.approx(fit.residual, abs=1e-9)
             assert solver.cost(fit.hypothesis, fit.z[None], fit.x[None], again)[0] == pytest.approx(fit.cost, abs=1e-6)
+
+
+def test_who_stands_badly_is_shown_where_the_others_stand() -> None:
+    """The refit nominal model far from where it belongs, an effect near: both end near, nobody worse than before, and
+    each keeps its own numbers of the effect."""
+    arena = begun_away(truth=0.0, bend=0.25)
+    solver = Fits(arena)  # type: ignore[arg-type]
+    lost, found = solver.begun(
+        [(Hypothesis(), np.array([4.0, -4.0]), np.zeros(0)), (RIGHT, np.array([0.3, -0.2]), np.array([0.1]))]
+    )
+    solver.settle([found])
+    before = lost.cost, found.cost
+    lost, found = exchanged(solver, [lost, found])
+    assert lost.cost < before[0] - 50 and found.cost <= before[1]
+    assert lost.z == pytest.approx([0.3, -0.2]) and lost.away == pytest.approx(found.away)
+    assert len(lost.x) == 0 and found.x == pytest.approx([0.1])
+    assert not lost.ended

@@ -74,3 +74,14 @@ def test_the_likely_start_is_the_posterior_mean(both: Any) -> None:
     wanted = -by.reshape(OFFSETS, -1) @ np.linalg.solve(covariance(one, by, 1.0, lasts), residual.ravel())
     kind = white.kinds[0]
     assert kind.start(kind.rooted(residual)[0]) == pytest.approx(wanted, abs=1e-6)
+
+
+def test_what_is_known_of_the_start_is_its_posterior(both: Any) -> None:
+    """Covariance of the offsets once the residuals are seen: 1 - B S^-1 B', never more than before."""
+    white, one, by, lasts = both
+    B = by.reshape(OFFSETS, -1)
+    root = white.kinds[0].known
+    assert root @ root.T == pytest.approx(
+        np.eye(OFFSETS) - B @ np.linalg.solve(covariance(one, by, 1.0, lasts), B.T), abs=1e-6
+    )
+    assert root[-1, -1] == pytest.approx(1.0, abs=1e-6)

@@ -71,14 +71,14 @@ def fitted(arena: Arena, base: Fit, picked: Sequence[Response], told_by: Said, t
     for number, (iterations, kept) in enumerate(ROUNDS):
         fits.run([nominal, *going], iterations=iterations)
         going = _kept(_best_of(going), told_by, kept)
-        nominal, *going = _exchanged(fits, [nominal, *going])
+        nominal, *going = exchanged(fits, [nominal, *going])
         told("fits", number + 1, len(ROUNDS) + 1)
     fits.run([nominal, *going], iterations=LAST)
     told("fits", len(ROUNDS) + 1, len(ROUNDS) + 1)
     return nominal, _best_of(going)
 
 
-def _exchanged(fits: Fits, found: Sequence[Fit]) -> list[Fit]:
+def exchanged(fits: Fits, found: Sequence[Fit]) -> list[Fit]:
     """The fits, each with the nuisances and starts of whichever of them serves it best. Costs are rough: one that has
     found a better place shows it to the others, the refit nominal model above all, else everything gains against it."""
     points = [(one.hypothesis, other.z, one.x) for one in found for other in found]

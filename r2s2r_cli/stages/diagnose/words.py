@@ -58,9 +58,10 @@ def _shrunk(found: Diagnosis) -> str:
     if much is None or much.rmse("refit") is None or much.rmse("effect") is None:
         return ""
     names = " and ".join(much.effects)
-    if found.which.verdict in ("ambiguous", "unknown"):
-        names = f"the best of them, {names},"
     before, after = 1e3 * (much.rmse("refit") or 0.0), 1e3 * (much.rmse("effect") or 0.0)
+    shrinks = much.share is not None and after < before
+    if found.which.verdict in ("ambiguous", "unknown"):
+        names = f"the {'best' if shrinks else 'first'} of them, {names},"
     count = len(much.names)
     held = f" On {count} held-out interval{'s' * (count != 1)}{' of the same run' if much.within_run else ''}"
     text = (
@@ -68,6 +69,10 @@ def _shrunk(found: Diagnosis) -> str:
     )
     if much.share is None:
         return text + ": the refit error is at the floor, so there is no share to speak of."
+    if not shrinks:
+        was = much.rmse("nominal")
+        beside = "" if was is None or 1e3 * was >= after else f"; as identified it is {1e3 * was:.1f} mm"
+        return f"{text}: it closes none of the gap{beside}."
     wide = "" if much.ci90 is None else f" ({round(100 * much.ci90[0])} .. {round(100 * much.ci90[1])})"
     told = "" if much.predicted is None else f"; predicted {round(100 * much.predicted)} %"
     return text + f", which closes {round(100 * much.share)} %{wide} of the gap above the floor{told}."

@@ -67,3 +67,15 @@ def test_at_the_floor_there_is_no_share() -> None:
     said = sentence(one)  # type: ignore[arg-type]
     assert "of the same run payload takes" in said
     assert said.endswith("the refit error is at the floor, so there is no share to speak of.")
+
+
+@pytest.mark.parametrize(
+    ("nominal", "ends"), [(0.011, "none of the gap; as identified it is 11.0 mm."), (0.02, "closes none of the gap.")]
+)
+def test_what_shrinks_nothing_is_not_praised(nominal: float, ends: str) -> None:
+    """A first name that makes held-out intervals no better is no best one, and what was identified before may be."""
+    one = found("ambiguous")
+    one.much.share, one.much.rmse = -0.1, {"nominal": nominal, "refit": 0.012, "effect": 0.0125}.get
+    said = sentence(one)  # type: ignore[arg-type]
+    assert "the first of them, payload, takes the key-frame error from 12.0 to 12.5 mm" in said
+    assert "best of them" not in said and said.endswith(ends)

@@ -20,6 +20,9 @@ from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.selection import complete, default_split, in_words
 from schemas.robot import Robot
 
+LOST_M = 0.05
+"""Sd from which on a filter that knows no later frame knows nothing of a cap."""
+
 
 @dataclass(frozen=True)
 class Run:
@@ -40,13 +43,19 @@ class Run:
 
     @cached_property
     def known(self) -> Known:
-        """Its caps at every frame, from it and those before."""
+        """Its caps at every frame, from it and those before; a cap that was not seen for so long that it may be anywhere
+        is where the estimate has it."""
         caps = self.caps
         row = np.clip(np.searchsorted(caps.t_command, caps.t, side="right") - 1, 0, len(caps.t_command) - 1)
         ways = np.sign(np.nan_to_num(caps.control[row]))
         changes = np.flatnonzero(np.any(np.diff(ways, axis=0) != 0, axis=1))
         noise = caps.noise if caps.observed_sd is None else caps.observed_sd
-        return known(caps.t, caps.observed, noise, caps.quality, changes)
+        found = known(caps.t, caps.observed, noise, caps.quality, changes)
+        lost = found.sd_p > LOST_M
+        return Known(
+            np.where(lost, caps.p_WE, found.p_WE), np.where(lost, caps.v_WE, found.v_WE),
+            np.where(lost, np.minimum(caps.sd_p, LOST_M), found.sd_p), np.where(lost, caps.sd_v, found.sd_v),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

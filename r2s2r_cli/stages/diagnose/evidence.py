@@ -43,8 +43,8 @@ class Run:
 
     @cached_property
     def known(self) -> Known:
-        """Its caps at every frame, from it and those before; a cap that was not seen for so long that it may be anywhere
-        is where the estimate has it."""
+        """Its caps at every frame, from it and those before; a cap that was not seen for so long that it may be
+        anywhere is where the estimate has it."""
         caps = self.caps
         row = np.clip(np.searchsorted(caps.t_command, caps.t, side="right") - 1, 0, len(caps.t_command) - 1)
         ways = np.sign(np.nan_to_num(caps.control[row]))

@@ -11,6 +11,7 @@ import pytest
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run, require_enough
 from r2s2r_cli.stages.diagnose.prepare import floor_for
+from r2s2r_cli.stages.estimate.smooth import MISSING
 from r2s2r_cli.stages.identified import nominal
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.segments import Intervals, Segments
@@ -51,6 +52,23 @@ def test_a_split_through_a_run_is_marked() -> None:
     assert not two.within_run
     assert [run.name for run in two.only(two.judge)] == ["b"]
     require_enough(two)
+
+
+def test_a_cap_that_was_never_seen_is_where_the_estimate_has_it() -> None:
+    """Hidden for the first 15 frames: until it is seen a filter that knows nothing later would have it anywhere. From
+    then on it is where it is seen, and so are the others all along."""
+    one = run_data()
+    rng = np.random.default_rng(0)
+    seen = rng.uniform(-0.2, 0.2, (6, 3)) + 1e-3 * rng.standard_normal((FRAMES, 6, 3))
+    quality = one.quality.copy()
+    quality[:15, 4] = MISSING
+    inferred, sd = seen + 0.03, np.full(seen.shape, 0.02)
+    observed = np.where(quality[..., None] == MISSING, 9.0, seen)
+    known = Run(replace(one, observed=observed, quality=quality, p_WE=inferred, sd_p=sd, sd_v=sd)).known
+    assert known.p_WE[:15, 4] == pytest.approx(inferred[:15, 4]) and known.sd_p[:15, 4] == pytest.approx(0.02)
+    assert known.p_WE[20:, 4] == pytest.approx(seen[20:, 4], abs=4e-3)
+    assert known.p_WE[:, 0] == pytest.approx(seen[:, 0], abs=4e-3) and (known.sd_p[:, 0] < 2e-3).all()
+    assert np.isfinite(known.v_WE).all() and np.isfinite(known.sd_v).all()
 
 
 def test_too_little_is_refused() -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.estimate.causal import Known, known
+from r2s2r_cli.stages.estimate.smooth import switched
 from r2s2r_cli.stages.floor.runs import SensedRun
 from r2s2r_cli.stages.identified import Identified
 from r2s2r_cli.stages.identify.data import RunData, Selection
@@ -47,10 +48,8 @@ class Run:
         anywhere is where the estimate has it."""
         caps = self.caps
         row = np.clip(np.searchsorted(caps.t_command, caps.t, side="right") - 1, 0, len(caps.t_command) - 1)
-        ways = np.sign(np.nan_to_num(caps.control[row]))
-        changes = np.flatnonzero(np.any(np.diff(ways, axis=0) != 0, axis=1))
         noise = caps.noise if caps.observed_sd is None else caps.observed_sd
-        found = known(caps.t, caps.observed, noise, caps.quality, changes)
+        found = known(caps.t, caps.observed, noise, caps.quality, switched(caps.control[row]))
         lost = found.sd_p > LOST_M
         return Known(
             np.where(lost, caps.p_WE, found.p_WE), np.where(lost, caps.v_WE, found.v_WE),

@@ -29,6 +29,7 @@ NOISES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
 LASTING = (0.0, 0.1, 0.3)
 """[s] Times that errors of the caps may last."""
 NEAR = (0.7, 1.0, 1.4)
+"""Factors on the floor and the noise, where something is known of them."""
 FLOOR_SPREAD = 0.5
 """Of the logarithm of the floor, before healthy runs are looked at: noisy ones say little of it."""
 ROUNDS = 2

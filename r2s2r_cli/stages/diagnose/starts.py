@@ -89,7 +89,7 @@ def known_at(at: Sequence[tuple[Run, int]], carried: State, predictor: Predictor
 
     theta = predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64))
     up = np.array([0.0, 0.0, predictor.mapping.observation(values).ground_height])
-    radius = predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64)).cap_radius.flatten().numpy()
+    radius = theta.cap_radius.flatten().numpy()
     caps = np.array([run.known.p_WE[frame] - up for run, frame in at])
     sd = np.array([run.known.sd_p[frame, :, 2] for run, frame in at])
     caps[..., 2] = np.where(caps[..., 2] < radius + STANDING * sd, radius, caps[..., 2])

@@ -15,7 +15,7 @@ from r2s2r_cli.stages.estimate.lasting import lasting
 from r2s2r_cli.stages.estimate.lengths import SensorLengths, sensor_lengths
 from r2s2r_cli.stages.estimate.noise import observation_noise
 from r2s2r_cli.stages.estimate.rigid import Rods, is_rigid, make_rigid
-from r2s2r_cli.stages.estimate.smooth import MIN_FRAMES, OUTLIER, Tracks, smooth
+from r2s2r_cli.stages.estimate.smooth import MIN_FRAMES, OUTLIER, Tracks, smooth, switched
 from r2s2r_cli.stages.estimate.unseen import Unseen
 from r2s2r_cli.stages.frames import KEPT, fit_rod_length
 from r2s2r_cli.stages.segments import Intervals, Segments, segments, target_intervals
@@ -193,7 +193,7 @@ def switches(streams: dict[str, Group], t: np.ndarray) -> np.ndarray:
     if control is None:
         changed = np.flatnonzero(np.any(np.diff(np.nan_to_num(target, nan=-1.0), axis=0) != 0, axis=1))
         return np.unique(np.clip(np.concatenate([changed, changed + 1]), 0, len(t) - 2))
-    return np.flatnonzero(np.any(np.diff(np.sign(np.nan_to_num(control)), axis=0) != 0, axis=1))
+    return switched(control)
 
 
 def _commanded(streams: dict[str, Group], t: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:

@@ -109,6 +109,11 @@ def smooth(
     return _tracks(fit, state, quality, used, BURSTS * 10.0**density)
 
 
+def switched(control: np.ndarray) -> np.ndarray:
+    """Gaps between frames in which a motor is switched on, off or round. control: at each frame, (frame, actuated)."""
+    return np.flatnonzero(np.any(np.diff(np.sign(np.nan_to_num(control)), axis=0) != 0, axis=1))
+
+
 def whiteness(innovation: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mean square, lag-1 correlation and whether that is 0 within 2 standard deviations; each of shape (cap,).
 

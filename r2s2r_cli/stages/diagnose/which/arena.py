@@ -71,7 +71,7 @@ class Arena:
         found[:, self.engine] = z[:, : len(self.engine)]
         return found
 
-    def prepare(self, z: np.ndarray, *, floor_m: float | None = None, noise: float | None = None) -> None:
+    def prepare(self, z: np.ndarray) -> None:
         """Derivatives at nuisances z (p + q,), and with them what makes residuals white: differences over
         the sd of the starts, secants over a share of the nuisances' prior: contacts make a derivative say little of a
         step."""
@@ -91,10 +91,9 @@ class Arena:
         raw = self.raw(self.values(points), points)
         width = (high - low)[:, None, None]
         self._by_engine = [np.nan_to_num((one[p:] - one[:p]) / width, posinf=0.0, neginf=0.0) for one in raw]
-        self.whiten(floor_m=floor_m, noise=noise)
-        if DRAWS:
-            self._roughen(z, sd, seen)
-            self.whiten()
+        self.whiten()
+        self._roughen(z, sd, seen)
+        self.whiten()
 
     def move_starts(self, away: np.ndarray) -> None:
         """Lets all stretches begin so far (stretch, offset) [sd] away from where they did. What is known of the starts

@@ -53,15 +53,16 @@ class LinearArena:
     def raw(
         self, values: np.ndarray, z: np.ndarray, only: object = None, away: np.ndarray | None = None
     ) -> list[np.ndarray]:  # fmt: skip
-        """By stretch, (k, 1, EACH): of the first starts, along straight lines."""
+        """By stretch, (k, EACH + offset): of the first starts, along straight lines; none is linked to another one."""
         whole = values[:, :2] @ self.A.T + values[:, 2:] @ self.B.T - self.y
         there = np.repeat(self.away[None], len(values), axis=0) if away is None else away
         bent = there**2 - self.began**2
         parts = whole.reshape(len(values), STRETCHES, 1, EACH).transpose(1, 0, 2, 3)
-        return [
+        seen = [
             one - np.einsum("o,ocf->cf", self.began[k], self.C) + np.einsum("ko,ocf->kcf", bent[:, k], self.D)
             for k, one in enumerate(parts)
-        ]  # fmt: skip
+        ]
+        return [np.concatenate([one.reshape(len(values), EACH), 0.0 * there[:, 0]], axis=1) for one in seen]
 
     def residuals(
         self, values: np.ndarray, z: np.ndarray, only: object = None, away: np.ndarray | None = None
@@ -71,21 +72,16 @@ class LinearArena:
 
     def settled(self, values: np.ndarray, z: np.ndarray, only: object, away: np.ndarray) -> np.ndarray:
         """As `Arena`: of each stretch the better of two starts."""
-        raw = self.raw(values, z, None, away)
-        wanted = np.array([self.likely_starts([one[i] for one in raw]) for i in range(len(values))])
+        wanted = self.likely_starts(self.raw(values, z, None, away))
         both = [self.residuals(values, z, None, at) for at in (away, wanted)]
         costs = [minus_log(self.squares(one), self.logdets, self.sizes) for one in both]
-        rows = np.array([self.by_row(one) for one in costs[1] < costs[0]])
+        rows = np.array([np.tile(np.repeat(one, EACH), len(FACTORS)) for one in costs[1] < costs[0]])
         return np.where(rows, both[1], both[0])
 
     def likely_starts(self, raw: Sequence[np.ndarray]) -> np.ndarray:
         """As `Arena`, of the first kind."""
-        return np.array([white.kinds[0].start(white.kinds[0].rooted(one[None])[0])
-                         for white, one in zip(self.white, raw, strict=True)])  # fmt: skip
-
-    def by_row(self, chosen: np.ndarray) -> np.ndarray:
-        """As `Arena`."""
-        return np.tile(np.repeat(chosen, EACH), len(FACTORS))
+        return np.stack([white.kinds[0].start(white.kinds[0].rooted(white.residual(one)))
+                         for white, one in zip(self.white, raw, strict=True)], axis=1)  # fmt: skip
 
     def keys(self, values: np.ndarray, z: np.ndarray, only: Sequence[int]) -> np.ndarray:
         """Key frames of one cap."""

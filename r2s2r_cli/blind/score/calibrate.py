@@ -43,9 +43,15 @@ SHARPNESS = 1.0 / 15.0
 """1 / temperature before anything is learned [1/nats], and the unit in which it is fitted."""
 
 
+BY_CHANCE = 4.0
+"""[nats] That the parity stage says for the best of a whole catalogue where nothing is wrong: less than that says
+nothing, and weighed like more it outdoes gains that are real."""
+
+
 @dataclass(frozen=True)
 class Case:
-    """One set. names: what was ranked; score, parity (n,) [nats]: without the numbers that are learned; equivalent:
+    """One set. names: what was ranked; score, parity (n,) [nats]: without the numbers that are learned, parity beyond
+    BY_CHANCE; equivalent:
     the test found no gap. truth: the right name, not among `names` where the screening had lost it. gap, left [nats]:
     what pieces cost beyond those of healthy runs, under the refit model and under the best effect; 0 where they cost
     less."""
@@ -68,7 +74,7 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
     score = [chance if row["effect"] == NONE else float(row["elpd_gain"]) for row in rows]
     upper, floor = document.get("refit_upper_m"), document["floor_m"]
     equivalent = upper is not None and float(upper) < 1.25 * float(floor)
-    parity = np.array([float(row.get("parity_nats", 0.0)) for row in rows])
+    parity = np.array([max(float(row.get("parity_nats", 0.0)) - BY_CHANCE, 0.0) for row in rows])
     gap, left = (max(float(document.get(key) or 0.0), 0.0) for key in ("gap_nats", "left_nats"))
     names = tuple(row["effect"] for row in rows)
     return Case(names, np.array(score), parity, equivalent, truth.right, gap, left)
@@ -100,6 +106,7 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
     return {
         "temperature": 1.0 / sharp,
         "parity": learned["parity"] / sharp,
+        "by_chance": BY_CHANCE,
         "none": learned["none"] / sharp,
         "equivalent": learned["equivalent"] / sharp,
         "gap": learned["gap"] * SHARPNESS / sharp,

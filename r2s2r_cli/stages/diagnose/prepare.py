@@ -16,6 +16,7 @@ from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.pieces import pieces
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
+from r2s2r_cli.stages.diagnose.which.shake import shaken
 from r2s2r_cli.stages.diagnose.which.stretches import stretches
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.measures.floor import floor_of
@@ -182,7 +183,10 @@ def _fitted(
             if calibrate:
                 _calibrate(arena, z, first=number == 0)
             base = _from(arena, z)
-            Fits(arena).run([base])
+            solver = Fits(arena)
+            solver.run([base])
+            if number == rounds - 1:
+                base = shaken(solver, base)
             z, arena.away = base.z, base.away
         simulator, noise, lasts = arena.floor_m, arena.noise, arena.lasts
     if calibrate:

@@ -63,6 +63,19 @@ def displaced(structure: Structure, s: Tensor, offsets: Tensor) -> Tensor:
     return torch.as_tensor(pack_state(structure, moved))
 
 
+def displacement(structure: Structure, s: Tensor, other: Tensor) -> Tensor:
+    """The offsets (B, offset) that take flat states s (B, NS) to others (B, NS): the inverse of `displaced`."""
+    import roma
+    import torch
+
+    from r2s2r_cli.engine.flat import unpack_state
+
+    a, b = unpack_state(structure, s), unpack_state(structure, other)
+    turn = roma.unitquat_to_rotvec(roma.quat_product(roma.quat_conjugation(a.q_WR), b.q_WR))
+    by = (b.p_WB - a.p_WB, turn, b.v_WB - a.v_WB, b.w_R - a.w_R)
+    return torch.cat([*(part.flatten(1) for part in by), b.rest - a.rest], dim=1)
+
+
 def displacement_jacobian(structure: Structure, s: Tensor, offsets: Tensor) -> Tensor:
     """D displaced / d offsets, (B, NS, offset).
 

@@ -18,9 +18,12 @@ from r2s2r_cli.stages.diagnose.evidence import Run
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.pieces import pieces
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
+from r2s2r_cli.stages.diagnose.which.starting import Starting
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch, begun_at
+from r2s2r_cli.stages.diagnose.which.white import whites
 from r2s2r_cli.stages.identified import nominal
 from r2s2r_cli.stages.identify.data import RunData, Selection
+from r2s2r_cli.stages.identify.offsets import StartSpread
 from r2s2r_cli.stages.model import rest_state
 from r2s2r_cli.stages.segments import Intervals, Segments
 from tests.support.builders import robot
@@ -219,3 +222,41 @@ def test_a_late_camera_shows_what_was(walked: Walked) -> None:
     frames = round(tau / FRAME_S)
     assert seen.caps[1, frames:] == pytest.approx(seen.caps[0, :-frames], abs=1e-3)
     assert np.abs(seen.caps[1] - seen.caps[0]).max() > 3e-3
+
+
+def test_a_piece_is_told_where_the_one_before_ended(walked: Walked) -> None:
+    """In offsets of its own start: small where it was seen right, and what it was seen wrong by otherwise."""
+    made, structure = walked.pieces, walked.replayer.structure
+    starting = Starting(structure, made)
+    assert starting.before == [None, *range(len(made) - 1)]
+    each = starting.tried()
+    starting.learn(walked.replayer.around(made, np.repeat(walked.values[None], len(each[0]), axis=0), each))
+
+    def ended(many: tuple[Stretch, ...]) -> np.ndarray:
+        seen = walked.replayer.seen(many, walked.values[None])
+        return starting.ahead(1, seen[1], seen[0])[0] * made[1].start_sd
+
+    rods = structure.n_rods
+    assert np.abs(ended(made)[: 3 * rods]).max() < 3.5e-3
+    wrong = np.zeros(starting.offsets)
+    wrong[: 3 * rods : 3] = 1e-3  # to the side
+    wrong[3 * rods] = 0.01  # a tilt of the first rod
+    shifted = (made[0], begun_at(structure, made[1], wrong), *made[2:])
+    assert ended(shifted) - ended(made) == pytest.approx(-wrong, abs=2e-4)
+
+
+def test_the_start_of_a_piece_is_known_from_the_frames_before(walked: Walked) -> None:
+    """Under 3 mm of noise better than from where it was seen alone; a run of its own has nothing before it."""
+    spread, values = StartSpread().sd(walked.replayer.structure), walked.values
+    made = tuple(replace(one, start_sd=spread, noise=np.full_like(one.noise, 3e-3)) for one in walked.pieces)
+    starting = Starting(walked.replayer.structure, made)
+    each = starting.tried()
+    starting.learn(walked.replayer.around(made, np.repeat(values[None], len(each[0]), axis=0), each))
+    white = whites(made, starting.by_start, starting.ways, sensors=0, floor_m=1e-4, noise=1.0, lasts=0.0)
+    places = 3 * walked.replayer.structure.n_rods
+    link = white[1].kinds[0].link
+    assert white[0].kinds[0].link is None and link is not None
+    sd = np.sqrt(np.diag(link.root @ link.root.T))[:places]
+    assert sd.mean() < 0.8
+    stranger = (replace(made[0], run="another"), *made[1:])
+    assert Starting(walked.replayer.structure, stranger).before[:2] == [None, None]

@@ -64,8 +64,9 @@ def asked(monkeypatch: pytest.MonkeyPatch, model: Model) -> list[str]:
     def views(self: Replayer, many: Sequence[Stretch], total: np.ndarray) -> list[Seen]:
         self.rollouts += len(many) * len(total)
         rng = [np.random.default_rng([one.order, round(abs(1e6 * float(total.sum())))]) for one in many]
-        return [Seen(r.standard_normal((6, 3, FRAMES, len(total))).T, r.standard_normal((len(total), FRAMES, SENSORS)))
-                for r in rng]  # fmt: skip
+        k = len(total)
+        return [Seen(r.standard_normal((6, 3, FRAMES, k)).T, r.standard_normal((k, FRAMES, SENSORS)),
+                     r.standard_normal((k, 7)), r.standard_normal((k, 7))) for r in rng]  # fmt: skip
 
     def seen(
         self: Replayer, many: Sequence[Stretch], values: np.ndarray, by: Sequence[np.ndarray] | None = None
@@ -100,7 +101,7 @@ def diagnosis(model: Model, kept: Kept) -> tuple[list[np.ndarray], int]:
     replayer = Remembered(model, kept, threads=1)
     many = [stretch(0), stretch(1)]
     values = model.values0[None] + np.arange(3.0)[:, None] / 10
-    found = [part for one in replayer.seen(many, values) for part in (one.caps, one.length)]
+    found = [part for one in replayer.seen(many, values) for part in (one.caps, one.length, one.begin, one.end)]
     found += [one.caps for one in replayer.around(many, values[:1], [np.ones((1, 4)), np.full((1, 4), 0.5)])]
     found.append(pack_state(model.structure, replayer.finals(many, values[1])).numpy())
     found += [one.length for one in replayer.seen(many[1:], values[:1], [np.ones((1, 4))])]
@@ -126,6 +127,7 @@ def test_what_was_done_is_not_done_again(model: Model, asked: list[str], count: 
 OTHERS: dict[str, Any] = {
     "another run": {"run": "crawl"}, "another interval": {"interval": 2}, "a later piece": {"piece": 1},
     "another margin": {"margin": 1e-3}, "cables that are taut": {"taut": np.zeros(6)},
+    "a later end": {"goes_on": 0.1},
 }  # fmt: skip
 
 

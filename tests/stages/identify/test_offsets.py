@@ -8,7 +8,7 @@ from torch import Tensor
 
 from r2s2r_cli.engine import end_caps, pack_state, unpack_state
 from r2s2r_cli.engine.flat import state_slots
-from r2s2r_cli.stages.identify.offsets import StartSpread, count, displaced, displacement_jacobian
+from r2s2r_cli.stages.identify.offsets import StartSpread, count, displaced, displacement, displacement_jacobian
 from tests.support.engine import shaken, threebar_engine
 
 STRUCTURE, THETA, REST = threebar_engine()
@@ -29,6 +29,16 @@ def offsets(batch: int = 4, *, times: float = 1.0) -> Tensor:
 def test_no_offset_is_the_identity() -> None:
     """Zero offsets give the states back."""
     torch.testing.assert_close(displaced(STRUCTURE, states(), 0 * offsets()), states(), rtol=0, atol=1e-15)
+
+
+def test_the_offsets_between_two_states_lead_from_one_to_the_other() -> None:
+    """Also where a quaternion has changed its sign, which is the same turn."""
+    n = offsets(times=2.0)
+    other = displaced(STRUCTURE, states(), n)
+    torch.testing.assert_close(displacement(STRUCTURE, states(), other), n, rtol=0, atol=1e-12)
+    slot = state_slots(STRUCTURE)["q_WR"]
+    other[:, slot.start : slot.start + slot.size] *= -1.0
+    torch.testing.assert_close(displacement(STRUCTURE, states(), other), n, rtol=0, atol=1e-12)
 
 
 def test_quaternions_stay_unit() -> None:

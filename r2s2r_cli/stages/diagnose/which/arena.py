@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from r2s2r_cli.stages.diagnose.which.mixture import density, minus_log
-from r2s2r_cli.stages.diagnose.which.replay import Replayer, Seen
+from r2s2r_cli.stages.diagnose.which.likely import better_of, likely_start
+from r2s2r_cli.stages.diagnose.which.looks import Seen
+from r2s2r_cli.stages.diagnose.which.mixture import density
+from r2s2r_cli.stages.diagnose.which.replay import Replayer
 from r2s2r_cli.stages.diagnose.which.shifts import CAMERA, Shifts, camera_columns
-from r2s2r_cli.stages.diagnose.which.stretches import Stretch, begun_at
-from r2s2r_cli.stages.diagnose.which.white import White, whitened, whites
+from r2s2r_cli.stages.diagnose.which.starting import LOST_M, Starting, clipped
+from r2s2r_cli.stages.diagnose.which.stretches import Stretch
+from r2s2r_cli.stages.diagnose.which.white import White, whitened, whitened_of, whites
 
 SECANT = 0.3
 """Of a nuisance's prior sd, to both sides: over what its derivative is taken."""
 DRAWS = 6
 """Of starts and nuisances together, for what straight lines do not tell of them."""
-MOST_SD = 2.5
-"""How far from where it is known to be a start may be moved, every coordinate in its sd."""
-LOST_M = 0.25
-"""A cap that is simulated so far from where it was is lost, and farther off is not worse."""
 
 
 class Arena:
@@ -58,11 +57,10 @@ class Arena:
         self.gait = np.array([self.gaits.index(one.gait) for one in many])
         self.white: tuple[White, ...] = ()
         self.by_nuisance = np.zeros((0, 0))
-        offsets = next((len(one.start_sd) for one in self.many if one.start_sd is not None), 0)
-        self.away = np.zeros((len(self.many), offsets))
+        starting = Starting(replayer.structure, self.many)
+        self.away = np.zeros((len(self.many), starting.offsets))
         """Where hypotheses begin that do not say, in sd from the starts, (stretch, offset)."""
-        self._settled = np.zeros((len(self.many), offsets))
-        self._by_settled: list[np.ndarray] = [np.zeros((1, 1)) for _ in self.many]
+        self.starting = starting
         self._shifts = [self.shifts.columns(one, None) for one in self.many]
 
     def values(self, z: np.ndarray) -> np.ndarray:
@@ -75,13 +73,10 @@ class Arena:
         """Derivatives at nuisances z (p + q,), and with them what makes residuals white: differences over
         the sd of the starts, secants over a share of the nuisances' prior: contacts make a derivative say little of a
         step."""
-        sd = [one.start_sd for one in self.many if one.start_sd is not None]
-        assert len(sd) == len(self.many)  # noqa: S101 - whole intervals are never prepared, only pieces
-        each = [np.concatenate([np.zeros((1, len(own))), np.diag(own)]) for own in sd]
+        each = self.starting.tried()
         seen = self.replayer.around(self.many, np.repeat(self.values(z[None]), len(each[0]), axis=0), each)
-        self._by_start = [self._responses(one) for one in seen]
-        self._by_offset = self._by_start
-        self._by_settled = [np.einsum("o,ocf->cf", *both) for both in zip(self._settled, self._by_start, strict=True)]
+        self.starting.learn(seen)
+        self._by_offset = self.starting.by_start
         self._shifts = [self.shifts.columns(one, own.length[0]) for one, own in zip(self.many, seen, strict=True)]
         p = len(self.engine)
         by = SECANT * np.array([self.model.numbers[k].sd for k in self.engine])
@@ -89,20 +84,16 @@ class Arena:
         points = np.repeat(z[None], 2 * p, axis=0)
         points[np.arange(p), np.arange(p)], points[p + np.arange(p), np.arange(p)] = low, high
         raw = self.raw(self.values(points), points)
-        width = (high - low)[:, None, None]
+        width = (high - low)[:, None]
         self._by_engine = [np.nan_to_num((one[p:] - one[:p]) / width, posinf=0.0, neginf=0.0) for one in raw]
         self.whiten()
-        self._roughen(z, sd, seen)
+        self._roughen(z, [np.diag(one[1:]) for one in each], seen)
         self.whiten()
 
     def move_starts(self, away: np.ndarray) -> None:
         """Lets all stretches begin so far (stretch, offset) [sd] away from where they did. What is known of the starts
         stays what it was. Derivatives are to be taken anew (`prepare`)."""
-        self._settled = self._settled + away
-        self.many = tuple(
-            begun_at(self.replayer.structure, one, by * one.start_sd) if by.any() else one
-            for one, by in zip(self.many, away, strict=True)
-        )
+        self.many = self.starting.moved(self.many, away)
         self.away = np.zeros_like(away)
 
     def _roughen(self, z: np.ndarray, sd: Sequence[np.ndarray], seen: Sequence[Seen]) -> None:
@@ -116,21 +107,24 @@ class Arena:
         root = vector * np.sqrt(np.maximum(value, 0.0))
         points = np.repeat(z[None], DRAWS, axis=0)
         points[:, :p] = np.clip(z[:p] + rng.standard_normal((DRAWS, p)) @ root.T, self.lower[:p], self.upper[:p])
-        by = [rng.standard_normal((DRAWS, len(white.kinds[0].known))) @ white.kinds[0].known for white in self.white]
+        by = [
+            rng.standard_normal((DRAWS, len(own))) @ white.kinds[0].spread
+            for white, own in zip(self.white, sd, strict=True)
+        ]
         far = [one * own for one, own in zip(by, sd, strict=True)]
         there = self.replayer.around(self.many, self.values(points), far)
-        found = []
+        starting, found = self.starting, []
+        along = [(points[:, :p] - z[:p]) @ one for one in self._by_engine]
         for k, (one, here) in enumerate(zip(there, seen, strict=True)):
-            first = Seen(here.caps[:1], here.length[:1])
-            change = self._clipped(self._residual(k, one, points)) - self._clipped(self._residual(k, first, z[None]))
-            change -= np.einsum("ko,ocf->kcf", by[k], self._by_start[k])
-            change -= np.einsum("kp,pcf->kcf", points[:, :p] - z[:p], self._by_engine[k])
+            first = Seen(here.caps[:1], here.length[:1], here.begin[:1], here.end[:1])
+            change = clipped(self._residual(k, one, points)) - clipped(self._residual(k, first, z[None]))
+            change -= np.einsum("ko,ocf->kcf", by[k], starting.by_start[k]) + self.white[k].residual(along[k])
             found.append(np.clip(change, -LOST_M, LOST_M) / np.sqrt(DRAWS))
-        self._by_offset = [np.concatenate(both) for both in zip(self._by_start, found, strict=True)]
-
-    @staticmethod
-    def _clipped(residual: np.ndarray) -> np.ndarray:
-        return np.clip(np.nan_to_num(residual, nan=LOST_M), -LOST_M, LOST_M)
+        self._by_offset = [np.concatenate(both) for both in zip(starting.by_start, found, strict=True)]
+        for k, j in enumerate(starting.before):
+            if j is not None:
+                ends = starting.ahead(k, there[k], there[j], by[k], by[j]) - starting.ahead(k, seen[k], seen[j])[:1]
+                starting.roughen(k, ends - self.white[k].ahead(along[k]))
 
     def whiten(
         self, *, floor_m: float | None = None, noise: float | None = None, lasts: float | None = None
@@ -141,10 +135,10 @@ class Arena:
         self.noise = self.noise if noise is None else noise
         self.lasts = self.lasts if lasts is None else lasts
         self.white = whites(
-            self.many, self._by_offset, sensors=len(self.sensors), floor_m=self.floor_m, noise=self.noise,
-            lasts=self.lasts,
+            self.many, self._by_offset, self.starting.ways, sensors=len(self.sensors), floor_m=self.floor_m,
+            noise=self.noise, lasts=self.lasts,
         )  # fmt: skip
-        own = [np.concatenate([e, s], axis=0) for e, s in zip(self._by_engine, self._shifts, strict=True)]
+        own = [np.concatenate([e, _flat(s, e.shape[1])]) for e, s in zip(self._by_engine, self._shifts, strict=True)]
         self.by_nuisance = whitened(self.white, own).T  # (M, p + q)
 
     @property
@@ -158,34 +152,47 @@ class Arena:
         """Residuals (k, M), simulated minus observed, white under each kind of error, at values (k, n) of the model,
         with the shifts of z. only: places of the stretches that are simulated, whole intervals; the others' are 0.
         away: as `raw`."""
-        raw = self.raw(values, z, only, away)
         if only is None:
-            return whitened(self.white, raw)
+            return whitened(self.white, self.raw(values, z, None, away))
+        raw = self._with_before(values, z, only, away)
         found = np.zeros((len(values), self.by_nuisance.shape[0]))
-        for k, one in zip(only, raw, strict=True):
-            for kind in self.white[k].kinds:
-                found[:, kind.rows] = kind.white(one)
+        for k in only:
+            for kind, one in zip(self.white[k].kinds, whitened_of(self.white, raw, k), strict=True):
+                found[:, kind.rows] = one
         return found
+
+    def _with_before(
+        self, values: np.ndarray, z: np.ndarray, only: Sequence[int], away: np.ndarray | None
+    ) -> dict[int, np.ndarray]:  # fmt: skip
+        """Raw residuals of the stretches `only` and of those that end where they begin."""
+        wide = sorted({*only, *(j for k in only if (j := self.starting.before[k]) is not None)})
+        return dict(zip(wide, self.raw(values, z, wide, away), strict=True))
 
     def raw(
         self, values: np.ndarray, z: np.ndarray, only: Sequence[int] | None = None, away: np.ndarray | None = None
     ) -> list[np.ndarray]:  # fmt: skip
-        """Residuals as they are, of every stretch (k, channel, F) [m]: caps by axis, then sensors; at most LOST_M.
-        only: places of those that are asked for. away (k, stretch, offset): where each hypothesis begins, in sd from
-        the starts; None: `self.away` for all. Residuals are those of what is known of the starts, along straight lines
-        from where they begin."""
+        """Residuals as they are, of every stretch (k, n): those of the channels [m], caps by axis, then sensors, frame
+        by frame, at most LOST_M; then where the stretch before ends (`Starting.ahead`), 0 where there is none. only:
+        places of those that are asked for. away (k, stretch, offset): where each hypothesis begins, in sd from the
+        starts; None: `self.away` for all. Residuals are those of what is known of the starts, along straight lines from
+        where they begin."""
         only = range(len(self.many)) if only is None else only
         if away is None and self.away.any():
             away = np.repeat(self.away[None], len(values), axis=0)
         by = None if away is None else [away[:, k] * self.many[k].start_sd for k in only]
         seen = self.replayer.seen([self.many[k] for k in only], values, by)
-        found = [self._residual(k, one, z) for k, one in zip(only, seen, strict=True)]
-        if away is not None:
-            found = [
-                one - np.einsum("ko,ocf->kcf", away[:, k], self._by_start[k])
-                for k, one in zip(only, found, strict=True)
-            ]
-        return [self._clipped(one) for one in found]
+        place = {k: i for i, k in enumerate(only)}
+        found = []
+        for k, one in zip(only, seen, strict=True):
+            own, j = self._residual(k, one, z), self.starting.before[k]
+            if away is not None:
+                own = own - np.einsum("ko,ocf->kcf", away[:, k], self.starting.by_start[k])
+            ahead = np.zeros((len(values), self.starting.offsets))
+            if j in place and self.starting.ways[k] is not None:
+                both = (None, None) if away is None else (away[:, k], away[:, j])
+                ahead = self.starting.ahead(k, one, seen[place[j]], *both)
+            found.append(np.concatenate([clipped(own).reshape(len(values), -1), ahead], axis=1))
+        return found
 
     def settled(self, values: np.ndarray, z: np.ndarray, only: Sequence[int], away: np.ndarray) -> np.ndarray:
         """As `residuals`, of every stretch and row the better of two: from `away`, and from where it then most likely
@@ -193,34 +200,25 @@ class Arena:
         wanted = away.copy()
         white = []
         for at in (away, wanted):
-            raw = self.raw(values, z, only, at)
-            white.append([[kind.white(one) for kind in self.white[k].kinds] for k, one in zip(only, raw, strict=True)])
+            raw = self._with_before(values, z, only, at)
+            white.append([whitened_of(self.white, raw, k) for k in only])
             if at is away:
-                for k, one in zip(only, raw, strict=True):
-                    wanted[:, k] = [self._likely_start(k, row) for row in one]
+                for k in only:
+                    wanted[:, k] = self._likely_start(k, raw)
         found = np.zeros((len(values), self.by_nuisance.shape[0]))
         for k, first, second in zip(only, *white, strict=True):
             own = self.white[k]
-            costs = np.array([
-                minus_log(np.stack([np.sum(one**2, axis=1) for one in kinds], axis=1), own.logdet, np.array(own.size))
-                for kinds in (first, second)
-            ])  # fmt: skip
-            better = (costs[1] < costs[0])[:, None]
-            for kind, one, other in zip(own.kinds, first, second, strict=True):
-                found[:, kind.rows] = np.where(better, other, one)
+            for kind, one in zip(own.kinds, better_of(own, first, second), strict=True):
+                found[:, kind.rows] = one
         return found
 
     def likely_starts(self, raw: Sequence[np.ndarray]) -> np.ndarray:
-        """Where stretches most likely begin that leave residuals raw, of every stretch (channel, F): in sd from the
-        starts, (stretch, offset)."""
-        return np.array([self._likely_start(k, one) for k, one in enumerate(raw)])
+        """Where stretches most likely begin that leave raw residuals (k, n) each: in sd from the starts, (k, stretch,
+        offset)."""
+        return np.stack([self._likely_start(k, raw) for k in range(len(self.many))], axis=1)
 
-    def _likely_start(self, k: int, raw: np.ndarray) -> np.ndarray:
-        kinds = self.white[k].kinds
-        rooted = [kind.rooted(raw[None])[0] for kind in kinds]
-        squares = [np.sum(kind.off_start(r) ** 2) for kind, r in zip(kinds, rooted, strict=True)]
-        i = int(np.argmin(np.array(squares) + self.white[k].logdet))
-        return np.clip(kinds[i].start(rooted[i])[: self.away.shape[1]], -MOST_SD, MOST_SD) - self._settled[k]
+    def _likely_start(self, k: int, raw: Sequence[np.ndarray] | Mapping[int, np.ndarray]) -> np.ndarray:
+        return likely_start(self.white, raw, k, self.starting.offsets) - self.starting.settled[k]
 
     def keys(self, values: np.ndarray, z: np.ndarray, only: Sequence[int] | None = None) -> np.ndarray:
         """Simulated minus observed caps [m] at the ends of whole target intervals, the key frames, (k, interval, cap,
@@ -241,14 +239,6 @@ class Arena:
         """Of one hypothesis's residuals under the covariance as it is, (stretch,) [nats]."""
         return -density(self.squares(whitened(self.white, raw))[0], self.logdets)
 
-    def by_row(self, chosen: np.ndarray) -> np.ndarray:
-        """What is said of stretches (stretch,), for each of their residuals (M,)."""
-        kinds = range(len(self.white[0].kinds))
-        return np.concatenate(
-            [np.full(white.kinds[c].rows.stop - white.kinds[c].rows.start, one)
-             for c in kinds for white, one in zip(self.white, chosen.tolist(), strict=True)]
-        )  # fmt: skip
-
     def squares(self, residual: np.ndarray) -> np.ndarray:
         """Sums of squares (k, stretch, kind) of white residuals (k, M)."""
         found = [[np.sum(residual[:, kind.rows] ** 2, axis=1) for kind in white.kinds] for white in self.white]
@@ -267,12 +257,11 @@ class Arena:
                 parts.append(np.where(np.isfinite(one.length)[None], gap, 0.0).transpose(0, 2, 1))
         found = np.concatenate(parts, axis=1)
         shift = z[:, len(self.engine) :]
-        return found + np.einsum("kq,qcf->kcf", shift, self._shifts[k]) - self._by_settled[k]
+        return found + np.einsum("kq,qcf->kcf", shift, self._shifts[k]) - self.starting.by_settled[k]
 
-    def _responses(self, seen: Seen) -> np.ndarray:
-        """What moving a start by one sd changes in all channels, (offset, channel, F), from what was seen without and
-        with each offset."""
-        caps = seen.caps.reshape(*seen.caps.shape[:2], -1)
-        both = np.concatenate([caps, seen.length], axis=-1).transpose(0, 2, 1)
-        by = both[1:] - both[:1]
-        return np.clip(np.nan_to_num(by, nan=LOST_M), -LOST_M, LOST_M)
+
+def _flat(shifts: np.ndarray, size: int) -> np.ndarray:
+    """Shifts (q, channel, F) as raw residuals (q, size): they move no end."""
+    found = np.zeros((len(shifts), size))
+    found[:, : shifts[0].size] = shifts.reshape(len(shifts), -1)
+    return found

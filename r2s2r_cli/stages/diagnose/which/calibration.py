@@ -21,7 +21,8 @@ class Calibration:
     """What turns evidence into probabilities.
 
     temperature [nats]: of the softmax over names. parity: nats of gain that a nat of the parity stage is worth, which
-    needs no simulator and errs far less. none, equivalent [nats]: what `none`
+    needs no simulator and errs far less, beyond by_chance [nats], which it says for the best of a whole catalogue where
+    nothing is wrong. none, equivalent [nats]: what `none`
     gains, and more where the equivalence test finds no gap; gap: what it loses for every nat that the refit model costs
     more than in healthy runs. unknown_share, left: what `unknown` has of what a wider floor gains and of every nat that
     the best effect leaves; unknown [nats]: what that must exceed. bias [nats]: of a name, what its gains are short of.
@@ -33,6 +34,7 @@ class Calibration:
 
     temperature: float = 25.0
     parity: float = 15.0
+    by_chance: float = 0.0
     none: float = 20.0
     equivalent: float = 6.0
     gap: float = 0.0
@@ -59,7 +61,7 @@ class Calibration:
             return gain + self.none + (self.equivalent if equivalent else 0.0) - self.gap * max(beyond, 0.0)
         if name == UNKNOWN:
             return self.unknown_share * gain + self.left * max(beyond, 0.0) - self.unknown
-        return gain + self.parity * parity
+        return gain + self.parity * max(parity - self.by_chance, 0.0)
 
     def absolute(self) -> Calibration:
         """For a diagnosis without healthy runs."""

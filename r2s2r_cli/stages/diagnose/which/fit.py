@@ -51,7 +51,7 @@ class Fits:
     def begin(
         self, hypothesis: Hypothesis, z: np.ndarray, x: np.ndarray, raw: Sequence[np.ndarray], away: np.ndarray
     ) -> Fit:  # fmt: skip
-        """A fit at a point of which the residuals as they are, (channel, F) of every stretch, are known; derivatives by
+        """A fit at a point of which the raw residuals, (n,) of every stretch, are known; derivatives by
         the effect are those towards off."""
         residual = whitened(self.arena.white, [one[None] for one in raw])[0]
         jacobian = np.concatenate([self.arena.by_nuisance, np.zeros((len(residual), len(x)))], axis=1)
@@ -92,11 +92,11 @@ class Fits:
             going = [fit for fit in fits if not fit.ended]
             if not going:
                 break
-            steps = [self._step(fit) for fit in going]
+            steps = [self.step(fit) for fit in going]
             points = []
             for fit, step in zip(going, steps, strict=True):
                 for length in LENGTHS:
-                    points.append(self._moved(fit, length * step))
+                    points.append(self.moved(fit, length * step))
             raw = self._raw(
                 [(fit.hypothesis, *point) for fit, point in _spread(going, points)],
                 [fit.away for fit in going for _ in LENGTHS],
@@ -110,22 +110,28 @@ class Fits:
 
     def settle(self, fits: Sequence[Fit]) -> None:
         """Lets the stretches of all fits begin where they most likely did, those that are better for it."""
-        wanted = [self.arena.likely_starts(fit.raw) for fit in fits]
+        if not fits:
+            return
+        before = [np.array(rows) for rows in zip(*(fit.raw for fit in fits), strict=True)]
+        wanted = list(self.arena.likely_starts(before))
         raw = self._raw([(fit.hypothesis, fit.z, fit.x) for fit in fits], wanted)
         white = whitened(self.arena.white, raw)
         own = np.array([fit.residual for fit in fits])
         costs = [minus_log(self.arena.squares(one), self.arena.logdets, self.arena.sizes) for one in (own, white)]
         better = costs[1] < costs[0]
+        mixed = [np.where(yes[:, None], new, old) for yes, new, old in zip(better.T, raw, before, strict=True)]
+        white = whitened(self.arena.white, mixed)
+        both = [costs[0], minus_log(self.arena.squares(white), self.arena.logdets, self.arena.sizes)]
         for i, fit in enumerate(fits):
-            rows = self.arena.by_row(better[i])
-            fit.residual = np.where(rows, white[i], fit.residual)
+            gain = float(np.sum((both[0] - both[1])[i]))
+            if gain <= 0:
+                continue
+            fit.residual, fit.raw = white[i], [one[i] for one in mixed]
             fit.away = np.where(better[i][:, None], wanted[i], fit.away)
-            fit.raw = [new[i] if yes else old for new, old, yes in zip(raw, fit.raw, better[i], strict=True)]
-            gain = float(np.sum((costs[0] - costs[1])[i][better[i]]))
             fit.cost -= gain
             fit.ended = fit.ended and gain < LEAST_GAIN
 
-    def _step(self, fit: Fit) -> np.ndarray:
+    def step(self, fit: Fit) -> np.ndarray:
         """The damped step (p + q + k,)."""
         H, g = self.normal(fit)
         scale = np.sqrt(np.maximum(np.diag(H), 1e-12))
@@ -171,7 +177,8 @@ class Fits:
         """Of each kind of error, (stretch, kind)."""
         return weight(self.arena.squares(fit.residual[None])[0], self.arena.logdets, self.arena.sizes)
 
-    def _moved(self, fit: Fit, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def moved(self, fit: Fit, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Nuisances and the effect's numbers after a step (p + q + k,), within bounds."""
         p = len(fit.z)
         z = np.clip(fit.z + step[:p], self.arena.lower, self.arena.upper)
         x = np.clip(fit.x + step[p:], fit.hypothesis.stack("lower"), fit.hypothesis.stack("upper"))

@@ -20,18 +20,21 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Seen:
     """Of one stretch, for k hypotheses: caps (k, F, cap, 3) [m], as the camera sees them, and length (k, F, sensor)
-    [m], as the sensors read them. What left the finite numbers is nan."""
+    [m], as the sensors read them; begin, end (k, NS): flat states where it begins and at its last frame. What left the
+    finite numbers is nan."""
 
     caps: np.ndarray
     length: np.ndarray
+    begin: np.ndarray
+    end: np.ndarray
 
 
 def looked(
     structure: Structure, theta: Parameters, flat: Tensor, rows: Tensor, many: Sequence[Stretch], behind: np.ndarray, *,
     every: float, cable_caps: Sequence[tuple[int, int]], up: float,
-) -> list[Seen]:  # fmt: skip
-    """What is seen of each stretch, from the states (row, stored, NS), which are `every` seconds apart; rows
-    (k stretch,): of each hypothesis and stretch.
+) -> list[tuple[np.ndarray, np.ndarray]]:  # fmt: skip
+    """Caps and lengths, as `Seen`, of each stretch, from the states (row, stored, NS), which are `every` seconds apart;
+    rows (k stretch,): of each hypothesis and stretch.
 
     theta: batch k stretch, without the camera's delay; behind (k,) [s]: that delay. cable_caps: end caps of each cable,
     between which the sensors measure; up: height of the ground in the world [m].
@@ -60,7 +63,7 @@ def looked(
         F = len(one.t)
         camera = shown[i :: len(many), :F]
         _observe(structure, theta, special[:, i], i, len(many), torch.as_tensor(one.t), camera)
-        found.append(Seen(camera.numpy(), lengths[i :: len(many), :F][..., list(one.sensors)]))
+        found.append((camera.numpy(), lengths[i :: len(many), :F][..., list(one.sensors)]))
     return found
 
 

@@ -79,7 +79,14 @@ def pieces(
             begin.update({now[k].place: state for k, state in zip(going, own, strict=True)})
             taut.update({now[k].place: row for k, row in zip(going, rest, strict=True)})
     ordered = [made[(*cut.place, cut.piece)] for cut in cuts]
-    return tuple(replace(one, order=k) for k, one in enumerate(ordered))
+    return tuple(replace(one, order=k, goes_on=_gap(one, ordered[k + 1 : k + 2])) for k, one in enumerate(ordered))
+
+
+def _gap(one: Stretch, following: Sequence[Stretch]) -> float:
+    """Seconds to the begin of the next piece, if that comes in the run before a frame can be missing."""
+    apart = float(np.diff(one.window.run.t).max(initial=0.0)) if len(one.t) > 1 else 0.0
+    gaps = [after.window.start - float(one.t[-1]) for after in following if after.run == one.run]
+    return max((gap for gap in gaps if 0.0 < gap <= apart + 1e-6), default=0.0)
 
 
 def length_of(run: RunData) -> float:

@@ -64,9 +64,12 @@ class Remembered(Replayer):
         self, question: str, many: Sequence[Stretch], numbers: Sequence[np.ndarray], made: Callable[[], list[Seen]]
     ) -> list[Seen]:
         flat = self._answer(
-            question, many, numbers, lambda: [part for one in made() for part in (one.caps, one.length)]
+            question,
+            many,
+            numbers,
+            lambda: [part for one in made() for part in (one.caps, one.length, one.begin, one.end)],
         )
-        return [Seen(caps, length) for caps, length in zip(flat[::2], flat[1::2], strict=True)]
+        return [Seen(*flat[k : k + 4]) for k in range(0, len(flat), 4)]
 
     def _answer(
         self, question: str, many: Sequence[Stretch], numbers: Sequence[np.ndarray],
@@ -91,7 +94,7 @@ class Remembered(Replayer):
         for one in numbers:
             found.update(repr(np.shape(one)).encode() + np.ascontiguousarray(one).tobytes())
         for stretch in many:
-            found.update(repr((stretch.run, stretch.interval, stretch.piece, stretch.margin)).encode())
+            found.update(repr((stretch.run, stretch.interval, stretch.piece, stretch.margin, stretch.goes_on)).encode())
             found.update(pack_state(self.structure, stretch.window.state).numpy().tobytes())
             found.update(b"" if stretch.taut is None else stretch.taut.tobytes())
         return found.digest()

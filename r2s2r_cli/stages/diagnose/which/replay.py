@@ -46,6 +46,8 @@ class Replayer(Predictor):
         """Of every stretch at values (k, n). A piece that comes after another one of `many` goes on with what that left
         of slack cables and the memory of effects, each hypothesis with its own. by: of every stretch what each
         hypothesis begins away from its start, (k, offset) (`offsets.displaced`)."""
+        import torch
+
         parts: dict[int, Seen] = {}
         after: dict[tuple[str, int, int], Tensor] = {}
         for depth in sorted({one.piece for one in many}):
@@ -56,20 +58,22 @@ class Replayer(Predictor):
                 found = self._chunked(
                     [many[k] for k in own], values, begin, by=None if by is None else [by[k] for k in own]
                 )
-                for k, (one, last) in zip(own, found, strict=True):
+                for k, one in zip(own, found, strict=True):
                     parts[k] = one
-                    after[many[k].run, many[k].interval, depth] = last
+                    after[many[k].run, many[k].interval, depth] = torch.as_tensor(one.end)
         return [parts[k] for k in range(len(many))]
 
     def finals(self, many: Sequence[Stretch], values: np.ndarray) -> State:
         """States at the last frame of stretches, a batch, at values (n,)."""
+        import torch
+
         from r2s2r_cli.engine.flat import unpack_state
 
-        found: dict[int, Tensor] = {}
+        found: dict[int, np.ndarray] = {}
         for group in alike([one.window for one in many]):
-            for k, (_, last) in zip(group, self._batch([many[k] for k in group], values[None]), strict=True):
-                found[k] = last
-        return unpack_state(self.structure, _cat([found[k] for k in range(len(many))]))
+            for k, one in zip(group, self._batch([many[k] for k in group], values[None]), strict=True):
+                found[k] = one.end
+        return unpack_state(self.structure, torch.as_tensor(np.concatenate([found[k] for k in range(len(many))])))
 
     def around(self, many: Sequence[Stretch], values: np.ndarray, by: Sequence[np.ndarray]) -> list[Seen]:
         """As `seen`, but every stretch stands alone, with nothing handed on to it. Finite steps, because where caps
@@ -77,14 +81,13 @@ class Replayer(Predictor):
         parts: dict[int, Seen] = {}
         for group in _groups([one.window for one in many], len(values)):
             found = self._chunked([many[k] for k in group], values, by=[by[k] for k in group])
-            for k, (one, _) in zip(group, found, strict=True):
-                parts[k] = one
+            parts.update(zip(group, found, strict=True))
         return [parts[k] for k in range(len(many))]
 
     def _chunked(
         self, many: Sequence[Stretch], values: np.ndarray, begin: Sequence[Tensor | None] = (), *,
         by: Sequence[np.ndarray] | None = None,
-    ) -> list[tuple[Seen, Tensor]]:  # fmt: skip
+    ) -> list[Seen]:  # fmt: skip
         """`_batch`, at most MOST simulations at a time."""
         together = max(1, MOST // len(many))
         chunks = []
@@ -97,11 +100,8 @@ class Replayer(Predictor):
                 )
             )  # fmt: skip
         return [
-            (
-                Seen(
-                    np.concatenate([seen.caps for seen, _ in parts]), np.concatenate([seen.length for seen, _ in parts])
-                ),
-                _cat([last for _, last in parts]),
+            Seen(
+                *(np.concatenate([getattr(one, name) for one in parts]) for name in ("caps", "length", "begin", "end"))
             )
             for parts in zip(*chunks, strict=True)
         ]
@@ -109,8 +109,8 @@ class Replayer(Predictor):
     def _batch(
         self, many: Sequence[Stretch], values: np.ndarray, begin: Sequence[Tensor | None] = (), *,
         by: Sequence[np.ndarray] | None = None,
-    ) -> list[tuple[Seen, Tensor]]:  # fmt: skip
-        """K hypotheses of some stretches of about the same length: what is seen, and states (k, NS) at the last frame.
+    ) -> list[Seen]:  # fmt: skip
+        """K hypotheses of some stretches of about the same length.
         begin: states (k, NS) that the piece before each ended in, None: its own start is all there is. by: as
         `seen`."""
         import torch
@@ -130,7 +130,7 @@ class Replayer(Predictor):
                 starts[i] = carried(structure, many[i], starts[i], before, let_out)
         late = self.model.observation()
         s0 = placed(structure, theta, torch.stack(starts, dim=1).flatten(0, 1), late.ground_height)
-        lasting = max(one.window.duration for one in many) + max(0.0, float(behind.max()))
+        lasting = max(one.window.duration + one.goes_on for one in many) + max(0.0, float(behind.max()))
         rows = EVERY * (math.ceil(lasting / step / EVERY - TINY) + 1)
         own_delay = delay_of(structure, own)
         delays = np.zeros(k) if own_delay is None else own_delay.expand(k, 1)[:, 0].numpy()
@@ -147,9 +147,12 @@ class Replayer(Predictor):
                 structure, theta, flat, all_of, many, behind, every=EVERY * step, cable_caps=self.cable_caps,
                 up=late.ground_height,
             )  # fmt: skip
-        lasted = torch.as_tensor([one.window.duration / (EVERY * step) for one in many], dtype=torch.float64)
-        last = between(flat, lasted.repeat(len(first))[:, None])[all_of, 0]
-        return [(one, last[i :: len(many)]) for i, one in enumerate(seen)]
+        lasted = [(one.window.duration + one.goes_on) / (EVERY * step) for one in many]
+        last = between(flat, torch.as_tensor(lasted, dtype=torch.float64).repeat(len(first))[:, None])[
+            all_of, 0
+        ].numpy()
+        own_begin, count = s0.numpy(), len(many)
+        return [Seen(*one, own_begin[i::count], last[i::count]) for i, one in enumerate(seen)]
 
     def _undelayed(self, own: Parameters, k: int) -> tuple[Parameters, np.ndarray]:
         """The parameters without the camera's delay, and that delay (k,) [s]. A stretch starts where the camera saw the
@@ -189,9 +192,3 @@ def _rows(hypotheses: np.ndarray, stretches: int) -> Tensor:
     import torch
 
     return torch.as_tensor((hypotheses[:, None] * stretches + np.arange(stretches)).ravel())
-
-
-def _cat(parts: Sequence[Tensor]) -> Tensor:
-    import torch
-
-    return torch.cat(list(parts))

@@ -18,10 +18,12 @@ TWICE = 16
 """Of them, from two starts."""
 ELEMENTS = 2
 """Of an effect, at most."""
-ROUNDS = ((1, 14), (3, 8))
+ROUNDS = ((2, 16), (2, 8))
 """Iterations, and fits that go on after them."""
-LAST = 6
+LAST = 4
 """Iterations of those that are left."""
+GIVING = 6
+"""Fits whose nuisances and starts all are tried with."""
 SUSPECTED, LEAST_SAID = 3, 2.0
 """Effects that are fitted because the parity stage speaks for them, with so many nats at least."""
 PAIRED = 5
@@ -79,15 +81,17 @@ def fitted(arena: Arena, base: Fit, picked: Sequence[Response], told_by: Said, t
 
 
 def exchanged(fits: Fits, found: Sequence[Fit]) -> list[Fit]:
-    """The fits, each with the nuisances and starts of whichever of them serves it best. Costs are rough: one that has
-    found a better place shows it to the others, the refit nominal model above all, else everything gains against it."""
-    points = [(one.hypothesis, other.z, one.x) for one in found for other in found]
-    away = [other.away for _ in found for other in found]
-    costs = fits.costs(points, away).reshape(len(found), len(found))
-    costs[np.diag_indices(len(found))] = [one.cost for one in found]
+    """The fits, best first, each with the nuisances and starts of whichever of the first GIVING serves it best. Costs
+    are rough: one that has found a better place shows it to the others, the refit nominal model above all, else
+    everything gains against it."""
+    givers = list(found[:GIVING])
+    points = [(one.hypothesis, other.z, one.x) for one in found for other in givers]
+    away = [other.away for _ in found for other in givers]
+    costs = fits.costs(points, away).reshape(len(found), len(givers))
+    costs[range(len(givers)), range(len(givers))] = [one.cost for one in givers]
     best = costs.argmin(axis=1)
     moved = [i for i, one in enumerate(found) if costs[i, best[i]] < one.cost - LEAST_GAIN]
-    begun = fits.begun([points[i * len(found) + best[i]] for i in moved], [found[best[i]].away for i in moved])
+    begun = fits.begun([points[i * len(givers) + best[i]] for i in moved], [givers[best[i]].away for i in moved])
     new = dict(zip(moved, begun, strict=True))
     for one in (*found, *begun):
         one.ended, one.damping = False, DAMPING

@@ -29,7 +29,8 @@ class Stretch:
     order: 0, 1, ... through the evidence. window: with the thinned frames (F,). piece: 0 for what begins with its
     interval, and the next ones after it. taut (actuated,): rest lengths of winched cables that are just taut where it
     starts [m], None at a first piece; margin [m]: a cable that is longer by more than that hangs. start_sd (offset,):
-    of the start state, in the order of `offsets.StartSpread.sd`; None: not known. caps: (F, cap, 3) [m]; noise: sd of
+    of the start state, in the order of `offsets.StartSpread.sd`; None: not known. goes_on [s]: from its last frame to
+    where the next one of the run begins. caps: (F, cap, 3) [m]; noise: sd of
     them, (F, cap, 3). length: of the sensors (F, sensor) [m], NaN where not read, or None; length_sd: (F, sensor).
     sensors: cable of each sensor.
     """
@@ -48,6 +49,12 @@ class Stretch:
     taut: np.ndarray | None = None
     margin: float = 0.0
     start_sd: np.ndarray | None = None
+    goes_on: float = 0.0
+
+    @property
+    def until(self) -> float:
+        """Where it is simulated to, on the clock of the run [s]."""
+        return float(self.t[-1]) + self.goes_on
 
     @property
     def t(self) -> np.ndarray:

@@ -2,15 +2,19 @@
 
 Offsets of a start are normal numbers of their own, so they are not fitted: they are part of the covariance, the same
 for every hypothesis. So is the floor, a simulator's own error, which grows along a stretch like a random walk.
+
+A piece that comes after another one of its run begins where that one ended: what its frames say of its own start goes
+on through the simulation (`links`). One frame under 5 mm of noise tells a start to 5 mm, the frames of a piece to one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from r2s2r_cli.stages.diagnose.which.links import Link, Way
 from r2s2r_cli.stages.diagnose.which.mixture import FACTORS
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 
@@ -38,6 +42,7 @@ class Kind:
     logdet: float
     to_start: np.ndarray
     known: np.ndarray
+    link: Link | None = None
 
     def rooted(self, residual: np.ndarray) -> np.ndarray:
         """(k, channel, F) -> (k, channel F), white but for the start."""
@@ -52,8 +57,14 @@ class Kind:
         return np.asarray(rooted - ((rooted @ self.U) * self.shrink) @ self.U.T)
 
     def start(self, rooted: np.ndarray) -> np.ndarray:
-        """Offsets of the start [sd] that most likely left `rooted` residuals (channel F), (offset,)."""
-        return np.asarray(-(self.to_start @ rooted))
+        """Offsets of the start that most likely left `rooted` residuals (..., channel F), (..., offset)."""
+        return np.asarray(-(rooted @ self.to_start.T))
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Root of the covariance of where it begins once the residuals are seen, in sd of the start as it is seen,
+        (offset, offset): rows of it are added up."""
+        return self.known if self.link is None else self.known @ self.link.root.T
 
 
 @dataclass(frozen=True)
@@ -62,6 +73,16 @@ class White:
 
     kinds: tuple[Kind, ...]
     size: int
+
+    def residual(self, raw: np.ndarray) -> np.ndarray:
+        """Of raw residuals (..., n) what is seen, (..., channel, F)."""
+        channels, frames = self.kinds[0].roots.shape[:2]
+        return raw[..., : channels * frames].reshape(*raw.shape[:-1], channels, frames)
+
+    def ahead(self, raw: np.ndarray) -> np.ndarray:
+        """Of raw residuals (..., n) where the piece before ends, (..., offset)."""
+        channels, frames = self.kinds[0].roots.shape[:2]
+        return raw[..., channels * frames :]
 
     @property
     def rows(self) -> slice:
@@ -79,41 +100,79 @@ class White:
 
 
 def whites(
-    many: Sequence[Stretch], by_offset: Sequence[np.ndarray], *, sensors: int, floor_m: float, noise: float,
-    lasts: float,
+    many: Sequence[Stretch], by_offset: Sequence[np.ndarray], ways: Sequence[Way | None], *, sensors: int,
+    floor_m: float, noise: float, lasts: float,
 ) -> tuple[White, ...]:  # fmt: skip
-    """Of all stretches. by_offset: what one sd of each offset of their starts changes, (offset, channel, F);
-    sensors: channels after those of the caps; noise: factor on the stated noise; lasts [s]: time in which the
-    correlation of a cap's errors falls to 1/e, 0: they are white. Rows: those of the first kind of all stretches come
-    before those of the next kind."""
+    """Of all stretches. by_offset: what one sd of each offset of their starts changes, (offset, channel, F); ways: from
+    the pieces before; sensors: channels after those of the caps; noise: factor on the stated noise; lasts [s]: time in
+    which the correlation of a cap's errors falls to 1/e, 0: they are white. Rows: those of the first kind of all
+    stretches come before those of the next kind."""
     total = sum(d.shape[1] * d.shape[2] for d in by_offset)
-    begin, found = 0, []
-    for one, d in zip(many, by_offset, strict=True):
-        count = d.shape[1] * d.shape[2]
-        kinds = []
+    begin, firsts, sizes = 0, [], []
+    for d in by_offset:
+        firsts.append(begin)
+        begin += d.shape[1] * d.shape[2]
+    alone: list[list[Kind]] = []
+    for one, d, first in zip(many, by_offset, firsts, strict=True):
+        made, size, roots = [], 0, np.zeros(0)
         for c, factor in enumerate(FACTORS):
-            roots, size = _roots(one, sensors, factor * floor_m, noise, lasts)
-            V = _rooted(roots, d)
-            # Of the small matrix: singular values of the tall one take ten times as long, and only large ones matter.
-            square, W = np.linalg.eigh(V @ V.T)
-            square = np.maximum(square, TINY)
-            U, shrink = (V.T @ W) / np.sqrt(square), 1.0 - 1.0 / np.sqrt(1.0 + square)
-            logdet = float(np.log1p(square).sum() - 2.0 * np.log(np.diagonal(roots, axis1=1, axis2=2)).sum())
-            first = c * total + begin
-            to_start = (W / (1.0 + square)) @ W.T @ V
-            known = (W / np.sqrt(1.0 + square)) @ W.T
-            kinds.append(Kind(roots, U, shrink, slice(first, first + count), logdet, to_start, known))
-        found.append(White(tuple(kinds), size))
-        begin += count
+            if c == 0 or factor != FACTORS[c - 1]:
+                roots, size = _roots(one, sensors, factor * floor_m, noise, lasts)
+            made.append(_kind(roots, d, c * total + first))
+        alone.append(made)
+        sizes.append(size)
+    found = []
+    for k, (kinds, way) in enumerate(zip(alone, ways, strict=True)):
+        if way is not None:
+            before = alone[way.before][1]
+            link = way.link(before.to_start, before.known, before.roots, floor_m)
+            d = np.concatenate([np.einsum("ol,ocf->lcf", link.root, link.responses), by_offset[k][len(link.root) :]])
+            kinds = [replace(_kind(kinds[0].roots, d, kinds[0].rows.start), link=link), *kinds[1:]]
+        found.append(White(tuple(kinds), sizes[k]))
     return tuple(found)
 
 
+def _kind(roots: np.ndarray, d: np.ndarray, first: int) -> Kind:
+    """One kind of error. d (offset, channel, F): what offsets of the start change."""
+    V = _rooted(roots, d)
+    # Of the small matrix: singular values of the tall one take ten times as long, and only large ones matter.
+    square, W = np.linalg.eigh(V @ V.T)
+    square = np.maximum(square, TINY)
+    U, shrink = (V.T @ W) / np.sqrt(square), 1.0 - 1.0 / np.sqrt(1.0 + square)
+    logdet = float(np.log1p(square).sum() - 2.0 * np.log(np.diagonal(roots, axis1=1, axis2=2)).sum())
+    to_start = (W / (1.0 + square)) @ W.T @ V
+    known = (W / np.sqrt(1.0 + square)) @ W.T
+    return Kind(roots, U, shrink, slice(first, first + V.shape[1]), logdet, to_start, known)
+
+
 def whitened(many: Sequence[White], raw: Sequence[np.ndarray]) -> np.ndarray:
-    """Residuals (k, channel, F) of every stretch, white under each kind, (k, M)."""
+    """Raw residuals (k, n) of every stretch (`Arena.raw`), white under each kind, (k, M)."""
     kinds = range(len(FACTORS))
-    return np.concatenate(
-        [white.kinds[c].white(r) for c in kinds for white, r in zip(many, raw, strict=True)], axis=1
-    )  # fmt: skip
+    parts = [whitened_of(many, raw, k) for k in range(len(many))]
+    return np.concatenate([part[c] for c in kinds for part in parts], axis=1)
+
+
+def whitened_of(
+    many: Sequence[White], raw: Sequence[np.ndarray] | Mapping[int, np.ndarray], k: int
+) -> list[np.ndarray]:  # fmt: skip
+    """Raw residuals of the stretch k, white under each kind, (k, channel F) each."""
+    own = many[k].residual(raw[k])
+    return [kind.white(own if kind.link is None else own + shifted(many, raw, k)) for kind in many[k].kinds]
+
+
+def shifted(many: Sequence[White], raw: Sequence[np.ndarray] | Mapping[int, np.ndarray], k: int) -> np.ndarray:
+    """What the residuals of a linked stretch are more for beginning where the piece before ended, (k, channel, F)."""
+    link = many[k].kinds[0].link
+    assert link is not None  # noqa: S101 - only linked ones are asked for
+    return np.asarray(np.einsum("ko,ocf->kcf", begun(many, raw, k), link.responses))
+
+
+def begun(many: Sequence[White], raw: Sequence[np.ndarray] | Mapping[int, np.ndarray], k: int) -> np.ndarray:
+    """Where a linked stretch begins by the piece before and what its frames say, in sd of its start, (k, offset)."""
+    link = many[k].kinds[0].link
+    assert link is not None  # noqa: S101 - as above
+    before = many[link.before]
+    return link.middle(many[k].ahead(raw[k]), before.residual(raw[link.before]))
 
 
 def _roots(one: Stretch, sensors: int, floor_m: float, noise: float, lasts: float) -> tuple[np.ndarray, int]:

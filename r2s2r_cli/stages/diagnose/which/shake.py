@@ -1,0 +1,50 @@
+"""Out of the first hollow: a fit is tried at points about it, each with a step of its own.
+
+Costs are rough, and what goes downhill from one place soon stops. The refit nominal model is what everything else is
+compared with: where it has stopped too early, any effect gains by leading it on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from r2s2r_cli.stages.diagnose.which.fit import LEAST_GAIN, Fits
+from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
+from r2s2r_cli.stages.diagnose.which.rough import root_of
+
+ROUNDS = 2
+POINTS = 12
+"""Of each round."""
+FAR_SD = 0.7
+"""How far from the fit they are, in the sd of its numbers."""
+
+
+def shaken(fits: Fits, fit: Fit) -> Fit:
+    """The best that was found about a fit, its effect's numbers moved by steps alone; itself, if that is best."""
+    rng = np.random.default_rng(0)
+    arena, p = fits.arena, len(fit.z)
+    for _ in range(ROUNDS):
+        root = root_of(fits.normal(fit)[0])[:p]
+        drawn = fit.z + FAR_SD * rng.standard_normal((POINTS, root.shape[1])) @ root.T
+        about = [(fit.hypothesis, one, fit.x) for one in np.clip(drawn, arena.lower, arena.upper)]
+        found = _held(fits, about, [fit.away] * POINTS, fit)
+        stepped = [(one.hypothesis, *fits.moved(one, fits.step(one))) for one in found]
+        found += _held(fits, stepped, [one.away for one in found], fit)
+        best = min(found, key=lambda one: one.cost)
+        if best.cost < fit.cost - LEAST_GAIN:
+            best.start = fit.start
+            fit = best
+    return fit
+
+
+def _held(
+    fits: Fits, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]], away: Sequence[np.ndarray], like: Fit
+) -> list[Fit]:  # fmt: skip
+    """Settled fits at points, with the derivatives of another one."""
+    found = fits.begun(points, away)
+    for one in found:
+        one.jacobian = like.jacobian.copy()
+    fits.settle(found)
+    return found

@@ -22,6 +22,8 @@ ROUNDS = ((2, 16), (2, 8))
 """Iterations, and fits that go on after them."""
 LAST = 4
 """Iterations of those that are left."""
+AGAIN, BETWEEN = 3, 2
+"""Times that these show each other their nuisances and starts, and iterations after each."""
 GIVING = 6
 """Fits whose nuisances and starts all are tried with."""
 SUSPECTED, LEAST_SAID = 3, 2.0
@@ -76,6 +78,9 @@ def fitted(arena: Arena, base: Fit, picked: Sequence[Response], told_by: Said, t
         nominal, *going = exchanged(fits, [nominal, *going])
         told("fits", number + 1, len(ROUNDS) + 1)
     fits.run([nominal, *going], iterations=LAST)
+    for _ in range(AGAIN):
+        nominal, *going = exchanged(fits, [nominal, *_best_of(going)])
+        fits.run([nominal, *going], iterations=BETWEEN)
     told("fits", len(ROUNDS) + 1, len(ROUNDS) + 1)
     return nominal, _best_of(going)
 

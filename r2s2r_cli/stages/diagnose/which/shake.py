@@ -14,20 +14,21 @@ from r2s2r_cli.stages.diagnose.which.fit import LEAST_GAIN, Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.rough import root_of
 
-ROUNDS = 2
+FAR_SD = (1.0, 3.0, 6.0)
+"""How far from the fit points are, in the sd of its numbers, round after round: these are of one hollow, there are many.
+"""
+ROUNDS = 6
 POINTS = 12
 """Of each round."""
-FAR_SD = 0.7
-"""How far from the fit they are, in the sd of its numbers."""
 
 
 def shaken(fits: Fits, fit: Fit) -> Fit:
     """The best that was found about a fit, its effect's numbers moved by steps alone; itself, if that is best."""
     rng = np.random.default_rng(0)
     arena, p = fits.arena, len(fit.z)
-    for _ in range(ROUNDS):
+    for number in range(ROUNDS):
         root = root_of(fits.normal(fit)[0])[:p]
-        drawn = fit.z + FAR_SD * rng.standard_normal((POINTS, root.shape[1])) @ root.T
+        drawn = fit.z + FAR_SD[number % len(FAR_SD)] * rng.standard_normal((POINTS, root.shape[1])) @ root.T
         about = [(fit.hypothesis, one, fit.x) for one in np.clip(drawn, arena.lower, arena.upper)]
         found = _held(fits, about, [fit.away] * POINTS, fit)
         stepped = [(one.hypothesis, *fits.moved(one, fits.step(one))) for one in found]

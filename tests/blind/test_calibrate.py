@@ -81,7 +81,7 @@ def test_a_verdict_becomes_a_case() -> None:
     label = {"kind": "single", "effects": [{"id": "payload", "channel": "mass", "element": None, "onset": None}],
              "d": 9.0, "d_each": [9.0], "outside": None}  # fmt: skip
     document = {
-        "ranking": [{"effect": "payload", "elpd_gain": 7.5, "parity_nats": 2.5},
+        "ranking": [{"effect": "payload", "elpd_gain": 7.5, "parity_nats": 6.5},
                     {"effect": "none", "elpd_gain": 0.0},
                     {"effect": "unknown", "elpd_gain": 3.0}, {"effect": "backlash", "elpd_gain": -1e9}],
         "chance_nats": 2.0, "gap_nats": 31.0, "left_nats": -4.0, "refit_upper_m": 0.012, "floor_m": 0.010,

@@ -13,11 +13,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from r2s2r_cli.stages.diagnose.which.arena import LOST_M, SECANT, Arena
+from r2s2r_cli.stages.diagnose.which.arena import SECANT, Arena
 from r2s2r_cli.stages.diagnose.which.fit import PRIOR_SCALES, Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.mixture import ENOUGH
 from r2s2r_cli.stages.diagnose.which.pieces import LEAST_SPEED_SD, length_of
+from r2s2r_cli.stages.diagnose.which.starting import LOST_M
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.diagnose.which.white import FLOOR_S
 from r2s2r_cli.stages.identify.windows import Window

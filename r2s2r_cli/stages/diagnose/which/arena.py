@@ -6,19 +6,18 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from r2s2r_cli.stages.diagnose.which.bent import bent
 from r2s2r_cli.stages.diagnose.which.likely import better_of, likely_start
 from r2s2r_cli.stages.diagnose.which.looks import Seen
 from r2s2r_cli.stages.diagnose.which.mixture import density
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
 from r2s2r_cli.stages.diagnose.which.shifts import CAMERA, Shifts, camera_columns
-from r2s2r_cli.stages.diagnose.which.starting import LOST_M, Starting, clipped
+from r2s2r_cli.stages.diagnose.which.starting import Starting, clipped
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.diagnose.which.white import White, whitened, whitened_of, whites
 
 SECANT = 0.3
 """Of a nuisance's prior sd, to both sides: over what its derivative is taken."""
-DRAWS = 6
-"""Of starts and nuisances together, for what straight lines do not tell of them."""
 
 
 class Arena:
@@ -85,9 +84,9 @@ class Arena:
         points[np.arange(p), np.arange(p)], points[p + np.arange(p), np.arange(p)] = low, high
         raw = self.raw(self.values(points), points)
         width = (high - low)[:, None]
-        self._by_engine = [np.nan_to_num((one[p:] - one[:p]) / width, posinf=0.0, neginf=0.0) for one in raw]
+        self.by_engine = [np.nan_to_num((one[p:] - one[:p]) / width, posinf=0.0, neginf=0.0) for one in raw]
         self.whiten()
-        self._roughen(z, [np.diag(one[1:]) for one in each], seen)
+        self._by_offset = bent(self, z, seen)
         self.whiten()
 
     def move_starts(self, away: np.ndarray) -> None:
@@ -95,36 +94,6 @@ class Arena:
         stays what it was. Derivatives are to be taken anew (`prepare`)."""
         self.many = self.starting.moved(self.many, away)
         self.away = np.zeros_like(away)
-
-    def _roughen(self, z: np.ndarray, sd: Sequence[np.ndarray], seen: Sequence[Seen]) -> None:
-        """Adds to the covariance what straight lines do not tell of starts and nuisances near these."""
-        rng = np.random.default_rng(0)
-        J = self.by_nuisance
-        rows = slice(0, self.white[-1].kinds[0].rows.stop)
-        H = J[rows].T @ J[rows] + self.precision
-        p = len(self.engine)
-        value, vector = np.linalg.eigh(np.linalg.inv(H)[:p, :p])
-        root = vector * np.sqrt(np.maximum(value, 0.0))
-        points = np.repeat(z[None], DRAWS, axis=0)
-        points[:, :p] = np.clip(z[:p] + rng.standard_normal((DRAWS, p)) @ root.T, self.lower[:p], self.upper[:p])
-        by = [
-            rng.standard_normal((DRAWS, len(own))) @ white.kinds[0].spread
-            for white, own in zip(self.white, sd, strict=True)
-        ]
-        far = [one * own for one, own in zip(by, sd, strict=True)]
-        there = self.replayer.around(self.many, self.values(points), far)
-        starting, found = self.starting, []
-        along = [(points[:, :p] - z[:p]) @ one for one in self._by_engine]
-        for k, (one, here) in enumerate(zip(there, seen, strict=True)):
-            first = Seen(here.caps[:1], here.length[:1], here.begin[:1], here.end[:1])
-            change = clipped(self._residual(k, one, points)) - clipped(self._residual(k, first, z[None]))
-            change -= np.einsum("ko,ocf->kcf", by[k], starting.by_start[k]) + self.white[k].residual(along[k])
-            found.append(np.clip(change, -LOST_M, LOST_M) / np.sqrt(DRAWS))
-        self._by_offset = [np.concatenate(both) for both in zip(starting.by_start, found, strict=True)]
-        for k, j in enumerate(starting.before):
-            if j is not None:
-                ends = starting.ahead(k, there[k], there[j], by[k], by[j]) - starting.ahead(k, seen[k], seen[j])[:1]
-                starting.roughen(k, ends - self.white[k].ahead(along[k]))
 
     def whiten(
         self, *, floor_m: float | None = None, noise: float | None = None, lasts: float | None = None
@@ -138,7 +107,7 @@ class Arena:
             self.many, self._by_offset, self.starting.ways, sensors=len(self.sensors), floor_m=self.floor_m,
             noise=self.noise, lasts=self.lasts,
         )  # fmt: skip
-        own = [np.concatenate([e, _flat(s, e.shape[1])]) for e, s in zip(self._by_engine, self._shifts, strict=True)]
+        own = [np.concatenate([e, _flat(s, e.shape[1])]) for e, s in zip(self.by_engine, self._shifts, strict=True)]
         self.by_nuisance = whitened(self.white, own).T  # (M, p + q)
 
     @property
@@ -184,7 +153,7 @@ class Arena:
         place = {k: i for i, k in enumerate(only)}
         found = []
         for k, one in zip(only, seen, strict=True):
-            own, j = self._residual(k, one, z), self.starting.before[k]
+            own, j = self.residual(k, one, z), self.starting.before[k]
             if away is not None:
                 own = own - np.einsum("ko,ocf->kcf", away[:, k], self.starting.by_start[k])
             ahead = np.zeros((len(values), self.starting.offsets))
@@ -244,8 +213,9 @@ class Arena:
         found = [[np.sum(residual[:, kind.rows] ** 2, axis=1) for kind in white.kinds] for white in self.white]
         return np.array(found).transpose(2, 0, 1)
 
-    def _residual(self, k: int, seen: Seen, z: np.ndarray) -> np.ndarray:
-        """(hypothesis, channel, F): caps, then sensors; 0 where there is no reading."""
+    def residual(self, k: int, seen: Seen, z: np.ndarray) -> np.ndarray:
+        """What is seen of a stretch less what was, (hypothesis, channel, F) [m]: caps, then sensors, 0 where there is
+        no reading."""
         one = self.many[k]
         caps = (seen.caps - one.caps[None]).reshape(len(seen.caps), len(one.t), -1).transpose(0, 2, 1)
         parts = [caps]

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from r2s2r_cli.stages.diagnose.which.arena import LOST_M, Arena
+from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
 from r2s2r_cli.stages.diagnose.which.rough import DRAWS, around, root_of
+from r2s2r_cli.stages.diagnose.which.starting import LOST_M
 from r2s2r_cli.stages.diagnose.which.white import White
 
 ENOUGH = 12.0

@@ -15,8 +15,7 @@ from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.rough import root_of
 
 FAR_SD = (1.0, 3.0, 6.0)
-"""How far from the fit points are, in the sd of its numbers, round after round: these are of one hollow, there are many.
-"""
+"""How far from the fit points are, in the sd of its numbers, round after round: it is the sd of one hollow of many."""
 ROUNDS = 6
 POINTS = 12
 """Of each round."""

@@ -37,7 +37,7 @@ class Starting:
 
     def tried(self) -> list[np.ndarray]:
         """Offsets of every stretch that are simulated to learn what they change, none first, (1 + offset, offset)."""
-        return [np.concatenate([np.zeros((1, len(own))), np.diag(own)]) for own in self._known()]
+        return [np.concatenate([np.zeros((1, len(own))), np.diag(own)]) for own in self.known]
 
     def learn(self, seen: Sequence[Seen]) -> None:
         """From what was seen of every stretch at `tried`."""
@@ -56,7 +56,7 @@ class Starting:
         self.settled = self.settled + away
         return tuple(
             begun_at(self.structure, one, by * own) if by.any() else one
-            for one, by, own in zip(many, away, self._known(), strict=True)
+            for one, by, own in zip(many, away, self.known, strict=True)
         )
 
     def ahead(
@@ -70,7 +70,9 @@ class Starting:
         behind = self.settled[j] + (0.0 if by_before is None else by_before)
         return followed(found - behind @ way.through.T, way.rods)
 
-    def _known(self) -> list[np.ndarray]:
+    @property
+    def known(self) -> list[np.ndarray]:
+        """Sd of every start, (offset,) each."""
         known = [own for own in self.sd if own is not None]
         assert len(known) == len(self.sd)  # noqa: S101 - whole intervals are never prepared, only pieces
         return known

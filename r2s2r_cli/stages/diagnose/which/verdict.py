@@ -10,7 +10,7 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.parity.finding import Element
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
-from r2s2r_cli.stages.diagnose.which.fit import Fits
+from r2s2r_cli.stages.diagnose.which.confusable import confusable
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked, Screened, Shift, Which
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.material import Material
@@ -69,7 +69,7 @@ def concluded(m: Material) -> Which:
             Screened(r.candidate.effect, r.candidate.element, r.gain, r.absorbed, r.seen) for r in m.responses
         ),
         no_gap=m.no_gap, chance=m.chance, wider=m.wider, unexplained=m.unexplained, left=m.left,
-        confusable=_confusable(m, [best[name] for name in sorted(names, key=lambda n: -names[n])[:4]]),
+        confusable=confusable(m, [best[name] for name in sorted(names, key=lambda n: -names[n])[:4]]),
         not_testable=_not_testable(m.responses), shifts=() if top is None else _shifts(m, m.fits[top]),
         within=_left_out(m), calibrated=calibration.words, warnings=_warnings(m, [best[name] for name in names]),
     )  # fmt: skip
@@ -168,41 +168,6 @@ def _element(fit: Fit) -> Element | None:
 
 def _misfit(score: Score) -> float:
     return float(np.median(score.misfit))
-
-
-def _confusable(m: Material, rows: list[int]) -> tuple[tuple[str, str, float], ...]:
-    """Half the squared whitened distance between what two fits predict, the nuisances and the second one's size
-    fitted to the first [nats]; the smaller of both ways."""
-    responses = {}
-    for i in rows:
-        fit = m.fits[i]
-        p = len(fit.z)
-        solver = Fits(m.arena)
-        likely = solver.likely(fit)
-        J = likely[:, None] * fit.jacobian
-        Q, _ = np.linalg.qr(J[:, :p])
-        off = fit.hypothesis.stack("off")[None]
-        values = solver.values(fit.hypothesis, fit.z[None], off)
-        without = m.arena.residuals(values, fit.z[None], away=fit.away[None])[0]
-        response = likely * (fit.residual - without)
-        responses[i] = (response - Q @ (Q.T @ response), J[:, p:] - Q @ (Q.T @ J[:, p:]))
-    found = []
-    for a, i in enumerate(rows):
-        for j in rows[a + 1 :]:
-            found.append((
-                m.fits[i].hypothesis.effects[0], m.fits[j].hypothesis.effects[0],
-                min(_distance(responses[i][0], responses[j]), _distance(responses[j][0], responses[i])),
-            ))  # fmt: skip
-    return tuple(sorted(found, key=lambda one: one[2]))
-
-
-def _distance(of: np.ndarray, other: tuple[np.ndarray, np.ndarray]) -> float:
-    basis = np.concatenate([other[0][:, None], other[1]], axis=1)
-    if not np.isfinite(of).all() or not np.isfinite(basis).all():
-        return float("nan")
-    size, *_ = np.linalg.lstsq(basis, of, rcond=None)
-    left = of - basis @ size
-    return 0.5 * float(left @ left)
 
 
 def _not_testable(responses: tuple[Response, ...]) -> tuple[str, ...]:

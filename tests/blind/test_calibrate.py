@@ -19,10 +19,12 @@ TRUE = Calibration(
 
 
 def scores(by: Calibration, one: Case) -> dict[str, float]:
-    """What a diagnosis makes of the evidence of a set."""
+    """What a diagnosis makes of the evidence of a set, in which the parity stage has said what it says by chance too."""
     beyond = {"none": one.gap, "unknown": one.left}
     return {
-        name: by.score(name, float(a), parity=float(b), equivalent=one.equivalent, beyond=beyond.get(name, 0.0))
+        name: by.score(
+            name, float(a), parity=float(b) + by.by_chance, equivalent=one.equivalent, beyond=beyond.get(name, 0.0)
+        )
         for name, a, b in zip(one.names, one.score, one.parity, strict=True)
     }
 
@@ -77,7 +79,7 @@ def test_a_set_of_90_per_cent_holds_the_truth_so_often() -> None:
 
 
 def test_a_verdict_becomes_a_case() -> None:
-    """Gains as they are; chance for `none`; pairs and what was never fitted are left out."""
+    """Gains as they are, parity beyond chance; chance for `none`; pairs and what was never fitted are left out."""
     label = {"kind": "single", "effects": [{"id": "payload", "channel": "mass", "element": None, "onset": None}],
              "d": 9.0, "d_each": [9.0], "outside": None}  # fmt: skip
     document = {

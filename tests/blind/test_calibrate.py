@@ -19,7 +19,7 @@ TRUE = Calibration(
 
 
 def scores(by: Calibration, one: Case) -> dict[str, float]:
-    """What a diagnosis makes of the evidence of a set, in which the parity stage has said what it says by chance too."""
+    """What a diagnosis makes of the evidence of a set; the parity stage has said what it says by chance too."""
     beyond = {"none": one.gap, "unknown": one.left}
     return {
         name: by.score(

@@ -228,7 +228,7 @@ def _calibrate(arena: Arena, z: np.ndarray, *, first: bool = False) -> None:
     def best(some: Iterable[tuple[float, float, float]]) -> tuple[float, float, float]:
         found = {}
         for floor, noise, lasts in some:
-            arena.whiten(floor_m=floor, noise=noise, lasts=lasts)
+            arena.whiten(floor_m=floor, noise=noise, lasts=lasts, trial=True)
             unusual = np.log(floor / NUMERICS_M) / FLOOR_SPREAD
             found[floor, noise, lasts] = float(arena.log_densities(raw).sum()) - 0.5 * unusual**2
         return max(found, key=lambda one: found[one])

@@ -96,10 +96,11 @@ class Arena:
         self.away = np.zeros_like(away)
 
     def whiten(
-        self, *, floor_m: float | None = None, noise: float | None = None, lasts: float | None = None
+        self, *, floor_m: float | None = None, noise: float | None = None, lasts: float | None = None,
+        trial: bool = False,
     ) -> None:  # fmt: skip
         """Covariances anew, with another floor [m], factor on the noise or time that it lasts [s], at the same
-        derivatives."""
+        derivatives. trial: only to see how likely residuals are; derivatives by the nuisances are not made white."""
         self.floor_m = self.floor_m if floor_m is None else floor_m
         self.noise = self.noise if noise is None else noise
         self.lasts = self.lasts if lasts is None else lasts
@@ -107,8 +108,9 @@ class Arena:
             self.many, self._by_offset, self.starting.ways, sensors=len(self.sensors), floor_m=self.floor_m,
             noise=self.noise, lasts=self.lasts,
         )  # fmt: skip
-        own = [np.concatenate([e, _flat(s, e.shape[1])]) for e, s in zip(self.by_engine, self._shifts, strict=True)]
-        self.by_nuisance = whitened(self.white, own).T  # (M, p + q)
+        if not trial:
+            own = [np.concatenate([e, _flat(s, e.shape[1])]) for e, s in zip(self.by_engine, self._shifts, strict=True)]
+            self.by_nuisance = whitened(self.white, own).T  # (M, p + q)
 
     @property
     def sizes(self) -> np.ndarray:

@@ -22,6 +22,8 @@ SECANT = 0.25
 """Of a number's scale: length of a secant."""
 LEAST_GAIN = 0.3
 """[nats] A fit that gains less in a step has ended."""
+NO_WEIGHT = 1e-9
+"""A kind of error that is less likely for a stretch adds nothing to its normal matrix."""
 PRIOR_SCALES = 2.0
 """Prior sd of an effect's number, in its scale."""
 
@@ -38,8 +40,11 @@ class Fits:
         if x.shape[1]:
             sd = PRIOR_SCALES * hypothesis.stack("scale")
             prior = prior + 0.5 * np.sum(((x - hypothesis.stack("off")) / sd) ** 2, axis=1)
-        data = minus_log(self.arena.squares(residual), self.arena.logdets, self.arena.sizes).sum(axis=1)
+        data = self._nats(residual).sum(axis=1)
         return np.where(np.isfinite(data), data, np.inf) + prior
+
+    def _nats(self, residual: np.ndarray) -> np.ndarray:
+        return minus_log(self.arena.squares(residual), self.arena.logdets, self.arena.sizes)
 
     def values(self, hypothesis: Hypothesis, z: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Values of the model (k, n)."""
@@ -48,26 +53,28 @@ class Fits:
             found[:, list(places)] = x[:, k : k + 1]
         return found
 
-    def begin(
-        self, hypothesis: Hypothesis, z: np.ndarray, x: np.ndarray, raw: Sequence[np.ndarray], away: np.ndarray
-    ) -> Fit:  # fmt: skip
-        """A fit at a point of which the raw residuals, (n,) of every stretch, are known; derivatives by
-        the effect are those towards off."""
-        residual = whitened(self.arena.white, [one[None] for one in raw])[0]
-        jacobian = np.concatenate([self.arena.by_nuisance, np.zeros((len(residual), len(x)))], axis=1)
-        jacobian[:, self.overruled(hypothesis)] = 0.0
-        cost = float(self.cost(hypothesis, z[None], x[None], residual[None])[0])
-        return Fit(hypothesis, z.copy(), x.copy(), residual, jacobian, cost, x.copy(), away.copy(), list(raw))
-
     def begun(
-        self, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]], away: Sequence[np.ndarray] | None = None
+        self, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]], away: Sequence[np.ndarray] | None = None,
+        like: Fit | None = None,
     ) -> list[Fit]:  # fmt: skip
-        """Fits at points (hypothesis, z, x), whose stretches begin `away` (`Fit.away`), as the arena says if None."""
+        """Fits at points (hypothesis, z, x), whose stretches begin `away` (`Fit.away`), as the arena says if None.
+        Derivatives are those of the fit `like`, which is of no effect, or those by the nuisances alone."""
         if not points:
             return []
         own = [self.arena.away] * len(points) if away is None else list(away)
         raw = self._raw(points, own)
-        return [self.begin(h, z, x, [one[i] for one in raw], own[i]) for i, (h, z, x) in enumerate(points)]
+        white = whitened(self.arena.white, raw)
+        found = []
+        for i, (h, z, x) in enumerate(points):
+            cost = float(self.cost(h, z[None], x[None], white[i : i + 1])[0])
+            J = self._derivatives(h, len(x)) if like is None else like.jacobian
+            found.append(Fit(h, z.copy(), x.copy(), white[i], J, cost, x.copy(), own[i].copy(), [r[i] for r in raw]))
+        return found
+
+    def _derivatives(self, hypothesis: Hypothesis, count: int) -> np.ndarray:
+        found = np.pad(self.arena.by_nuisance, ((0, 0), (0, count)))
+        found[:, self.overruled(hypothesis)] = 0.0
+        return found
 
     def costs(
         self, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]], away: Sequence[np.ndarray]
@@ -117,13 +124,12 @@ class Fits:
         raw = self._raw([(fit.hypothesis, fit.z, fit.x) for fit in fits], wanted)
         white = whitened(self.arena.white, raw)
         own = np.array([fit.residual for fit in fits])
-        costs = [minus_log(self.arena.squares(one), self.arena.logdets, self.arena.sizes) for one in (own, white)]
-        better = costs[1] < costs[0]
+        costs = self._nats(own)
+        better = self._nats(white) < costs
         mixed = [np.where(yes[:, None], new, old) for yes, new, old in zip(better.T, raw, before, strict=True)]
         white = whitened(self.arena.white, mixed)
-        both = [costs[0], minus_log(self.arena.squares(white), self.arena.logdets, self.arena.sizes)]
-        for i, fit in enumerate(fits):
-            gain = float(np.sum((both[0] - both[1])[i]))
+        gains = (costs - self._nats(white)).sum(axis=1)
+        for i, (fit, gain) in enumerate(zip(fits, gains.tolist(), strict=True)):
             if gain <= 0:
                 continue
             fit.residual, fit.raw = white[i], [one[i] for one in mixed]
@@ -168,6 +174,8 @@ class Fits:
         H, g = np.zeros((len(w), n, n)), np.zeros((len(w), n))
         for k, white in enumerate(self.arena.white):
             for c, kind in enumerate(white.kinds):
+                if w[k, c] < NO_WEIGHT:
+                    continue
                 J = fit.jacobian[kind.rows]
                 H[k] += w[k, c] * J.T @ J
                 g[k] += w[k, c] * J.T @ fit.residual[kind.rows]

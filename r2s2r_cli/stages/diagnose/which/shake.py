@@ -43,8 +43,6 @@ def _held(
     fits: Fits, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]], away: Sequence[np.ndarray], like: Fit
 ) -> list[Fit]:  # fmt: skip
     """Settled fits at points, with the derivatives of another one."""
-    found = fits.begun(points, away)
-    for one in found:
-        one.jacobian = like.jacobian.copy()
+    found = fits.begun(points, away, like)
     fits.settle(found)
     return found

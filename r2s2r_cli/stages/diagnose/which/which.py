@@ -136,7 +136,7 @@ def _widened(arena: Arena, fits: Sequence[Fit]) -> tuple[float, float]:
     raws = [[one[None] for one in fit.raw] for fit in fits]
     found: dict[float, np.ndarray] = {}
     for factor in (1.0, *WIDER):
-        arena.whiten(floor_m=factor * own)
+        arena.whiten(floor_m=factor * own, trial=True)
         found[factor] = np.array([arena.log_densities(raw) for raw in raws]).max(axis=0)
     arena.whiten(floor_m=own)
     more = {factor: float(np.minimum(one - found[1.0], ENOUGH).sum()) for factor, one in found.items()}

@@ -114,12 +114,11 @@ def whites(
         begin += d.shape[1] * d.shape[2]
     alone: list[list[Kind]] = []
     for one, d, first in zip(many, by_offset, firsts, strict=True):
-        made, size, roots = [], 0, np.zeros(0)
-        for c, factor in enumerate(FACTORS):
-            if c == 0 or factor != FACTORS[c - 1]:
-                roots, size = _roots(one, sensors, factor * floor_m, noise, lasts)
+        made: list[Kind] = []
+        for c, factor in enumerate(FACTORS[1:], start=1):
+            roots, size = _roots(one, sensors, factor * floor_m, noise, lasts)
             made.append(_kind(roots, d, c * total + first))
-        alone.append(made)
+        alone.append([replace(made[0], rows=slice(first, first + d.shape[1] * d.shape[2])), *made])
         sizes.append(size)
     found = []
     for k, (kinds, way) in enumerate(zip(alone, ways, strict=True)):
@@ -156,8 +155,10 @@ def whitened_of(
     many: Sequence[White], raw: Sequence[np.ndarray] | Mapping[int, np.ndarray], k: int
 ) -> list[np.ndarray]:  # fmt: skip
     """Raw residuals of the stretch k, white under each kind, (k, channel F) each."""
-    own = many[k].residual(raw[k])
-    return [kind.white(own if kind.link is None else own + shifted(many, raw, k)) for kind in many[k].kinds]
+    own, (first, *others) = many[k].residual(raw[k]), many[k].kinds
+    found = [kind.white(own) for kind in others]
+    # Without a link the first kind is the second one.
+    return [found[0] if first.link is None else first.white(own + shifted(many, raw, k)), *found]
 
 
 def shifted(many: Sequence[White], raw: Sequence[np.ndarray] | Mapping[int, np.ndarray], k: int) -> np.ndarray:

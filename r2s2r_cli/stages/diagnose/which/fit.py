@@ -105,7 +105,7 @@ class Fits:
                 for length in LENGTHS:
                     points.append(self.moved(fit, length * step))
             raw = self._raw(
-                [(fit.hypothesis, *point) for fit, point in _spread(going, points)],
+                [(going[i // len(LENGTHS)].hypothesis, *point) for i, point in enumerate(points)],
                 [fit.away for fit in going for _ in LENGTHS],
             )
             for i, fit in enumerate(going):
@@ -246,9 +246,3 @@ def unlikely(arena: Arena, z: np.ndarray) -> np.ndarray:
     """-log prior density of nuisances z (k, p + q), up to a constant, (k,) [nats]."""
     away = z - arena.mean
     return np.asarray(0.5 * np.einsum("ki,ij,kj->k", away, arena.precision, away))
-
-
-def _spread(
-    fits: Sequence[Fit], points: Sequence[tuple[np.ndarray, np.ndarray]]
-) -> list[tuple[Fit, tuple[np.ndarray, np.ndarray]]]:
-    return [(fits[i // len(LENGTHS)], point) for i, point in enumerate(points)]

@@ -95,8 +95,8 @@ def told(project: Path) -> dict[str, Any]:
 
 
 def test_an_effect_of_a_package_is_found(project: Path) -> None:
-    """It is screened, fitted to what was planted, before any other, and said to be what the runs show. From 0.3 to 0.5 N
-    the four intervals cost the same within a few nats, by chance one more or less than the next."""
+    """It is screened, fitted to what was planted, before any other, and said to be what the runs show. From 0.3 N to
+    0.5 N four intervals cost the same within a few nats, by chance one more or less than the next."""
     first = next(one for one in told(project)["ranking"] if one["effect"] not in ("none", "unknown"))
     assert first["effect"] == "side_wind" and first["channel"] == "world"
     size, (low, high) = first["size"]["side_wind.force_n"], first["ci90"]["side_wind.force_n"]

@@ -51,10 +51,9 @@ nothing, and weighed like more it outdoes gains that are real."""
 @dataclass(frozen=True)
 class Case:
     """One set. names: what was ranked; score, parity (n,) [nats]: without the numbers that are learned, parity beyond
-    BY_CHANCE; equivalent:
-    the test found no gap. truth: the right name, not among `names` where the screening had lost it. gap, left [nats]:
-    what pieces cost beyond those of healthy runs, under the refit model and under the best effect; 0 where they cost
-    less."""
+    BY_CHANCE; equivalent: the test found no gap. truth: the right name, not among `names` where the screening had lost
+    it. gap, left [nats]: what pieces cost beyond those of healthy runs, under the refit model and under the best
+    effect; 0 where they cost less."""
 
     names: tuple[str, ...]
     score: np.ndarray

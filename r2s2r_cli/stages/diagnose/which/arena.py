@@ -56,10 +56,9 @@ class Arena:
         self.gait = np.array([self.gaits.index(one.gait) for one in many])
         self.white: tuple[White, ...] = ()
         self.by_nuisance = np.zeros((0, 0))
-        starting = Starting(replayer.structure, self.many)
-        self.away = np.zeros((len(self.many), starting.offsets))
+        self.starting = Starting(replayer.structure, self.many)
+        self.away = np.zeros((len(self.many), self.starting.offsets))
         """Where hypotheses begin that do not say, in sd from the starts, (stretch, offset)."""
-        self.starting = starting
         self._shifts = [self.shifts.columns(one, None) for one in self.many]
 
     def values(self, z: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
-from r2s2r_cli.stages.diagnose.which.white import White, begun, shifted
+from r2s2r_cli.stages.diagnose.which.white import White, begun
 
 MOST_SD = 2.5
 """How far from where it is known to be a start may be moved, every coordinate in its sd."""
@@ -21,10 +21,16 @@ def likely_start(
     own = white[k].residual(raw[k])
     squares, starts = [], []
     for kind in white[k].kinds:
-        rooted = kind.rooted(own if kind.link is None else own + shifted(white, raw, k))
+        link = kind.link
+        if link is None:
+            rooted = kind.rooted(own)
+            start = kind.start(rooted)[:, :offsets]
+        else:
+            middle = begun(white, raw, k)
+            rooted = kind.rooted(own + link.shift(middle))
+            start = middle + kind.start(rooted)[:, :offsets] @ link.root.T
         squares.append(np.sum(kind.off_start(rooted) ** 2, axis=1))
-        start = kind.start(rooted)[:, :offsets]
-        starts.append(start if kind.link is None else begun(white, raw, k) + start @ kind.link.root.T)
+        starts.append(start)
     best = np.argmin(np.array(squares) + white[k].logdet[:, None], axis=0)
     return np.clip(np.array(starts)[best, np.arange(len(best))], -MOST_SD, MOST_SD)
 

@@ -29,20 +29,22 @@ FAR, FAR_HIDDEN = 30.0, 3.0
 @dataclass(frozen=True)
 class Link:
     """From the piece before to a stretch. before: its place; start (offset, channel F): from its rooted residuals to
-    the offsets of this one; roots (channel, F, F): what makes them rooted. responses (offset, channel, F): what one sd
+    the offsets of this one. responses (offset, channel, F): what one sd
     of each offset changes here; root (offset, offset): of the covariance of the offsets."""
 
     before: int
     start: np.ndarray
-    roots: np.ndarray
     responses: np.ndarray
     root: np.ndarray
 
-    def middle(self, ahead: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    def middle(self, ahead: np.ndarray, rooted: np.ndarray) -> np.ndarray:
         """Where the stretch most likely begins, (k, offset) [sd], if the piece before ends at `ahead` (k, offset) [sd]
-        and leaves residuals (k, channel, F)."""
-        rooted = np.matmul(residual.transpose(1, 0, 2), self.roots.transpose(0, 2, 1)).transpose(1, 0, 2)
-        return np.asarray(ahead - rooted.reshape(len(residual), -1) @ self.start.T)
+        and leaves rooted residuals (k, channel F)."""
+        return np.asarray(ahead - rooted @ self.start.T)
+
+    def shift(self, begun: np.ndarray) -> np.ndarray:
+        """What residuals are more for beginning there (k, offset) [sd], (k, channel, F)."""
+        return np.asarray(np.einsum("ko,ocf->kcf", begun, self.responses))
 
 
 @dataclass(frozen=True)
@@ -59,15 +61,13 @@ class Way:
     lasts: float
     rods: int
 
-    def link(self, to_start: np.ndarray, known: np.ndarray, roots: np.ndarray, floor_m: float) -> Link:
+    def link(self, to_start: np.ndarray, known: np.ndarray, floor_m: float) -> Link:
         """to_start, known: of the piece before (`white.Kind`), seen alone. floor_m: of the simulator, per second."""
         n = len(self.through)
         spread = self.through @ known[:n]
         more = self.errs(floor_m) / self.sd
         covariance = spread @ spread.T + self.rough.T @ self.rough + np.diag(more**2)
-        return Link(
-            self.before, self.through @ to_start[:n], roots, self.responses, np.linalg.cholesky(covariance),
-        )  # fmt: skip
+        return Link(self.before, self.through @ to_start[:n], self.responses, np.linalg.cholesky(covariance))
 
     def errs(self, floor_m: float) -> np.ndarray:
         """Sd of where a simulator of that floor ends a piece, (offset,) in the units of `offsets.StartSpread`."""

@@ -42,7 +42,7 @@ class Starting:
     def learn(self, seen: Sequence[Seen]) -> None:
         """From what was seen of every stretch at `tried`."""
         self.by_start = [_responses(one) for one in seen]
-        self._through = [followed(self._apart(one.end[:1], one.end[1:]), self.structure.n_rods) for one in seen]
+        self._through = [self._apart(one.end[:1], one.end[1:]) for one in seen]
         self.ways = [self._way(k, np.zeros((0, self.offsets))) for k in range(len(seen))]
         self.by_settled = [np.einsum("o,ocf->cf", *both) for both in zip(self.settled, self.by_start, strict=True)]
 

@@ -124,7 +124,7 @@ def whites(
     for k, (kinds, way) in enumerate(zip(alone, ways, strict=True)):
         if way is not None:
             before = alone[way.before][1]
-            link = way.link(before.to_start, before.known, before.roots, floor_m)
+            link = way.link(before.to_start, before.known, floor_m)
             d = np.concatenate([np.einsum("ol,ocf->lcf", link.root, link.responses), by_offset[k][len(link.root) :]])
             kinds = [replace(_kind(kinds[0].roots, d, kinds[0].rows.start), link=link), *kinds[1:]]
         found.append(White(tuple(kinds), sizes[k]))
@@ -158,22 +158,17 @@ def whitened_of(
     own, (first, *others) = many[k].residual(raw[k]), many[k].kinds
     found = [kind.white(own) for kind in others]
     # Without a link the first kind is the second one.
-    return [found[0] if first.link is None else first.white(own + shifted(many, raw, k)), *found]
-
-
-def shifted(many: Sequence[White], raw: Sequence[np.ndarray] | Mapping[int, np.ndarray], k: int) -> np.ndarray:
-    """What the residuals of a linked stretch are more for beginning where the piece before ended, (k, channel, F)."""
-    link = many[k].kinds[0].link
-    assert link is not None  # noqa: S101 - only linked ones are asked for
-    return np.asarray(np.einsum("ko,ocf->kcf", begun(many, raw, k), link.responses))
+    if first.link is None:
+        return [found[0], *found]
+    return [first.white(own + first.link.shift(begun(many, raw, k))), *found]
 
 
 def begun(many: Sequence[White], raw: Sequence[np.ndarray] | Mapping[int, np.ndarray], k: int) -> np.ndarray:
     """Where a linked stretch begins by the piece before and what its frames say, in sd of its start, (k, offset)."""
     link = many[k].kinds[0].link
-    assert link is not None  # noqa: S101 - as above
+    assert link is not None  # noqa: S101 - only linked ones are asked for
     before = many[link.before]
-    return link.middle(many[k].ahead(raw[k]), before.residual(raw[link.before]))
+    return link.middle(many[k].ahead(raw[k]), before.kinds[1].rooted(before.residual(raw[link.before])))
 
 
 def _roots(one: Stretch, sensors: int, floor_m: float, noise: float, lasts: float) -> tuple[np.ndarray, int]:

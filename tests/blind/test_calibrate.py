@@ -29,17 +29,19 @@ def scores(by: Calibration, one: Case) -> dict[str, float]:
     }
 
 
-def planted(count: int, seed: int = 0) -> list[Case]:
-    """Sets whose truth is drawn from the probabilities of known numbers."""
+def planted(
+    count: int, seed: int = 0, by: Calibration = TRUE, gains: tuple[float, float] = (67.0, 45.0)
+) -> list[Case]:  # fmt: skip
+    """Sets whose truth is drawn from the probabilities of known numbers; gains: mean and sd of those of effects."""
     rng = np.random.default_rng(seed)
     found = []
     for _ in range(count):
         names = (*EFFECTS, "none", "unknown")
-        score = np.array([*rng.normal(67.0, 45.0, len(EFFECTS)), 90.0, rng.uniform(0.0, 300.0)])
+        score = np.array([*rng.normal(*gains, len(EFFECTS)), 90.0, rng.uniform(0.0, 300.0)])
         parity = np.array([*rng.exponential(1.5, len(EFFECTS)), 0.0, 0.0])
         gap = rng.uniform(0.0, 120.0)
         one = Case(names, score, parity, bool(rng.random() < 0.3), "", gap, gap * rng.uniform(0.0, 1.0))
-        p = np.array(list(TRUE.probabilities(scores(TRUE, one)).values()))
+        p = np.array(list(by.probabilities(scores(by, one)).values()))
         found.append(replace(one, truth=names[rng.choice(len(names), p=p)]))
     return found
 
@@ -57,6 +59,28 @@ def test_planted_numbers_come_back() -> None:
     assert found["left"] == pytest.approx(TRUE.left, abs=0.2)
     assert found["equivalent"] == pytest.approx(TRUE.equivalent, abs=8.0)
     assert found["bias"]["soft_ground"] - found["bias"]["payload"] == pytest.approx(-27.0, abs=7.0)
+
+
+@pytest.mark.parametrize("share", [0.1, 1.0])
+def test_what_chance_gives_counts_a_share(share: float) -> None:
+    """It is learned whether nats below the usual gain say as much as those above: here a tenth, and all."""
+    by = replace(
+        TRUE, temperature=4.0, parity=4.0, none=-85.0, unknown=110.0, usual=8.0, usual_share=share, bias={}
+    )  # fmt: skip
+    found = calibrated(planted(2000, by=by, gains=(8.0, 12.0)), words="test")
+    assert found["usual"] == by.usual and found["usual_share"] == pytest.approx(share, abs=0.15)
+    assert found["temperature"] == pytest.approx(by.temperature, rel=0.4)
+
+
+def test_strangers_do_not_move_the_threshold_of_names() -> None:
+    """Sets whose cause no catalogue has, each with an effect that gains much: names are committed to as before, though
+    the first guess is wrong in every one of these sets."""
+    sets = planted(300)
+    stranger = Case(
+        (*EFFECTS, "none", "unknown"), np.array([500.0, 0.0, 0.0, 0.0, 90.0, 0.0]), np.zeros(6), False, "unknown"
+    )
+    before, after = (calibrated(one, words="test") for one in (sets, [*sets, *[stranger] * 30]))
+    assert after["commit"] < before["commit"] + 0.1 < 1.0
 
 
 def test_a_set_of_90_per_cent_holds_the_truth_so_often() -> None:

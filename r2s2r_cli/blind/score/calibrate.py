@@ -1,12 +1,14 @@
 """From verdicts on a calibration bank to the numbers that turn gains into probabilities.
 
-p(name) ~ exp((score + bias) / temperature). The score of an effect is its held-out gain, and `parity` times what the
-parity stage says for it; that of `none` what the best of the catalogue gains by chance, and `none`, and `equivalent`
+p(name) ~ exp((score + bias) / temperature). The score of an effect is its held-out gain, of which the first USUAL nats
+count a share (`usual_share`), since chance gives as much to whatever is tried, and `parity` times what the parity stage
+says for it; that of `none` what the best of the catalogue gains by chance, and `none`, and `equivalent`
 more where the equivalence test finds no gap, less `gap` for every nat that today's pieces cost beyond those of healthy
 runs; that of `unknown` a share (`unknown_share`) of what a wider floor gains, and `left` for every nat that the best
 effect leaves, less `unknown`. Linear in 1 / temperature and the products with it: a multinomial regression, biases
 drawn to 0, in which any name is the truth once in 20 sets (LAPSE). Thresholds come from probabilities of sets left out
-of the fit. To commit to a name, to `none` and to `unknown` are claims of different weight: each has its own.
+of the fit. To commit to a name, to `none` and to `unknown` are claims of different weight: each has its own. That of
+names is for sets in which the catalogue has the cause; how often strangers are taken for one of them is another figure.
 """
 
 from __future__ import annotations
@@ -21,12 +23,12 @@ from r2s2r_cli.blind.score.facts import NONE, UNKNOWN, Truth
 from r2s2r_cli.errors import InputError
 
 LEAST_SETS = 12
-LEARNED = ("sharpness", "parity", "none", "equivalent", "gap", "unknown", "unknown_share", "left")
+LEARNED = ("sharpness", "parity", "none", "equivalent", "gap", "unknown", "unknown_share", "left", "usual")
 """Numbers beside the biases, in the order of the columns; all of them in the exponent."""
-BEFORE = (0.5, 0.7, 0.0, 0.0, 0.05, -1.0, 0.3, 0.05)
+BEFORE = (1.0, 0.7, 0.0, 0.0, 0.05, -1.0, 0.3, 0.05, 0.5)
 """What they are before anything is learned, gains in the unit of SHARPNESS."""
-BEFORE_SD = (0.5, 0.3, 2.0, 1.0, 0.1, 2.0, 0.3, 0.1)
-POSITIVE = ("sharpness", "parity", "gap", "unknown_share", "left")
+BEFORE_SD = (2.0, 0.3, 2.0, 1.0, 0.1, 2.0, 0.3, 0.1, 0.5)
+POSITIVE = ("sharpness", "parity", "gap", "unknown_share", "left", "usual")
 FOLDS = 10
 COVER = 0.90
 PRECISION = {"commit": 0.90, "commit_none": 0.80, "commit_unknown": 0.75}
@@ -40,9 +42,9 @@ LAPSE = 0.05
 """How often the evidence says nothing of the truth, whatever it says: without this one set in which a stranger looks
 just like an effect decides what all evidence is worth."""
 SHARPNESS = 1.0 / 15.0
-"""1 / temperature before anything is learned [1/nats], and the unit in which it is fitted."""
-
-
+"""The unit in which 1 / temperature is fitted [1/nats]."""
+USUAL = 8.0
+"""[nats] About what the best of a catalogue gains where nothing is wrong."""
 BY_CHANCE = 4.0
 """[nats] That the parity stage says for the best of a whole catalogue where nothing is wrong: less than that says
 nothing, and weighed like more it outdoes gains that are real."""
@@ -106,6 +108,8 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
         "temperature": 1.0 / sharp,
         "parity": learned["parity"] / sharp,
         "by_chance": BY_CHANCE,
+        "usual": USUAL,
+        "usual_share": learned["usual"] * SHARPNESS / sharp,
         "none": learned["none"] / sharp,
         "equivalent": learned["equivalent"] / sharp,
         "gap": learned["gap"] * SHARPNESS / sharp,
@@ -115,7 +119,7 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
         "bias": {name: float(b) / sharp for name, b in zip(effects, whole[len(LEARNED) :], strict=True)},
         **{
             key: _commit(sure[of], right[of], wanted)
-            for (key, wanted), of in zip(PRECISION.items(), _claims(first), strict=True)
+            for (key, wanted), of in zip(PRECISION.items(), _claims(first, apart), strict=True)
         },
         "conformal": float(held[k - 1]) if k else 0.0,
         "lapse": LAPSE,
@@ -134,10 +138,12 @@ def _design(one: Case, effects: Sequence[str]) -> np.ndarray:
     for row, name, score, parity in zip(X, one.names, one.score, one.parity, strict=True):
         if name == UNKNOWN:
             row[5:8] = 1.0, score * SHARPNESS, one.left * SHARPNESS
-        elif name == NONE:
-            row[[0, 2, 3, 4]] = score * SHARPNESS, 1.0, float(one.equivalent), -one.gap * SHARPNESS
+            continue
+        row[[0, 8]] = max(score - USUAL, 0.0) * SHARPNESS, min(score, USUAL) * SHARPNESS
+        if name == NONE:
+            row[2:5] = 1.0, float(one.equivalent), -one.gap * SHARPNESS
         else:
-            row[:2] = score * SHARPNESS, parity
+            row[1] = parity
             row[len(LEARNED) + effects.index(name)] = 1.0
     return X
 
@@ -181,10 +187,14 @@ def _left_out(cases: Sequence[Case], effects: Sequence[str], fold: int) -> list[
     ]  # fmt: skip
 
 
-def _claims(first: Sequence[str]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which first guesses are an effect, `none`, `unknown`, in the order of PRECISION, (set,) each."""
+def _claims(
+    first: Sequence[str], apart: Sequence[tuple[Case, dict[str, float]]]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    """Which first guesses are an effect where no stranger is the cause, `none`, `unknown`, in the order of PRECISION,
+    (set,) each."""
     none, unknown = (np.array([one == name for one in first], dtype=bool) for name in (NONE, UNKNOWN))
-    return ~(none | unknown), none, unknown
+    stranger = np.array([one.truth == UNKNOWN for one, _ in apart], dtype=bool)
+    return ~(none | unknown | stranger), none, unknown
 
 
 def _commit(sure: np.ndarray, right: np.ndarray, precision: float) -> float:

@@ -185,7 +185,8 @@ def _fitted(
             base = _from(arena, z)
             solver = Fits(arena)
             solver.run([base])
-            if number == rounds - 1:
+            # Before the last derivatives: they are to be those of the best place.
+            if number == rounds - 1 and not again:
                 base = shaken(solver, base)
             z, arena.away = base.z, base.away
         simulator, noise, lasts = arena.floor_m, arena.noise, arena.lasts

@@ -15,8 +15,7 @@ MODEL = Model(nominal(robot()), effects=("backlash", "sensor_bias", "sensor_gain
 
 def first_and_back(values: np.ndarray, starts: np.ndarray, delays: np.ndarray) -> tuple[list[int], list[int]]:
     """Of hypotheses with two stretches each."""
-    theta = MODEL.theta(values)
-    first, back = first_of_each(MODEL.structure, theta, torch.as_tensor(starts), delays)
+    first, back = first_of_each(MODEL.structure, MODEL.packed(values), torch.as_tensor(starts), delays)
     return first.tolist(), back.tolist()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -36,9 +37,10 @@ def rows_of(theta: Parameters, rows: Tensor) -> Parameters:
     return theta.map(lambda x: x[rows] if len(x) > 1 else x)
 
 
-def placed(structure: Structure, theta: Parameters, start: Tensor, up: float) -> Tensor:
-    """Starts (k, NS) where each hypothesis's camera says that the robot is: they stand where it was
-    seen. theta: parameters of each, batch k; up: height of the ground in the world [m]."""
+def placed(structure: Structure, theta: Parameters, whose: Tensor, start: Tensor, up: float) -> Tensor:
+    """Starts (row, NS) where each hypothesis's camera says that the robot is: they stand where it was
+    seen. theta: parameters of the hypotheses, batch k; whose (row,): which one's a start is; up: height of the ground
+    in the world [m]."""
     import roma
     import torch
 
@@ -49,11 +51,11 @@ def placed(structure: Structure, theta: Parameters, start: Tensor, up: float) ->
     from r2s2r_cli.engine.roll import along
     from r2s2r_cli.engine.settle import lowered
 
-    rows = acting(structure, theta, "observation").nonzero()[:, 0]
+    rows = acting(structure, theta, "observation")[whose].nonzero()[:, 0]
     if not len(rows):
         return start
     with torch.no_grad():
-        own, state = rows_of(theta, rows), unpack_state(structure, start[rows])
+        own, state = rows_of(theta, whose[rows]), unpack_state(structure, start[rows])
         robot = effective(structure, own)
         shown = end_caps(robot, state)
         lift = torch.tensor([0.0, 0.0, up], dtype=start.dtype)
@@ -68,25 +70,27 @@ def placed(structure: Structure, theta: Parameters, start: Tensor, up: float) ->
 
 
 def carried(
-    structure: Structure, one: Stretch, start: Tensor, before: Tensor, let_out: Tensor | float = 0.0
+    structure: Structure, many: Sequence[Stretch], start: Tensor, before: Tensor, let_out: Tensor | float = 0.0
 ) -> Tensor:  # fmt: skip
-    """Starts (k, NS) with what no cap shows from the states (k, NS) before: rest lengths of cables that hang, by
-    each hypothesis's own account, winding rates, the memory of effects. What left the finite numbers hands nothing
-    on. let_out: what the starts have more of winched cables [m], (k, actuated)."""
+    """Starts (k, stretch, NS) with what no cap shows from the states before, of the same shape: rest lengths of cables
+    that hang, by each hypothesis's own account, winding rates, the memory of effects. What left the finite numbers
+    hands nothing on. let_out: what the starts have more of winched cables [m], (k, stretch, actuated)."""
     import torch
 
     from r2s2r_cli.engine.flat import state_slots
 
     slots = state_slots(structure)
-    own = torch.zeros(start.shape[1], dtype=torch.bool)
+    own = torch.zeros(start.shape[-1], dtype=torch.bool)
     for name, slot in slots.items():
         own[slot.start : slot.start + slot.size] = name == "winding" or "." in name
     found = torch.where(own, before, start)
-    if one.taut is not None:
-        rest = slice(slots["rest"].start, slots["rest"].start + slots["rest"].size)
-        taut = torch.as_tensor(one.taut).expand(len(before), -1) + let_out
-        found[:, rest] = torch.where(before[:, rest] > taut + one.margin, before[:, rest], taut)
-    return torch.where(before.isfinite().all(dim=1, keepdim=True), found, start)
+    rest = slice(slots["rest"].start, slots["rest"].start + slots["rest"].size)
+    for i, one in enumerate(many):
+        if one.taut is not None:
+            more = let_out if isinstance(let_out, float) else let_out[:, i]
+            taut, hangs = torch.as_tensor(one.taut) + more, before[:, i, rest]
+            found[:, i, rest] = torch.where(hangs > taut + one.margin, hangs, taut)
+    return torch.where(before.isfinite().all(dim=-1, keepdim=True), found, start)
 
 
 def between(stored: Tensor, place: Tensor) -> Tensor:

@@ -20,7 +20,8 @@ FILE = "calibration.json"
 class Calibration:
     """What turns evidence into probabilities.
 
-    temperature [nats]: of the softmax over names. parity: nats of gain that a nat of the parity stage is worth, which
+    temperature [nats]: of the softmax over names. usual [nats]: about what chance gives to the best of a catalogue;
+    usual_share: what a nat below it counts. parity: nats of gain that a nat of the parity stage is worth, which
     needs no simulator and errs far less, beyond by_chance [nats], which it says for the best of a whole catalogue where
     nothing is wrong. none, equivalent [nats]: what `none`
     gains, and more where the equivalence test finds no gap; gap: what it loses for every nat that the refit model costs
@@ -35,6 +36,8 @@ class Calibration:
     temperature: float = 25.0
     parity: float = 15.0
     by_chance: float = 0.0
+    usual: float = 0.0
+    usual_share: float = 1.0
     none: float = 20.0
     equivalent: float = 6.0
     gap: float = 0.0
@@ -57,10 +60,11 @@ class Calibration:
         """What a name is worth without its bias [nats]. gain: held out; of `none` what chance reaches, of `unknown`
         what a wider floor gains. equivalent: the equivalence test found no gap. beyond: what pieces cost more than
         those of healthy runs (`left.Left`): under the refit model for `none`, under the best effect for `unknown`."""
-        if name == NONE:
-            return gain + self.none + (self.equivalent if equivalent else 0.0) - self.gap * max(beyond, 0.0)
         if name == UNKNOWN:
             return self.unknown_share * gain + self.left * max(beyond, 0.0) - self.unknown
+        gain = self.usual_share * min(gain, self.usual) + max(gain - self.usual, 0.0)
+        if name == NONE:
+            return gain + self.none + (self.equivalent if equivalent else 0.0) - self.gap * max(beyond, 0.0)
         return gain + self.parity * max(parity - self.by_chance, 0.0)
 
     def absolute(self) -> Calibration:

@@ -36,7 +36,7 @@ def looked(
     """Caps and lengths, as `Seen`, of each stretch, from the states (row, stored, NS), which are `every` seconds apart;
     rows (k stretch,): of each hypothesis and stretch.
 
-    theta: batch k stretch, without the camera's delay; behind (k,) [s]: that delay. cable_caps: end caps of each cable,
+    theta: batch k, without the camera's delay; behind (k,) [s]: that delay. cable_caps: end caps of each cable,
     between which the sensors measure; up: height of the ground in the world [m].
     """
     import torch
@@ -51,18 +51,19 @@ def looked(
     ends = torch.as_tensor(cable_caps)
     length = torch.linalg.vector_norm(caps[..., ends[:, 0], :] - caps[..., ends[:, 1], :], dim=-1)[rows]
     begin = torch.as_tensor([one.window.start for one in many]).repeat(k)
-    length = _read(structure, theta, length, begin[:, None] + every * torch.arange(stored))
+    whose = torch.arange(k).repeat_interleave(len(many))
+    length = _read(structure, theta, whose, length, begin[:, None] + every * torch.arange(stored))
     since = torch.as_tensor(_since(many)).repeat(k, 1)
     late = torch.as_tensor(behind).repeat_interleave(len(many))[:, None]
     shown = between(caps[rows], since / every)
     shown[..., 2] += up
     lengths = between(length, (since + late) / every).numpy()
-    special = acting(structure, theta, "observation").unflatten(0, (k, len(many)))
+    special = acting(structure, theta, "observation").expand(k)
     found = []
     for i, one in enumerate(many):
         F = len(one.t)
         camera = shown[i :: len(many), :F]
-        _observe(structure, theta, special[:, i], i, len(many), torch.as_tensor(one.t), camera)
+        _observe(structure, theta, special, torch.as_tensor(one.t), camera)
         found.append((camera.numpy(), lengths[i :: len(many), :F][..., list(one.sensors)]))
     return found
 
@@ -73,28 +74,26 @@ def _since(many: Sequence[Stretch]) -> np.ndarray:
     return np.array([np.pad(one.t - one.window.start, (0, most - len(one.t)), mode="edge") for one in many])
 
 
-def _read(structure: Structure, theta: Parameters, length: Tensor, t: Tensor) -> Tensor:
-    """Lengths (row, stored, cable) as the sensors read them at times t (row, stored) [s] of the run: only rows whose
-    sensors are not as they should be are gone through."""
+def _read(structure: Structure, theta: Parameters, whose: Tensor, length: Tensor, t: Tensor) -> Tensor:
+    """Lengths (row, stored, cable) as the sensors of hypotheses whose (row,) they are read them at times t (row,
+    stored) [s] of the run: only rows whose sensors are not as they should be are gone through."""
     from r2s2r_cli.engine import sense
 
-    rows = acting(structure, theta, "sensing").nonzero()[:, 0]
+    rows = acting(structure, theta, "sensing")[whose].nonzero()[:, 0]
     if len(rows):
         stored = length.shape[1]
-        own = rows_of(theta, rows).map(lambda x: x.repeat_interleave(stored, dim=0))
+        own = rows_of(theta, whose[rows].repeat_interleave(stored))
         length[rows] = sense(structure, own, length[rows].flatten(0, 1), t[rows].reshape(-1, 1)).unflatten(
             0, (len(rows), stored)
         )
     return length
 
 
-def _observe(
-    structure: Structure, theta: Parameters, special: Tensor, i: int, count: int, t: Tensor, shown: Tensor
-) -> None:
-    """Puts what cameras that are not as they should be (special: (k,), whose) see of the i-th of `count` stretches at
-    times t (F,) in place of what is shown (k, F, cap, 3)."""
+def _observe(structure: Structure, theta: Parameters, special: Tensor, t: Tensor, shown: Tensor) -> None:
+    """Puts what cameras that are not as they should be (special: (k,), whose) see of a stretch at times t (F,) in place
+    of what is shown (k, F, cap, 3)."""
     from r2s2r_cli.engine import observe
 
     rows = special.nonzero()[:, 0]
     if len(rows):
-        shown[rows] = observe(structure, rows_of(theta, rows * count + i), t, shown[rows])
+        shown[rows] = observe(structure, rows_of(theta, rows), t, shown[rows])

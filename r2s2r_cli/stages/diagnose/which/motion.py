@@ -13,7 +13,7 @@ import numpy as np
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from r2s2r_cli.engine import Parameters, Structure
+    from r2s2r_cli.engine import Structure
 
 SEEN = ("sensing", "observation")
 """Hooks that act on what is seen of a trajectory."""
@@ -37,21 +37,22 @@ def moves_nothing(structure: Structure) -> tuple[str, ...]:
 
 
 def first_of_each(
-    structure: Structure, theta: Parameters, s0: Tensor, delays: np.ndarray
+    structure: Structure, packed: Tensor, s0: Tensor, delays: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Places of the first hypothesis of each motion, and the place of every hypothesis among these, (k,).
 
-    theta: batch 1 or k; s0: starts (k stretch, NS), those of a hypothesis after each other; delays (k,) [s]: of its
-    commands. Alike is alike in every bit.
+    packed (k, NP): flat parameters; s0: starts (k stretch, NS), those of a hypothesis after each other; delays (k,)
+    [s]: of its commands. Alike is alike in every bit.
     """
     import torch
 
-    from r2s2r_cli.engine.flat import pack_parameters
+    from r2s2r_cli.engine.flat import parameter_slots
 
-    k = len(delays)
-    quiet = {name: torch.zeros_like(theta.extra[name]) for name in moves_nothing(structure) if name in theta.extra}
-    packed = pack_parameters(structure, theta.with_values(quiet).map(lambda x: x.expand(k, *x.shape[1:])))
-    rows = torch.cat([packed, s0.reshape(k, -1), torch.as_tensor(delays)[:, None]], dim=1).numpy()
+    k, slots = len(delays), parameter_slots(structure)
+    moving = packed.clone()
+    for name in moves_nothing(structure):
+        moving[:, slots[name].start : slots[name].start + slots[name].size] = 0.0
+    rows = torch.cat([moving, s0.reshape(k, -1), torch.as_tensor(delays)[:, None]], dim=1).numpy()
     first: dict[bytes, int] = {}
     back = np.array([first.setdefault(row.tobytes(), len(first)) for row in rows])
     return np.unique(back, return_index=True)[1], back

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from r2s2r_cli.stages.diagnose.which.begins import TINY, between, carried, placed
+from r2s2r_cli.stages.diagnose.which.begins import TINY, between, carried, placed, rows_of
 from r2s2r_cli.stages.diagnose.which.looks import Seen, looked
 from r2s2r_cli.stages.diagnose.which.motion import first_of_each
 from r2s2r_cli.stages.diagnose.which.numbers import Model
@@ -28,6 +28,8 @@ EVERY = 10
 """Engine steps between stored states."""
 MOST = 256
 """Simulations in one batch."""
+ROOM = 0.8
+"""Of a step that is stable in one pose: so much is left for poses and robots near it."""
 FEW = 4
 """Hypotheses whose stretches are all simulated in one batch."""
 
@@ -39,6 +41,9 @@ class Replayer(Predictor):
         super().__init__(model, **how)  # type: ignore[arg-type]
         self.model = model
         self._logs: dict[int, tuple[RunData, CommandLog]] = {}
+        self._packed: dict[int, tuple[Stretch, Tensor]] = {}
+        self._longest: dict[tuple[str, int, int], float] = {}
+        self._always: float | None = None
 
     def seen(
         self, many: Sequence[Stretch], values: np.ndarray, by: Sequence[np.ndarray] | None = None
@@ -52,15 +57,10 @@ class Replayer(Predictor):
         after: dict[tuple[str, int, int], Tensor] = {}
         for depth in sorted({one.piece for one in many}):
             rows = [k for k, one in enumerate(many) if one.piece == depth]
-            for group in _groups([many[k].window for k in rows], len(values)):
-                own = [rows[i] for i in group]
-                begin = [after.get((many[k].run, many[k].interval, depth - 1)) for k in own]
-                found = self._chunked(
-                    [many[k] for k in own], values, begin, by=None if by is None else [by[k] for k in own]
-                )
-                for k, one in zip(own, found, strict=True):
-                    parts[k] = one
-                    after[many[k].run, many[k].interval, depth] = torch.as_tensor(one.end)
+            begin = {k: after.get((many[k].run, many[k].interval, depth - 1)) for k in rows}
+            for k, one in self._grouped(many, rows, values, begin, by).items():
+                parts[k] = one
+                after[many[k].run, many[k].interval, depth] = torch.as_tensor(one.end)
         return [parts[k] for k in range(len(many))]
 
     def finals(self, many: Sequence[Stretch], values: np.ndarray) -> State:
@@ -78,33 +78,28 @@ class Replayer(Predictor):
     def around(self, many: Sequence[Stretch], values: np.ndarray, by: Sequence[np.ndarray]) -> list[Seen]:
         """As `seen`, but every stretch stands alone, with nothing handed on to it. Finite steps, because where caps
         slip and stick a derivative at a point may be a thousand times what a millimetre does."""
-        parts: dict[int, Seen] = {}
-        for group in _groups([one.window for one in many], len(values)):
-            found = self._chunked([many[k] for k in group], values, by=[by[k] for k in group])
-            parts.update(zip(group, found, strict=True))
+        parts = self._grouped(many, range(len(many)), values, {}, by)
         return [parts[k] for k in range(len(many))]
 
-    def _chunked(
-        self, many: Sequence[Stretch], values: np.ndarray, begin: Sequence[Tensor | None] = (), *,
-        by: Sequence[np.ndarray] | None = None,
-    ) -> list[Seen]:  # fmt: skip
-        """`_batch`, at most MOST simulations at a time."""
-        together = max(1, MOST // len(many))
-        chunks = []
-        for first in range(0, len(values), together):
-            rows = slice(first, first + together)
-            chunks.append(
-                self._batch(
-                    many, values[rows], [None if one is None else one[rows] for one in begin],
-                    by=None if by is None else [one[rows] for one in by],
-                )
-            )  # fmt: skip
-        return [
-            Seen(
-                *(np.concatenate([getattr(one, name) for one in parts]) for name in ("caps", "length", "begin", "end"))
-            )
-            for parts in zip(*chunks, strict=True)
-        ]
+    def _grouped(
+        self, many: Sequence[Stretch], rows: Sequence[int], values: np.ndarray, begin: Mapping[int, Tensor | None],
+        by: Sequence[np.ndarray] | None,
+    ) -> dict[int, Seen]:  # fmt: skip
+        """The stretches at places `rows`, in batches of about the same length, of at most MOST simulations. begin: by
+        place, as `_batch`; by: of all of `many`."""
+        chunks: dict[int, list[Seen]] = {k: [] for k in rows}
+        for group in _groups([many[k].window for k in rows], len(values)):
+            together, places = max(1, MOST // len(group)), [rows[i] for i in group]
+            before = [begin.get(k) for k in places]
+            for first in range(0, len(values), together):
+                some = slice(first, first + together)
+                found = self._batch(
+                    [many[k] for k in places], values[some], [None if b is None else b[some] for b in before],
+                    by=None if by is None else [by[k][some] for k in places],
+                )  # fmt: skip
+                for k, seen in zip(places, found, strict=True):
+                    chunks[k].append(seen)
+        return {k: _joined(own) for k, own in chunks.items()}
 
     def _batch(
         self, many: Sequence[Stretch], values: np.ndarray, begin: Sequence[Tensor | None] = (), *,
@@ -116,43 +111,96 @@ class Replayer(Predictor):
         import torch
 
         from r2s2r_cli.engine import delay_of
-        from r2s2r_cli.engine.flat import pack_parameters, pack_state, unpack_state
+        from r2s2r_cli.engine.flat import pack_parameters
 
-        structure, step, k = self.structure, self.step, len(values)
+        structure, step, k, count = self.structure, self.step, len(values), len(many)
         own, behind = self._undelayed(self.model.theta(values), k)
-        theta = own.map(lambda x: x.expand(k, *x.shape[1:]).repeat_interleave(len(many), dim=0))
-        starts = [pack_state(structure, one.window.state).expand(k, -1) for one in many]
-        if by is not None:
-            starts = [displaced(structure, start, torch.as_tensor(one)) for start, one in zip(starts, by, strict=True)]
-        for i, before in enumerate(begin):
-            if before is not None:
-                let_out = 0.0 if by is None else torch.as_tensor(by[i][:, -structure.n_actuated :])
-                starts[i] = carried(structure, many[i], starts[i], before, let_out)
+        own = own.map(lambda x: x.expand(k, *x.shape[1:]))
+        whose = torch.arange(k).repeat_interleave(count)
         late = self.model.observation()
-        s0 = placed(structure, theta, torch.stack(starts, dim=1).flatten(0, 1), late.ground_height)
+        s0 = placed(structure, own, whose, self._starts(many, k, begin, by).flatten(0, 1), late.ground_height)
         lasting = max(one.window.duration + one.goes_on for one in many) + max(0.0, float(behind.max()))
         rows = EVERY * (math.ceil(lasting / step / EVERY - TINY) + 1)
         own_delay = delay_of(structure, own)
-        delays = np.zeros(k) if own_delay is None else own_delay.expand(k, 1)[:, 0].numpy()
+        delays = np.zeros(k) if own_delay is None else own_delay[:, 0].numpy()
         delays = delays + behind + late.command_delay + late.camera_delay
-        first, back = first_of_each(structure, own, s0, delays)
-        moved, all_of = _rows(first, len(many)), _rows(back, len(many))
-        u = self._commands_at(many, rows, delays[first])
+        packed = pack_parameters(structure, own)
+        first, back = first_of_each(structure, packed, s0, delays)
+        moved, all_of = _rows(first, count), _rows(back, count)
         self.rollouts += len(moved)
-        packed = pack_parameters(structure, theta).expand(len(s0), -1)[moved]
-        n = self.simulator.substeps(theta, unpack_state(structure, s0), step)
+        u = self._commands_at(many, rows, delays[first])
+        n = 1 if step <= self._stable(many, own) else self._substeps(own, whose, s0)
         with torch.no_grad():
-            flat = self.simulator.advance(s0[moved], u, packed, h=step / n, hold=n, every=EVERY * n)
+            flat = self.simulator.advance(s0[moved], u, packed[whose[moved]], h=step / n, hold=n, every=EVERY * n)
             seen = looked(
-                structure, theta, flat, all_of, many, behind, every=EVERY * step, cable_caps=self.cable_caps,
+                structure, own, flat, all_of, many, behind, every=EVERY * step, cable_caps=self.cable_caps,
                 up=late.ground_height,
             )  # fmt: skip
         lasted = [(one.window.duration + one.goes_on) / (EVERY * step) for one in many]
         last = between(flat, torch.as_tensor(lasted, dtype=torch.float64).repeat(len(first))[:, None])[
             all_of, 0
         ].numpy()
-        own_begin, count = s0.numpy(), len(many)
+        own_begin = s0.numpy()
         return [Seen(*one, own_begin[i::count], last[i::count]) for i, one in enumerate(seen)]
+
+    def _starts(
+        self, many: Sequence[Stretch], k: int, begin: Sequence[Tensor | None], by: Sequence[np.ndarray] | None
+    ) -> Tensor:  # fmt: skip
+        """Where k hypotheses begin stretches, (k, stretch, NS): begin, by as of `_batch`."""
+        import torch
+
+        structure = self.structure
+        start = torch.stack([self._flat(one) for one in many]).expand(k, -1, -1)
+        let_out: Tensor | float = 0.0
+        if by is not None:
+            offsets = torch.as_tensor(np.stack(by, axis=1))
+            start = displaced(structure, start.flatten(0, 1), offsets.flatten(0, 1)).unflatten(0, start.shape[:2])
+            let_out = offsets[..., -structure.n_actuated :]
+        after = [i for i, one in enumerate(begin) if one is not None]
+        if after:
+            before = torch.stack([one for one in begin if one is not None], dim=1)
+            more = let_out if isinstance(let_out, float) else let_out[:, after]
+            start = start.clone()
+            start[:, after] = carried(structure, [many[i] for i in after], start[:, after], before, more)
+        return start
+
+    def _flat(self, one: Stretch) -> Tensor:
+        """The start state of a stretch, (NS,), packed once."""
+        from r2s2r_cli.engine.flat import pack_state
+
+        if id(one) not in self._packed:
+            # The stretch is kept: no other one gets its id.
+            self._packed[id(one)] = (one, pack_state(self.structure, one.window.state)[0])
+        return self._packed[id(one)][1]
+
+    def _stable(self, many: Sequence[Stretch], own: Parameters) -> float:
+        """A step [s] that is stable for all hypotheses (batch k) of some stretches: that of the nominal robot in the
+        poses that they begin in, as much shorter as the bound for every pose is, and ROOM for what these leave out. To
+        ask for every start takes as long as to simulate a third of it."""
+        import torch
+
+        from r2s2r_cli.engine.flat import unpack_state
+        from r2s2r_cli.engine.reading import always_stable_step, longest_step
+
+        if self._always is None:
+            self._always = always_stable_step(self.structure, self.model.theta(self.model.values0))
+        for one in many:
+            place = (one.run, one.interval, one.piece)
+            if place not in self._longest:
+                nominal = self.model.theta(self.model.values0)
+                state = unpack_state(self.structure, self._flat(one)[None])
+                self._longest[place] = longest_step(self.structure, nominal, state)
+        with torch.no_grad():
+            bound = always_stable_step(self.structure, own)
+        longest = min(self._longest[one.run, one.interval, one.piece] for one in many)
+        return ROOM * longest * bound / self._always if self._always > 0 else 0.0
+
+    def _substeps(self, own: Parameters, whose: Tensor, s0: Tensor) -> int:
+        """Engine steps a step where a stiff cable may need more than one. own: batch k; whose (row,): of the starts s0
+        (row, NS)."""
+        from r2s2r_cli.engine.flat import unpack_state
+
+        return self.simulator.substeps(rows_of(own, whose), unpack_state(self.structure, s0), self.step)
 
     def _undelayed(self, own: Parameters, k: int) -> tuple[Parameters, np.ndarray]:
         """The parameters without the camera's delay, and that delay (k,) [s]. A stretch starts where the camera saw the
@@ -179,6 +227,13 @@ class Replayer(Predictor):
         if id(run) not in self._logs:
             self._logs[id(run)] = (run, CommandLog(run))  # the run is kept: no other one gets its id
         return self._logs[id(run)][1]
+
+
+def _joined(parts: Sequence[Seen]) -> Seen:
+    """Of one stretch, all hypotheses."""
+    if len(parts) == 1:
+        return parts[0]
+    return Seen(*(np.concatenate([getattr(one, name) for one in parts]) for name in ("caps", "length", "begin", "end")))
 
 
 def _groups(windows: Sequence[Window], count: int) -> list[list[int]]:

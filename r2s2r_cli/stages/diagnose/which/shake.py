@@ -17,8 +17,8 @@ from r2s2r_cli.stages.diagnose.which.rough import root_of
 FAR_SD = (1.0, 3.0, 6.0)
 """How far from the fit points are, in the sd of its numbers, round after round: it is the sd of one hollow of many."""
 ROUNDS = 6
-POINTS = 12
-"""Of each round."""
+POINTS, SETTLED = 12, 6
+"""Of each round, and how many of them go on, settled and with a step; of the steps half are settled."""
 
 
 def shaken(fits: Fits, fit: Fit) -> Fit:
@@ -29,9 +29,9 @@ def shaken(fits: Fits, fit: Fit) -> Fit:
         root = root_of(fits.normal(fit)[0])[:p]
         drawn = fit.z + FAR_SD[number % len(FAR_SD)] * rng.standard_normal((POINTS, root.shape[1])) @ root.T
         about = [(fit.hypothesis, one, fit.x) for one in np.clip(drawn, arena.lower, arena.upper)]
-        found = _held(fits, about, [fit.away] * POINTS, fit)
+        found = _held(fits, about, [fit.away] * POINTS, fit, SETTLED)
         stepped = [(one.hypothesis, *fits.moved(one, fits.step(one))) for one in found]
-        found += _held(fits, stepped, [one.away for one in found], fit)
+        found += _held(fits, stepped, [one.away for one in found], fit, SETTLED // 2)
         best = min(found, key=lambda one: one.cost)
         if best.cost < fit.cost - LEAST_GAIN:
             best.start = fit.start
@@ -40,9 +40,10 @@ def shaken(fits: Fits, fit: Fit) -> Fit:
 
 
 def _held(
-    fits: Fits, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]], away: Sequence[np.ndarray], like: Fit
+    fits: Fits, points: Sequence[tuple[Hypothesis, np.ndarray, np.ndarray]], away: Sequence[np.ndarray], like: Fit,
+    count: int,
 ) -> list[Fit]:  # fmt: skip
-    """Settled fits at points, with the derivatives of another one."""
-    found = fits.begun(points, away, like)
+    """The first `count` of the fits at points, settled, with the derivatives of another one."""
+    found = sorted(fits.begun(points, away, like), key=lambda one: one.cost)[:count]
     fits.settle(found)
     return found

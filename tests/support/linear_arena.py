@@ -84,7 +84,8 @@ class LinearArena:
                          for white, one in zip(self.white, raw, strict=True)], axis=1)  # fmt: skip
 
     def keys(self, values: np.ndarray, z: np.ndarray, only: Sequence[int]) -> np.ndarray:
-        """Key frames of one cap."""
+        """Key frames of one cap; as the engine, none of nothing."""
+        assert len(only)
         return np.zeros((len(z), len(only), 1, 3))
 
     def squares(self, residual: np.ndarray) -> np.ndarray:

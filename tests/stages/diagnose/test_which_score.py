@@ -67,6 +67,15 @@ def test_leaving_a_gait_out_is_fitting_without_it() -> None:
     assert found.scores[1].without[0] == pytest.approx(direct, abs=2e-3)
 
 
+def test_a_gait_without_a_key_frame_is_scored_by_its_pieces() -> None:
+    """The robot tips over as both of its intervals begin: what they say counts as before, and no key frame is made."""
+    found = tried(0.8)
+    found.arena.whole = found.arena.many[:4]
+    after = scores(found.arena, found.fits, found.arena.gait)  # type: ignore[arg-type]
+    assert [one.elpd.tolist() for one in after] == [one.elpd.tolist() for one in found.scores]
+    assert all(one.key.shape[0] == 4 and np.isfinite(one.key).all() for one in after)
+
+
 def test_an_effect_far_smaller_than_what_is_tried_is_seen_in_the_screening() -> None:
     """A third of the least try: at that try it would make everything worse, at a share of it it gains."""
     found = tried(0.16)

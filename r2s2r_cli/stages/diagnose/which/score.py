@@ -111,7 +111,8 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: b
         values, z = _at(solver, fits, [one.points for one in left])
         white = arena.settled(values, z, own.tolist(), away).reshape(n, DRAWS, -1)
         first = slice(None, None, DRAWS)
-        key[:, ends] = arena.keys(values[first], z[first], ends.tolist())
+        if len(ends):  # where the robot tips over as an interval begins, there is no key frame
+            key[:, ends] = arena.keys(values[first], z[first], ends.tolist())
         for i, (fit, one) in enumerate(zip(fits, left, strict=True)):
             without[i].append(one.points[0])
             for k in own:

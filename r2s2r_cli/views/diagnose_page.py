@@ -139,10 +139,24 @@ def _limits(report: DiagnoseReport) -> Iterator[list[str]]:
     yield ["not testable with these runs", ", ".join(report.not_testable) or "none"]
     for text in report.missing:
         yield ["missing", text]
+    command = use(report)
+    if command:
+        yield ["use it", command]
     if report.next_gait is None:
         yield ["run next", "nothing: no gait of the library would decide more"]
     else:
         yield ["run next", _next(report.next_gait)]
+
+
+def use(report: DiagnoseReport) -> str:
+    """The command that puts what was named into the simulator, empty where nothing with a number was. The fit begins at
+    the sizes that were found: where an effect is off, a patch of the floor has no place."""
+    words: list[str] = []
+    for one in (one for one in report.ranking if one.effect in report.effects and one.size):
+        seats = {name.split(".")[2] for name in one.size if name.count(".") == 2}
+        words.append(f"--with-effect {one.effect}" + (f":{seats.pop()}" if len(seats) == 1 else ""))
+        words += [f"--free +{name}={value:.4g}" for name, value in one.size.items()]
+    return " ".join(["r2s2r identify", *words]) if words else ""
 
 
 def _next(one: NextGaitFound) -> str:

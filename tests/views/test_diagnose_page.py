@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.diagnose import draw_diagnosis, guilt
-from r2s2r_cli.views.diagnose_page import diagnose_page, diagnose_tables
+from r2s2r_cli.views.diagnose_page import diagnose_page, diagnose_tables, use
 from schemas.results_diagnose import (
     DiagnoseReport,
     ElementFound,
@@ -92,6 +92,19 @@ def test_what_was_not_fitted_has_no_gain() -> None:
     assert rows["dropout"][2] == "-" and "not fitted" in rows["dropout"][-1]
     assert rows["payload"][2].startswith("31.0")
     assert rows["payload"][5] == "mass_kg 0.03 .. 0.05 kg; place_m 0.05 .. 0.15 m"
+
+
+def test_what_was_named_comes_with_the_command_that_uses_it() -> None:
+    """At the element and sizes that were found; what has no number, and what is not committed to, has none."""
+    assert use(report()) == "r2s2r identify --with-effect payload:1 --free +payload.mass_kg.1=0.04"
+    place = {"friction_field.patch_factor": 0.262, "friction_field.patch_x_m": 0.2034}
+    row = report().ranking[0].model_copy(update={"effect": "friction_field", "size": place})
+    floor = report().model_copy(update={"effects": ("friction_field",), "ranking": (row,)})
+    assert use(floor).endswith("--with-effect friction_field --free +friction_field.patch_factor=0.262 "
+                               "--free +friction_field.patch_x_m=0.2034")  # fmt: skip
+    assert not use(report().model_copy(update={"verdict": "ambiguous", "effects": ()}))
+    lost = report().ranking[0].model_copy(update={"effect": "dropout", "size": {}})
+    assert not use(report().model_copy(update={"effects": ("dropout",), "ranking": (lost,)}))
 
 
 @pytest.mark.parametrize(

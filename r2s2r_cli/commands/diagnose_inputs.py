@@ -124,7 +124,7 @@ class Asked:
         found: list[Run] = []
         gaits: dict[bytes, str] = {}
         for one in named_runs(self.sources):
-            require_robot(one.recording, one.run, robot.name, "diagnose")
+            require_robot(one.recording, one.run, robot.name)
             caps = run_data(one.recording, one.estimate, one.run, name=one.name, still=True)
             gait = gaits.setdefault(caps.intervals.target.round(6).tobytes(), one.name)
             found.append(Run(caps, sensed_run(one.name, one.recording, one.run, robot), gait=gait))

@@ -95,7 +95,7 @@ def _refs(project: Project, places: Sequence[Iteration], numerics: int) -> list[
     if not found and not numerics:
         raise UsageError("there is nothing to measure a floor with", where="r2s2r floor", received="none",
                          expected="an iteration with 10-record.h5 or 20-estimate.h5, or executed runs",
-                         hint="r2s2r record gait.toml --repeats 3 --port ...")  # fmt: skip
+                         hint="r2s2r record gait.toml --repeats 3 --port /dev/ttyUSB0")  # fmt: skip
     return [artifact_ref(project, path, whole_header(path)) for path in found]
 
 

@@ -71,14 +71,14 @@ def named_runs(sources: Sequence[Source]) -> Iterator[NamedRun]:
             yield NamedRun(name, recording, estimate, run)
 
 
-def require_robot(recording: ArtifactData | None, run: str, name: str, command: str) -> None:
+def require_robot(recording: ArtifactData | None, run: str, name: str) -> None:
     """Raises InputError where a run says that it is of another robot than `name`."""
     own = None if recording is None else recording.groups.get(f"runs/{run}")
     told = name if own is None else str(own.attributes.get("robot", name))
     if told != name:
         raise InputError(
             f"run {run} is of another robot", where=f"runs/{run}, robot", expected=f"{name}, as robot.toml says",
-            received=told, hint=f"r2s2r {command} --iteration N   # with runs of this robot alone",
+            received=told, hint="r2s2r status   # another iteration may have runs of this robot alone",
         )  # fmt: skip
 
 
@@ -180,7 +180,7 @@ class Asked:
 
         found, robot = list(named_runs(self.sources)), self.project.robot()
         for one in found:
-            require_robot(one.recording, one.run, robot.name, "identify")
+            require_robot(one.recording, one.run, robot.name)
         return [run_data(one.recording, one.estimate, one.run, name=one.name) for one in found]
 
     def artifacts(self) -> list[Path]:

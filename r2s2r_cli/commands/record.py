@@ -150,7 +150,7 @@ def _policies(
     if not found:
         raise UsageError("there is nothing to record", where="r2s2r record",
                          expected="a policy file, --random N or --excite NAME", received="none of them",
-                         hint="r2s2r record --random 15 --port ...")  # fmt: skip
+                         hint="r2s2r record --random 15 --port /dev/ttyUSB0")  # fmt: skip
     for policy in found:
         sequence(policy, robot)  # for this robot, before anything moves
     return found

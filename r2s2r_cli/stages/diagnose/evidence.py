@@ -127,7 +127,7 @@ def require_enough(evidence: Evidence) -> None:
             raise InputError(
                 f"run {run.name} is of another robot", where=f"runs/{run.name}",
                 expected=f"{evidence.robot.n_caps} end caps", received=str(caps),
-                hint="r2s2r diagnose --iteration N   # with runs of one robot",
+                hint="r2s2r status   # another iteration may have runs of this robot alone",
             )  # fmt: skip
     if sum(len(one.intervals) for one in evidence.fit) < 2:
         fitted = ", ".join(f"{one.run}:{in_words(one.intervals)}" for one in evidence.fit if one.intervals)

@@ -172,7 +172,8 @@ def _fitted(
         if not whole:
             raise InputError(
                 "the robot tips over in every interval: nothing can be fitted", where="--train",
-                expected="an interval without a tip-over", received="none", hint="r2s2r diagnose --also N",
+                expected="an interval without a tip-over", received="none",
+                hint="r2s2r record --random 15 --port /dev/ttyUSB0   # other shapes",
             )  # fmt: skip
         arena = Arena(replayer, many, floor_m=simulator, noise=noise, lasts=lasts, prior=prior, whole=whole)
         z = _begun(arena, z)

@@ -38,14 +38,14 @@ def kept_frames(run: str, streams: dict[str, Group], pictures: Pictures) -> tupl
         raise Unseen(
             f"run {run} has no {missing or 'times of its'} pictures: the tracker needs colour and depth", where=where,
             expected="colour and depth images with their times", received=f"no {missing or 't'}",
-            hint="r2s2r import FOLDER   # with color/ and depth/ in it",
+            hint="r2s2r import recording   # a folder with color/ and depth/ in it",
         )  # fmt: skip
     facts = camera.attributes
     lost = [name for name in (*_LENS, "depth_scale") if name not in facts]
     if lost:
         raise InputError(
             f"the camera of run {run} is not described", where=where, expected=", ".join((*_LENS, "depth_scale")),
-            received=f"no {', '.join(lost)}", hint="r2s2r import FOLDER --force, with a config.json in it",
+            received=f"no {', '.join(lost)}", hint="r2s2r import recording --force   # a folder with config.json in it",
         )  # fmt: skip
     t = camera["t"]
     rows = np.flatnonzero(keep_frames(t) == KEPT)

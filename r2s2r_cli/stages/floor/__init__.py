@@ -52,7 +52,7 @@ def floor(
         raise InputError(
             "nothing repeats itself in these runs", where="r2s2r floor", received=names,
             expected="two or more intervals of one phase: 3 repeats of a policy, say",
-            hint="r2s2r record gait.toml --repeats 3 --port ...",
+            hint="r2s2r record gait.toml --repeats 3 --port /dev/ttyUSB0",
         )  # fmt: skip
     groups: dict[str, Group] = {}
     if caps is not None:

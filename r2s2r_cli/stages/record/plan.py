@@ -35,7 +35,8 @@ def plans(policies: Items[PolicyFile], *, repeats: int, rest: float) -> tuple[Ru
     """
     if not 1 <= repeats <= REPEATS_MAX:
         raise UsageError("this is no number of repeats", where="--repeats", expected=f"1 to {REPEATS_MAX}",
-                         received=str(repeats), hint="r2s2r record gait.toml --repeats 3 --port ...")  # fmt: skip
+                         received=str(repeats),
+                         hint="r2s2r record gait.toml --repeats 3 --port /dev/ttyUSB0")  # fmt: skip
     found = [
         RunPlan(policy.name if repeats == 1 else f"{policy.name}-{number}", policy, number, rest)
         for number in range(1, repeats + 1)

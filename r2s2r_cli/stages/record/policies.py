@@ -35,7 +35,7 @@ def random_targets(robot: Robot, steps: int, seed: int, *, levels: int = 2) -> P
         raise UsageError(
             "this is no random policy", where="--random, --levels", received=f"{steps} targets, {levels} levels",
             expected=f"1 to {RANDOM_MAX} targets, {LEVELS[0]} to {LEVELS[1]} levels",
-            hint="r2s2r record --random 15 --levels 5 --port ...",
+            hint="r2s2r record --random 15 --levels 5 --port /dev/ttyUSB0",
         )  # fmt: skip
     generator = np.random.default_rng(seed)
     before = np.ones(len(robot.actuated))
@@ -55,7 +55,8 @@ def excitation(robot: Robot, name: str) -> tuple[PolicyFile, ...]:
     if name not in EXCITATIONS:
         raise UsageError(
             f"there is no excitation set {name}", where="--excite", received=name,
-            expected=", ".join((*EXCITATIONS, "commission")), hint="r2s2r record --excite commission --port ...",
+            expected=", ".join((*EXCITATIONS, "commission")),
+            hint="r2s2r record --excite commission --port /dev/ttyUSB0",
         )  # fmt: skip
     return (EXCITATIONS[name](robot),)
 

@@ -96,5 +96,5 @@ def test_another_robot_is_refused(estimated: Path) -> None:
     recording = ArtifactData("recording", {"runs/walk": Group({}, {"robot": "sixbar"})})
     with pytest.raises(InputError, match="run walk is of another robot") as caught:
         require_robot(recording, "walk", "threebar")
-    assert caught.value.received == "sixbar" and caught.value.hint.startswith("r2s2r diagnose")
+    assert caught.value.received == "sixbar" and caught.value.hint.startswith("r2s2r status")
     require_robot(recording, "walk", "sixbar")

@@ -70,6 +70,21 @@ def test_a_wrong_speed_of_all_winches_is_a_setting() -> None:
     assert mismatches(runs, threebar(), SPEED)[0] == []
 
 
+def test_winches_that_were_right_have_no_wrong_number() -> None:
+    """At half their speed today, at all of it in healthy runs: an effect (a battery, a dead zone) is for the diagnosis
+    to name. Half of it in both is a wrong number; so is a sign that was right before, since plugs are exchanged."""
+
+    def at(share: float) -> list[Run]:
+        return [wound(f"g{k}", k, lambda u, h: np.cumsum(share * SPEED * h * u, axis=0)) for k in range(2)]
+
+    def kinds(today: float, before: float) -> list[str]:
+        return [one.kind for one in mismatches(at(today), threebar(), SPEED, at(before))[0]]
+
+    assert kinds(0.5, 1.0) == []
+    assert kinds(0.5, 0.5) == ["rate"]
+    assert kinds(-1.0, 1.0) == ["sign"]
+
+
 def test_nothing_wrong_names_nothing() -> None:
     """No setting is doubted where all are right, for six logs."""
     for seed in range(6):

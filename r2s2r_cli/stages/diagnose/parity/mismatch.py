@@ -20,13 +20,22 @@ WHOLE = 1.5
 """Commands beyond this are not in units of the largest."""
 
 
-def mismatches(runs: Sequence[Run], robot: Robot, speed: float) -> tuple[list[Mismatch], list[str]]:
+def mismatches(
+    runs: Sequence[Run], robot: Robot, speed: float, healthy: Sequence[Run] = ()
+) -> tuple[list[Mismatch], list[str]]:  # fmt: skip
     """What is plainly set wrong, most basic first, and what could not be looked at. speed: nominal, of the winches
-    [m/s].
+    [m/s]. healthy: runs from when nothing was wrong: a speed that was right then is no wrong number now, but an effect.
 
     A wrong unit makes everything after it meaningless, and so does a wrong order: the search ends at the first stage
     with a mismatch.
     """
+    found, missing = _in_stages(runs, robot, speed)
+    if healthy and [one.kind for one in found] == ["rate"] and not _in_stages(healthy, robot, speed)[0]:
+        return [], missing
+    return found, missing
+
+
+def _in_stages(runs: Sequence[Run], robot: Robot, speed: float) -> tuple[list[Mismatch], list[str]]:
     many = tuple(series(run, robot) for run in runs)
     missing: list[str] = []
     stages: tuple[Callable[[Sequence[Series], Robot, float, list[str]], list[Mismatch]], ...] = (

@@ -33,7 +33,7 @@ def parity(evidence: Evidence, *, level: float = 0.05) -> Parity:
     robot = evidence.robot
     runs = fitted_runs(evidence)
     speed = float(evidence.model.theta.speed_in.mean())
-    wrong, missing = mismatches(runs, robot, speed)
+    wrong, missing = mismatches(runs, robot, speed, evidence.healthy)
     if wrong:
         return Parity((), tuple(wrong), tuple(missing), bool(evidence.healthy), level)
     healthy = evidence.healthy or None

@@ -82,7 +82,8 @@ def test_winches_that_were_right_have_no_wrong_number() -> None:
 
     assert kinds(0.5, 1.0) == []
     assert kinds(0.5, 0.5) == ["rate"]
-    assert kinds(-1.0, 1.0) == ["sign"]
+    turned = [_control(lambda u: -u)(run) for run in at(1.0)]
+    assert [one.kind for one in mismatches(turned, threebar(), SPEED, at(1.0))[0]] == ["sign"]
 
 
 def test_nothing_wrong_names_nothing() -> None:

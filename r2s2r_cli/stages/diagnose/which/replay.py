@@ -12,6 +12,7 @@ from r2s2r_cli.stages.diagnose.which.begins import TINY, between, carried, place
 from r2s2r_cli.stages.diagnose.which.looks import Seen, looked
 from r2s2r_cli.stages.diagnose.which.motion import first_of_each
 from r2s2r_cli.stages.diagnose.which.numbers import Model
+from r2s2r_cli.stages.diagnose.which.stable import Stable
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.identify.commands import CommandLog
 from r2s2r_cli.stages.identify.data import RunData
@@ -28,8 +29,6 @@ EVERY = 10
 """Engine steps between stored states."""
 MOST = 256
 """Simulations in one batch."""
-ROOM = 0.8
-"""Of a step that is stable in one pose: so much is left for poses and robots near it."""
 FEW = 4
 """Hypotheses whose stretches are all simulated in one batch."""
 
@@ -42,8 +41,7 @@ class Replayer(Predictor):
         self.model = model
         self._logs: dict[int, tuple[RunData, CommandLog]] = {}
         self._packed: dict[int, tuple[Stretch, Tensor]] = {}
-        self._longest: dict[tuple[str, int, int], float] = {}
-        self._always: float | None = None
+        self._stable = Stable(self.structure, model.theta(model.values0))
 
     def seen(
         self, many: Sequence[Stretch], values: np.ndarray, by: Sequence[np.ndarray] | None = None
@@ -129,7 +127,7 @@ class Replayer(Predictor):
         moved, all_of = _rows(first, count), _rows(back, count)
         self.rollouts += len(moved)
         u = self._commands_at(many, rows, delays[first])
-        n = 1 if step <= self._stable(many, own) else self._substeps(own, whose, s0)
+        n = self._substeps(many, own, whose, s0)
         with torch.no_grad():
             flat = self.simulator.advance(s0[moved], u, packed[whose[moved]], h=step / n, hold=n, every=EVERY * n)
             seen = looked(
@@ -173,33 +171,15 @@ class Replayer(Predictor):
             self._packed[id(one)] = (one, pack_state(self.structure, one.window.state)[0])
         return self._packed[id(one)][1]
 
-    def _stable(self, many: Sequence[Stretch], own: Parameters) -> float:
-        """A step [s] that is stable for all hypotheses (batch k) of some stretches: that of the nominal robot in the
-        poses that they begin in, as much shorter as the bound for every pose is, and ROOM for what these leave out. To
-        ask for every start takes as long as to simulate a third of it."""
-        import torch
-
+    def _substeps(self, many: Sequence[Stretch], own: Parameters, whose: Tensor, s0: Tensor) -> int:
+        """Engine steps a step, as stiff cables need. own: batch k; whose (row,): of the starts s0 (row, NS)."""
         from r2s2r_cli.engine.flat import unpack_state
-        from r2s2r_cli.engine.reading import always_stable_step, longest_step
 
-        if self._always is None:
-            self._always = always_stable_step(self.structure, self.model.theta(self.model.values0))
+        places: set[object] = {(one.run, one.interval, one.piece) for one in many}
         for one in many:
-            place = (one.run, one.interval, one.piece)
-            if place not in self._longest:
-                nominal = self.model.theta(self.model.values0)
-                state = unpack_state(self.structure, self._flat(one)[None])
-                self._longest[place] = longest_step(self.structure, nominal, state)
-        with torch.no_grad():
-            bound = always_stable_step(self.structure, own)
-        longest = min(self._longest[one.run, one.interval, one.piece] for one in many)
-        return ROOM * longest * bound / self._always if self._always > 0 else 0.0
-
-    def _substeps(self, own: Parameters, whose: Tensor, s0: Tensor) -> int:
-        """Engine steps a step where a stiff cable may need more than one. own: batch k; whose (row,): of the starts s0
-        (row, NS)."""
-        from r2s2r_cli.engine.flat import unpack_state
-
+            self._stable.learn((one.run, one.interval, one.piece), self._flat(one))
+        if self.step <= self._stable.step(places, own):
+            return 1
         return self.simulator.substeps(rows_of(own, whose), unpack_state(self.structure, s0), self.step)
 
     def _undelayed(self, own: Parameters, k: int) -> tuple[Parameters, np.ndarray]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.views.page import Page, PageTable, Picture, render
@@ -161,12 +162,19 @@ def use(report: DiagnoseReport) -> str:
 
 def _next(one: NextGaitFound) -> str:
     """What to run, and what it is worth beside the runs so far."""
-    how = f": r2s2r record {one.file}" if one.file else ""
+    how = f": {_record(one.file)}" if one.file else ""
     if one.now is not None and one.nats <= one.now:
         return f"nothing separates the candidates better than these runs; the best of the library is {one.name}{how}"
     beside = "" if one.now is None else f", these runs by {one.now:.1f}"
     enough = "" if one.nats >= INDISTINCT else " (too few to tell them apart)"
     return f"{one.name}: would separate the likeliest candidates by {one.nats:.1f} nats{enough}{beside}{how}"
+
+
+def _record(file: str) -> str:
+    """The command that runs the policy of `iterations/001/70-diagnose-next.toml`, in the iteration after that."""
+    number = PurePosixPath(file).parent.name
+    after = f" --iteration {int(number) + 1}" if number.isdigit() else ""
+    return f"r2s2r record {file}{after} --port /dev/ttyUSB0 --camera realsense"
 
 
 def _how(report: DiagnoseReport) -> Iterator[list[str]]:

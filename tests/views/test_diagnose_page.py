@@ -121,7 +121,8 @@ def test_what_to_run_next_is_said_beside_what_was_run(nats: float, now: float | 
     one = NextGaitFound(name="ramps", file=file, targets=((1.0,),), nats=nats, now=now)
     made = report().model_copy(update={"next_gait": one})
     rows = [row for table in diagnose_tables(made) for row in table.rows if row[0] == "run next"]
-    assert rows == [["run next", f"{words}: r2s2r record {file}"]]
+    command = f"r2s2r record {file} --iteration 2 --port /dev/ttyUSB0 --camera realsense"
+    assert rows == [["run next", f"{words}: {command}"]]
 
 
 @pytest.mark.parametrize(

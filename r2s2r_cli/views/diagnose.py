@@ -177,7 +177,7 @@ def _judged(data: ArtifactData, report: DiagnoseReport) -> bytes:
     group = data.groups["judged"]
     names = [name.decode() for name in group["name"].tolist()]
     figure = new_figure(min(13.0, 5.0 + 0.6 * len(names)), 3.8)
-    each, all_ = figure.subplots(1, 2, sharey=True, width_ratios=[max(2.0, 0.5 * len(names)), 1.0])
+    each, all_ = figure.subplots(1, 2, sharey=True, width_ratios=[min(max(2.0, 0.5 * len(names)), 7.0), 1.0])
     series = (("nominal", STALE, "as identified"), ("refit", BEFORE, "refit"),
               ("effect", AFTER, "refit + " + (" + ".join(report.shrinkage.effects) if report.shrinkage else "effect")),
               ("ceiling", BLACK_BOX, "black box"))  # fmt: skip
@@ -188,6 +188,8 @@ def _judged(data: ArtifactData, report: DiagnoseReport) -> bytes:
         each.bar(x, np.nan_to_num(values), width, color=color, label=label)
         if np.isfinite(values).any():
             all_.bar(k, float(np.sqrt(np.nanmean(values**2))), 0.7, color=color)
+            # A fall or two decide the root mean square.
+            all_.plot(k, float(np.nanmedian(values)), "_", color="#111111", ms=12, mew=2)
     for axes in (each, all_):
         axes.axhline(1e3 * report.floor_m, color="#111111", lw=1, ls=":", label="floor")
     turned = sum(map(len, names)) > LABELS
@@ -198,7 +200,7 @@ def _judged(data: ArtifactData, report: DiagnoseReport) -> bytes:
     all_.set_xticks(
         range(len(series)), ["identified", "refit", "+ effect", "black box"], rotation=45, ha="right", fontsize=8
     )
-    all_.set_title("all together", fontsize=9)
+    all_.set_title("all together: root\nmean square, median", fontsize=9)
     handles, labels = each.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncol=5, fontsize=8, frameon=False)
     return png_bytes(figure)

@@ -107,7 +107,8 @@ def guilt(report: DiagnoseReport) -> str:
     element, channel = report.where.element, report.where.channel
     sure = report.verdict in ("effect", "pair")
     if element is not None:
-        part = element_words(element)
+        elsewhere = ", nothing on the robot" if element.kind in ("place", "world", "camera") else ""
+        part = f"{element_words(element)}{elsewhere}"
         return f"guilty: {part}" if sure else f"most suspect: {part} (verdict: {report.verdict})"
     if report.verdict == "no_gap":
         return "no part is guilty: there is no gap"

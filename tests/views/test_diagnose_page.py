@@ -129,6 +129,7 @@ def test_what_to_run_next_is_said_beside_what_was_run(nats: float, now: float | 
     ("verdict", "element", "channel", "words"),
     [
         ("effect", ElementFound(kind="rod", index=1), "mass", "guilty: rod 1"),
+        ("effect", ElementFound(kind="camera"), "observation", "guilty: the camera, nothing on the robot"),
         ("ambiguous", ElementFound(kind="cap", index=3), "contact", "most suspect: cap 3 (verdict: ambiguous)"),
         ("effect", None, "motor", "no single part: it acts in channel motor (verdict: effect)"),
         ("ambiguous", None, "cable", "no single part stands out: it acts in channel cable (verdict: ambiguous)"),

@@ -66,6 +66,25 @@ def test_luck_is_worth_less_than_in_one_simulation() -> None:
     assert np.isfinite(averaged).all()
 
 
+def test_roughness_makes_numbers_less_sure() -> None:
+    """Luck of as many sd as noise has makes what is fitted as unsure as twice the noise would: sd by the root of two;
+    without luck the sd is that of the noise."""
+
+    def wider(luck: float, seed: int) -> np.ndarray:
+        arena = RoughArena(0.8, seed=seed)
+        solver = Fits(arena)  # type: ignore[arg-type]
+        (fit,) = solver.begun([(Hypothesis((candidate("right", 0),)), np.zeros(2), np.zeros(1))])
+        solver.run([fit])
+        smooth = np.sqrt(np.diag(np.linalg.inv(solver.normal(fit)[0])))
+        arena.luck = luck
+        (one,) = scores(arena, [fit], arena.gait)  # type: ignore[arg-type]
+        return np.asarray(one.sd / smooth)
+
+    assert wider(0.0, 0) == pytest.approx(np.ones(3), abs=1e-6)
+    squares = np.mean([wider(1.0, seed) ** 2 for seed in range(20)])
+    assert squares == pytest.approx(2.0, rel=0.2)
+
+
 def test_what_is_left_is_what_no_hypothesis_explains() -> None:
     """Linear: the right effect leaves nothing beyond the healthy rate, the refit model leaves what the effect gains,
     and something along neither effect is left by both."""

@@ -160,7 +160,7 @@ class Fits:
 
     def likely(self, fit: Fit) -> np.ndarray:
         """Square roots of the weights of all its residuals, (M,): of what fell, nothing can be told."""
-        w = self._weights(fit)
+        w = self.weights(fit)
         found = np.zeros(len(fit.residual))
         for white, own in zip(self.arena.white, w, strict=True):
             for kind, one in zip(white.kinds, own, strict=True):
@@ -169,7 +169,7 @@ class Fits:
 
     def products(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
         """What every stretch adds to the normal matrix, (stretch, n, n), and to the gradient, (stretch, n)."""
-        w = self._weights(fit)
+        w = self.weights(fit)
         n = fit.jacobian.shape[1]
         H, g = np.zeros((len(w), n, n)), np.zeros((len(w), n))
         for k, white in enumerate(self.arena.white):
@@ -181,7 +181,7 @@ class Fits:
                 g[k] += w[k, c] * J.T @ fit.residual[kind.rows]
         return H, g
 
-    def _weights(self, fit: Fit) -> np.ndarray:
+    def weights(self, fit: Fit) -> np.ndarray:
         """Of each kind of error, (stretch, kind)."""
         return weight(self.arena.squares(fit.residual[None])[0], self.arena.logdets, self.arena.sizes)
 

@@ -28,8 +28,9 @@ ENOUGH = 12.0
 class Score:
     """elpd (stretch,): log predictive density of each stretch without its gait [nats], up to a constant that all
     hypotheses share. misfit (stretch,): squares over how many there are, 1 where noise and floor explain it. key
-    (interval, cap, 3): predicted minus observed caps at its end [m]. sd (n,): of the fitted numbers, all gaits; without
-    (group, n): the numbers without each group."""
+    (interval, cap, 3): predicted minus observed caps at its end [m]. sd (n,): of the fitted numbers, all gaits: what
+    noise leaves unsure, and how far apart simulations close together want them; without (group, n): the numbers without
+    each group."""
 
     elpd: np.ndarray
     misfit: np.ndarray
@@ -101,6 +102,8 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: b
     key = np.full((n, len(of_whole), caps, 3), np.nan)
     without: list[list[np.ndarray]] = [[] for _ in fits]
     away = np.repeat(np.array([fit.away for fit in fits]), DRAWS, axis=0)
+    weights = [solver.weights(fit) for fit in fits]
+    pulls = [np.zeros((DRAWS, len(H))) for _, _, H, _ in normals]
     for name in names:
         own, ends = np.flatnonzero(groups == name), np.flatnonzero(of_whole == name)
         out = own if held_out else own[:0]
@@ -117,9 +120,29 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: b
             without[i].append(one.points[0])
             for k in own:
                 elpd[i, k], misfit[i, k] = _piece(arena.white[k], fit.jacobian, white[i], one)
+                pulls[i] += _pull(arena.white[k], fit.jacobian, white[i], one, weights[i][k])
     key[np.abs(key).max(axis=(2, 3)) > LOST_M] = np.nan
-    sds = [np.sqrt(np.maximum(np.diag(np.linalg.pinv(H, hermitian=True)), 0.0)) for _, _, H, _ in normals]
+    sds = [_sd(H, pull) for (_, _, H, _), pull in zip(normals, pulls, strict=True)]
     return [Score(elpd[i], misfit[i], key[i], sds[i], np.array(without[i])) for i in range(n)]
+
+
+def _pull(
+    white: White, jacobian: np.ndarray, residual: np.ndarray, left: _Left, weights: np.ndarray
+) -> np.ndarray:  # fmt: skip
+    """Gradients (draw, n) of a piece's cost at the points, each brought back to the first along the derivatives.
+    weights (kind,)."""
+    found = np.zeros((len(residual), jacobian.shape[1]))
+    for kind, weight in zip(white.kinds, weights, strict=True):
+        J = jacobian[kind.rows]
+        found += weight * (residual[:, kind.rows] - left.away @ J.T) @ J
+    return found
+
+
+def _sd(H: np.ndarray, pulls: np.ndarray) -> np.ndarray:
+    """Of numbers with the normal matrix H: what noise leaves unsure, and how far apart the points would have them. Were
+    the cost smooth, all pulls (draw, n) would be the same."""
+    covariance = np.linalg.pinv(H, hermitian=True)
+    return np.sqrt(np.maximum(np.diag(covariance), 0.0) + (pulls @ covariance).var(axis=0, ddof=1))
 
 
 def _without(arena: Arena, fit: Fit, precision: np.ndarray, pull: np.ndarray) -> _Left:

@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
 import tomlkit
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "13_two_iterations"))
+from world import WORLD
+
 FRICTION, SPEED = (0.32, 0.45), (0.62, 0.75)
 """From where the truth is drawn: friction (0.76 in robot.toml), and a factor of the motors' speed."""
 PATCH = {"center_m": [0.3, 0.0], "radius_m": 0.3, "factor": 0.2}
 """Of the uneven floor; its rim is softer than the catalogue's."""
-
-EVEN = """\
-# Sensors and camera with their ordinary errors (docs/reference/world.md); between runs a hand puts the robot back.
-seed = {seed}
-
-[start]
-put_back = true
-
-[camera]
-position_m = [0.0, 0.0, 2.4]
-
-[camera.clock]
-rate_hz = 10.0
-"""
 
 
 def draw(project: Path, seed: int) -> dict[str, float]:
@@ -36,7 +26,7 @@ def draw(project: Path, seed: int) -> dict[str, float]:
     for motor in document["motors"]:
         motor["no_load_rad_per_s"] = round(float(motor["no_load_rad_per_s"] * drawn["speed"]), 4)
     (project / "truth.toml").write_text(tomlkit.dumps(document), "utf-8")
-    even = EVEN.format(seed=seed)
+    even = WORLD.format(seed=seed)
     (project / "even.toml").write_text(even, "utf-8")
     words = "patches = [{{ center_m = {center_m}, radius_m = {radius_m}, factor = {factor} }}]"
     patch = words.format(**PATCH)

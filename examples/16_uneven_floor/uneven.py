@@ -22,7 +22,8 @@ import tomlkit
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "13_two_iterations")]
 from floors import draw, lay  # noqa: E402 - beside this file
-from world import COMMAND, rig  # noqa: E402 - of example 13
+from run import r2s2r  # noqa: E402 - of example 13
+from world import COMMAND, rig  # noqa: E402
 
 LEARNED, HELD_OUT = "turn-counterclockwise", ("arching", "turn-clockwise")
 """Policies on the uneven floor: what is learned from, and what is predicted."""
@@ -30,12 +31,6 @@ REPEATS = 3
 QUICK = ("--no-draw", "--no-discrepancy", "--set", "identify.starts=1", "--set", "identify.profiles=0")
 """Of `identify`: the numbers, not how far they can be trusted."""
 PLAN = {"draws": 8, "candidates": 24, "kept": 4, "beam": 100, "cycles": 3}
-
-
-def r2s2r(project: Path, *words: str) -> None:
-    """A command that must succeed."""
-    print("$ r2s2r", *words, file=sys.stderr, flush=True)
-    subprocess.run([*COMMAND, *words, "--quiet"], cwd=project, check=True, stdout=sys.stderr)
 
 
 def answered(project: Path, *words: str) -> dict[str, Any]:

@@ -56,8 +56,10 @@ DEMO = Profile(targets=8, settings=SHORT, draw=True)
 """Minutes instead of a quarter of an hour: `make demo`."""
 
 
-def prepared(out: Path, seed: int, profile: Profile) -> Path:
-    """A project with a calibrated robot, and the world that it will meet."""
+def prepared(
+    out: Path, seed: int, profile: Profile, drawn: Callable[[Path, int], Mapping[str, object]] = unknown
+) -> Path:  # fmt: skip
+    """A project with a calibrated robot, and the world that it will meet. drawn: writes truth.toml and world.toml."""
     project = out / f"seed-{seed}"
     if not (project / "calibration.h5").exists():
         shutil.rmtree(project, ignore_errors=True)
@@ -67,7 +69,7 @@ def prepared(out: Path, seed: int, profile: Profile) -> Path:
         for stage, values in profile.settings.items():
             settings[stage].update(values)
         (project / "project.toml").write_text(tomlkit.dumps(settings), "utf-8")
-        (project / "drawn.json").write_text(json.dumps(unknown(project, seed), indent=1), "utf-8")
+        (project / "drawn.json").write_text(json.dumps(drawn(project, seed), indent=1), "utf-8")
         r2s2r(project, "rig", "--robot", "truth.toml", "--world", "world.toml", "--points", "points.csv")
         r2s2r(project, "calibrate", "--points", "points.csv", "--no-draw")
     return project

@@ -18,7 +18,8 @@ PATCH = {"center_m": [0.3, 0.0], "radius_m": 0.3, "factor": 0.2}
 
 
 def draw(project: Path, seed: int) -> dict[str, float]:
-    """Write truth.toml, which only the rig reads, and both worlds; what is true, for those who ask afterwards."""
+    """Write truth.toml, which only the rig reads, and both worlds, the robot on the even one; what is true, for those
+    who ask afterwards."""
     rng = np.random.default_rng([seed, 16])
     drawn = {"friction": float(rng.uniform(*FRICTION)), "speed": float(rng.uniform(*SPEED))}
     document = tomlkit.parse((project / "robot.toml").read_text("utf-8"))
@@ -31,6 +32,7 @@ def draw(project: Path, seed: int) -> dict[str, float]:
     words = "patches = [{{ center_m = {center_m}, radius_m = {radius_m}, factor = {factor} }}]"
     patch = words.format(**PATCH)
     (project / "uneven.toml").write_text(f"{even}\n[effects.friction_field]\n{patch}\n", "utf-8")
+    lay(project, "even")
     return drawn
 
 

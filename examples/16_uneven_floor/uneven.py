@@ -17,12 +17,13 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import tomlkit
+
+from r2s2r_cli.effects.friction_field import FrictionField
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "13_two_iterations")]
 from floors import draw, lay  # noqa: E402 - beside this file
-from run import r2s2r  # noqa: E402 - of example 13
+from run import Profile, prepared, r2s2r  # noqa: E402 - of example 13
 from world import COMMAND, rig  # noqa: E402
 
 LEARNED, HELD_OUT = "turn-counterclockwise", ("arching", "turn-clockwise")
@@ -30,7 +31,7 @@ LEARNED, HELD_OUT = "turn-counterclockwise", ("arching", "turn-clockwise")
 REPEATS = 3
 QUICK = ("--no-draw", "--no-discrepancy", "--set", "identify.starts=1", "--set", "identify.profiles=0")
 """Of `identify`: the numbers, not how far they can be trusted."""
-PLAN = {"draws": 8, "candidates": 24, "kept": 4, "beam": 100, "cycles": 3}
+PLAN = Profile(settings={"plan": {"draws": 8, "candidates": 24, "kept": 4, "beam": 100, "cycles": 3}})
 
 
 def answered(project: Path, *words: str) -> dict[str, Any]:
@@ -39,23 +40,6 @@ def answered(project: Path, *words: str) -> dict[str, Any]:
     done = subprocess.run([*COMMAND, *words, "--json"], cwd=project, check=True, stdout=subprocess.PIPE, text=True)
     found: dict[str, Any] = json.loads(done.stdout)
     return found
-
-
-def prepared(out: Path, seed: int) -> Path:
-    """A project with a calibrated robot."""
-    project = out / f"seed-{seed}"
-    if not (project / "calibration.h5").exists():
-        shutil.rmtree(project, ignore_errors=True)
-        out.mkdir(parents=True, exist_ok=True)
-        r2s2r(out, "init", project.name, "--robot", "threebar")
-        settings = tomlkit.parse((project / "project.toml").read_text("utf-8"))
-        settings["plan"].update(PLAN)
-        (project / "project.toml").write_text(tomlkit.dumps(settings), "utf-8")
-        (project / "drawn.json").write_text(json.dumps(draw(project, seed), indent=1), "utf-8")
-        lay(project, "even")
-        r2s2r(project, "rig", "--robot", "truth.toml", "--world", "world.toml", "--points", "points.csv")
-        r2s2r(project, "calibrate", "--points", "points.csv", "--no-draw")
-    return project
 
 
 def on_the_even_floor(project: Path) -> None:
@@ -120,15 +104,11 @@ def explained(project: Path) -> tuple[dict[str, Any], dict[str, Path]]:
     sizes = next((one["size"] for one in found["ranking"] if one["effect"] == "friction_field"), {})
     if sizes:
         free = [word for name, value in sizes.items() for word in ("--free", f"{name}={value:.4g}")]
-        off = {f"friction_field.{one}": value for one, value in OFF.items()}
+        off = {f"friction_field.{one.name}": one.off for one in FrictionField.own}
         free += [word for name, value in off.items() if name not in sizes for word in ("--fix", f"{name}={value}")]
         field = ("--with-effect", "friction_field", *free, "--fix", speed, "--fix", friction)
         models["with the field"] = identified(project, "field", *field)
     return found, models
-
-
-OFF = {"gradient_x_per_m": 0, "gradient_y_per_m": 0, "patch_factor": 1, "patch_x_m": 0, "patch_y_m": 0,
-       "patch_radius_m": 0.15}  # fmt: skip
 
 
 def told(project: Path, models: Mapping[str, Path]) -> None:
@@ -164,7 +144,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("uneven-floor"))
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
-    project = prepared(given.out.resolve(), given.seed)
+    project = prepared(given.out.resolve(), given.seed, PLAN, draw)
     on_the_even_floor(project)
     on_the_uneven_floor(project)
     found, models = explained(project)

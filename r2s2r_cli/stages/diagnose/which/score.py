@@ -119,23 +119,11 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: b
         for i, (fit, one) in enumerate(zip(fits, left, strict=True)):
             without[i].append(one.points[0])
             for k in own:
-                elpd[i, k], misfit[i, k] = _piece(arena.white[k], fit.jacobian, white[i], one)
-                pulls[i] += _pull(arena.white[k], fit.jacobian, white[i], one, weights[i][k])
+                elpd[i, k], misfit[i, k], pull = _piece(arena.white[k], fit.jacobian, white[i], one, weights[i][k])
+                pulls[i] += pull
     key[np.abs(key).max(axis=(2, 3)) > LOST_M] = np.nan
     sds = [_sd(H, pull) for (_, _, H, _), pull in zip(normals, pulls, strict=True)]
     return [Score(elpd[i], misfit[i], key[i], sds[i], np.array(without[i])) for i in range(n)]
-
-
-def _pull(
-    white: White, jacobian: np.ndarray, residual: np.ndarray, left: _Left, weights: np.ndarray
-) -> np.ndarray:  # fmt: skip
-    """Gradients (draw, n) of a piece's cost at the points, each brought back to the first along the derivatives.
-    weights (kind,)."""
-    found = np.zeros((len(residual), jacobian.shape[1]))
-    for kind, weight in zip(white.kinds, weights, strict=True):
-        J = jacobian[kind.rows]
-        found += weight * (residual[:, kind.rows] - left.away @ J.T) @ J
-    return found
 
 
 def _sd(H: np.ndarray, pulls: np.ndarray) -> np.ndarray:
@@ -162,17 +150,22 @@ def _at(solver: Fits, fits: Sequence[Fit], points: Sequence[np.ndarray]) -> tupl
     return np.concatenate(values), np.concatenate(z)
 
 
-def _piece(white: White, jacobian: np.ndarray, residual: np.ndarray, left: _Left) -> tuple[float, float]:
-    """Log predictive density of a piece, and its misfit. jacobian (M, n); residual (draw, M)."""
+def _piece(
+    white: White, jacobian: np.ndarray, residual: np.ndarray, left: _Left, weights: np.ndarray
+) -> tuple[float, float, np.ndarray]:  # fmt: skip
+    """Log predictive density of a piece, its misfit, and gradients (draw, n) of its cost at the points, each brought
+    back to the first along the derivatives. jacobian (M, n); residual (draw, M); weights (kind,): of the fit."""
     squares, logdet = np.zeros((len(residual), len(white.kinds))), white.logdet.copy()
+    pull = np.zeros((len(residual), jacobian.shape[1]))
     for c, kind in enumerate(white.kinds):
         J = jacobian[kind.rows]
         r = residual[:, kind.rows] - left.away @ J.T
         # Woodbury: r' (1 + J P J')^-1 r, in as many numbers as there are parameters.
         inner = left.precision + J.T @ J
         along = r @ J
+        pull += weights[c] * along
         explained = np.sum((along @ np.linalg.pinv(inner, hermitian=True)) * along, axis=1)
         squares[:, c] = np.maximum(np.sum(r**2, axis=1) - explained, 0.0)
         logdet[c] += float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(left.precision)[1])
     costs = minus_log(squares, logdet, np.array(white.size))
-    return -float(costs.mean()), float(np.median(squares[:, 0])) / white.size
+    return -float(costs.mean()), float(np.median(squares[:, 0])) / white.size, pull

@@ -12,7 +12,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from schemas.base import Frozen
-from schemas.results_diagnose import ElementFound, Verdict
+from schemas.results_diagnose import ElementFound, PairFound, Verdict
 
 Format = Literal["r2s2r blind published 1"]
 
@@ -94,6 +94,7 @@ class PublishedDiagnosis(Frozen):
     probability: float
     set90: tuple[str, ...]
     ranking: tuple[PublishedRank, ...]
+    pairs: tuple[PairFound, ...] = ()
     where: PublishedWhere | None = None
     shrinkage: PublishedShrinkage | None = None
     next_gait: PublishedNext | None = None

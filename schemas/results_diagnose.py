@@ -60,6 +60,14 @@ class WhereFound(Frozen):
     element: ElementFound | None
 
 
+class PairFound(Frozen):
+    """Two effects at once."""
+
+    effects: tuple[str, ...]
+    elpd_gain: float
+    """As of one effect: held-out log predictive density over the refit nominal model [nats]."""
+
+
 class ShrinkageFound(Frozen):
     """How far the gap shrinks on intervals that nothing was fitted to."""
 
@@ -120,6 +128,8 @@ class DiagnoseReport(Frozen):
     set90: tuple[str, ...]
     """Names that hold the truth in 90 of 100 cases, where probabilities are calibrated."""
     ranking: tuple[RankedName, ...]
+    pairs: tuple[PairFound, ...] = ()
+    """The best effect with others beside it, best first."""
     where: WhereFound
     shrinkage: ShrinkageFound | None
     not_testable: tuple[str, ...]

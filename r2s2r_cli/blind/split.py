@@ -33,22 +33,27 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Range:
-    """seeds: of the sets. low, high: sizes of effects as factors of their usual size, drawn evenly in the logarithm.
-    faint: the same of a part FAINT of the sets, most of whose effects lie under the floor; None: there is no such part.
+    """seeds: of the sets. low, high: sizes of effects as factors of their usual size, drawn evenly in the logarithm;
+    loud: the least one under LOUD_M of noise. faint: the same of a part FAINT of the sets, most of whose effects lie
+    under the floor; None: there is no such part.
     """
 
     seeds: range
     low: float
     high: float
+    loud: float
     faint: tuple[float, float] | None = None
 
 
 RANGES = {
-    Bank.CALIBRATION: Range(range(100_000, 200_000), 0.35, 1.6, (0.03, 0.14)),
-    Bank.BLIND: Range(range(500_000, 900_000), 0.3, 1.8, (0.025, 0.16)),
-    Bank.REGRESSION: Range(range(1_000, 2_000), 0.8, 1.3),
+    Bank.CALIBRATION: Range(range(100_000, 200_000), 0.5, 1.6, 0.8, (0.0025, 0.025)),
+    Bank.BLIND: Range(range(500_000, 900_000), 0.45, 1.8, 0.75, (0.002, 0.03)),
+    Bank.REGRESSION: Range(range(1_000, 2_000), 0.8, 1.3, 0.8),
 }
 FAINT = 0.25
+LOUD_M = 0.010
+"""Of noise, where the floor is two to four times that of less: effects below half of it say nothing, and are not drawn
+(diagnosis.md: sizes from half a floor on), but for the faint ones."""
 SHARES = {Kind.NONE: 0.15, Kind.SINGLE: 0.60, Kind.PAIR: 0.10, Kind.OUTSIDE: 0.15}
 NOISE_M = (0.002, 0.005, 0.010)
 AR1 = (0.0, 0.7)
@@ -82,9 +87,10 @@ def kinds(count: int, rng: np.random.Generator) -> list[Kind]:
     return [found[i] for i in rng.permutation(count)]
 
 
-def size(bank: Bank, rng: np.random.Generator) -> float:
-    """A size, as a factor of the usual one: off every grid."""
+def size(bank: Bank, rng: np.random.Generator, noise_m: float) -> float:
+    """A size, as a factor of the usual one: off every grid. noise_m: of the set [m]."""
     of = RANGES[bank]
     faint = rng.random() < FAINT
-    low, high = of.faint if faint and of.faint is not None else (of.low, of.high)
+    plain = (of.loud if noise_m >= LOUD_M else of.low, of.high)
+    low, high = of.faint if faint and of.faint is not None else plain
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))

@@ -28,7 +28,7 @@ class MotorDeadZone(Effect):
     channel = Channel.COMMAND
     title = "motor dead zone"
     own = (
-        EffectParameter("threshold", "1", 0.0, 0.4, off=0.0, scale=0.15,
+        EffectParameter("threshold", "1", 0.0, 0.95, off=0.0, scale=0.15,
                         what="command below which the winch stands still", per="actuated"),
     )  # fmt: skip
     look_alikes = ("sensor_bias", "sensor_gain")

@@ -34,8 +34,9 @@ class Body(Protocol):
     def restore(self, state: object) -> None:
         """Another one's state; what laws remember stays theirs."""
 
-    def push(self, velocity: np.ndarray, rate: np.ndarray) -> None:
-        """Add to the rods' velocities [m/s] in the world and rates [rad/s] in their own axes, (rod, 3)."""
+    def push(self, velocity: np.ndarray, rate: np.ndarray, let_out: np.ndarray) -> None:
+        """Add to the rods' velocities [m/s] in the world and rates [rad/s] in their own axes, (rod, 3), and to the rest
+        lengths that the winches have set [m], (actuated,)."""
 
 
 class Boards(Protocol):
@@ -91,9 +92,10 @@ class RigBody(Plant):
         data.qpos[:], data.qvel[:], data.ctrl[:] = state.qpos, state.qvel, state.ctrl
         winches.rest, winches.acting, winches.angle = state.rest.copy(), state.acting.copy(), state.angle.copy()
 
-    def push(self, velocity: np.ndarray, rate: np.ndarray) -> None:
+    def push(self, velocity: np.ndarray, rate: np.ndarray, let_out: np.ndarray) -> None:
         """Add to the rods' velocities [m/s] and rates [rad/s], (rod, 3): MuJoCo has those of a free joint together."""
         self.sim.data.qvel[: 6 * len(rate)] += np.concatenate([velocity, rate], axis=1).ravel()
+        self.winches.rest, self.winches.acting = self.winches.rest + let_out, self.winches.acting + let_out
 
     def _laws(self) -> tuple[Law, ...]:
         scene = Scene(self.robot, self.sim, self.winches.r, np.random.default_rng([self._hidden.seed, 12]))

@@ -100,8 +100,8 @@ class EngineBody:
         self._state, rest, acting, angle = state
         self.winches.rest, self.winches.acting, self.winches.angle = rest.copy(), acting.copy(), angle.copy()
 
-    def push(self, velocity: np.ndarray, rate: np.ndarray) -> None:
-        """Add to the rods' velocities [m/s] and rates [rad/s], (rod, 3)."""
+    def push(self, velocity: np.ndarray, rate: np.ndarray, let_out: np.ndarray) -> None:
+        """Add to the rods' velocities [m/s] and rates [rad/s], (rod, 3), and to the winches' rest lengths [m]."""
         import torch
 
         state = self._state
@@ -109,6 +109,7 @@ class EngineBody:
             state, v_WB=state.v_WB + torch.as_tensor(velocity @ self._R).reshape(state.v_WB.shape),
             w_R=state.w_R + torch.as_tensor(rate).reshape(state.w_R.shape),
         )  # fmt: skip
+        self.winches.rest, self.winches.acting = self.winches.rest + let_out, self.winches.acting + let_out
 
     def _working(self, hidden: Hidden, gait: int) -> tuple[Law, ...]:
         # These laws ask their scene for the winches' radii and for chance alone: there is no MuJoCo here.

@@ -4,9 +4,10 @@ projected off.
 Every target interval of every gait is simulated again without what is wrong, from the true state at its start and under
 the recorded duties (command replay). The difference of end caps and sensor lengths is whitened with the noise and the
 floor, and projected on the complement of the rig's own sensitivities to friction, motor speed (both common to the set)
-and start pose (x, y and heading of every interval: exact, the floor is the same everywhere). The floor has the robot's
-repeatability in it: every interval is simulated a few times more from a start that was pushed a little, and what that
-changes, a fall that comes earlier, is no effect's. d is the length of what is left: with d >= 8 no test would miss it.
+and start pose (x, y and heading of every interval: exact, the floor is the same everywhere). The rest of the pose is
+known as well as the camera's noise allows: every interval is simulated a few times more from a start that was pushed as
+far, and what that changes, a fall that comes earlier, is no effect's; neither is a clock that is some milliseconds off.
+d is the length of what is left: with d >= 8 no test would miss it.
 No interval counts for more than MOST: one tip-over that happens in one world and not in the other is worth more than
 all the rest together, and says nothing about which effect it was.
 """
@@ -33,10 +34,17 @@ LOOK_S = 0.1
 STEP = 0.05
 """Relative change of friction and speed for their sensitivities."""
 PUSHES = 6
-"""Of every interval's start, for the robot's repeatability."""
-PUSH_M_PER_S, PUSH_RAD_PER_S = 0.02, 0.1
-"""Sd of a push in every coordinate of a rod: cables stop it within a twentieth of a second, a millimetre or a third of
-a degree away."""
+"""Of every interval's start: what of it nobody knows, and how far the robot repeats itself."""
+PUSH_M_PER_S, PUSH_RAD_PER_S, PUSHED_M = 0.02, 0.1, 0.001
+"""Sd of the least push in every coordinate of a rod, and what it comes to: cables stop it within a twentieth of a second,
+a millimetre or a third of a degree away."""
+START_SHARE = 0.4
+"""Of the camera's noise, to which a start pose is known: errors that stay over an interval are 0.3 of it, and some
+frames before the start leave as much of the rest."""
+LET_OUT_M = float(np.hypot(LENGTH_FLOOR_M, DAY_SD_M))
+"""Of every winch at a start: what its sensor does not tell. It decides when a robot that is about to fall does."""
+CLOCK_S = 0.005
+"""Floor of time: on a ramp two engines, and two clocks, differ as fast as the ramp."""
 MOST = 10.0
 """Of one interval: what happens once can be clear, and no more than that."""
 WEAK, CLEAR = 3.0, 8.0
@@ -75,8 +83,8 @@ def detectability(robot: Robot, hidden: Hidden, runs: list[Driven]) -> Detectabl
     fast = [_replayed(robot, replace(plain, speed=plain.speed * (1 + STEP)), run, g) for g, run in enumerate(runs)]
     rng = np.random.default_rng([hidden.seed, 17])
     pushed = [[_replayed(robot, plain, run, g, rng) for g, run in enumerate(runs)] for _ in range(PUSHES)]
-    told = _Told(hidden, base, (rub, fast), pushed)
-    whole = [_recorded(hidden, run, g) for g, run in enumerate(runs)]
+    whole, later = ([_recorded(hidden, run, g, by) for g, run in enumerate(runs)] for by in (0.0, CLOCK_S))
+    told = _Told(hidden, base, (rub, fast), pushed, (whole, later))
     d, gap = told(whole)
     d = float(np.hypot(d, _lost(hidden, runs)))
     each = []
@@ -100,12 +108,18 @@ class _Told:
 
     def __init__(
         self, hidden: Hidden, base: list[list[_Looks]], varied: tuple[list[list[_Looks]], ...],
-        pushed: list[list[list[_Looks]]],
+        pushed: list[list[list[_Looks]]], clocks: tuple[list[list[_Looks]], list[list[_Looks]]],
     ) -> None:  # fmt: skip
         self._hidden, self._base = hidden, base
+        # The pushes of an interval are few directions of many: how far they reach counts in all of them.
+        self._grown = [[_reach(one, [p[g][k] for p in pushed]) for k, one in enumerate(run)]
+                       for g, run in enumerate(base)]  # fmt: skip
         again = [self._white(one) for one in pushed]
-        self._repeats = [np.column_stack(parts) / np.sqrt(len(again)) for parts in zip(
+        repeats = [np.column_stack(parts) / np.sqrt(len(again)) for parts in zip(
             *([part for part, _ in one] for one in again), strict=True)]  # fmt: skip
+        right, late = (self._white(one) for one in clocks)
+        self._known = [np.column_stack([known, b - a]) for known, (a, _), (b, _) in zip(
+            repeats, right, late, strict=True)]  # fmt: skip
         common = [self._white(one) for one in varied]
         self._common = np.column_stack([np.concatenate([part for part, _ in one]) for one in common])
         self._own = [_poses(looks) for run in base for looks in run]
@@ -114,42 +128,43 @@ class _Told:
         """d, and the root mean square at key frames [m]."""
         white = self._white(other)
         r = np.concatenate([part for part, _ in white])
-        nuisances, repeats, begins, at = [], [], [], 0
-        for pose, again, (part, cap_rows) in zip(self._own, self._repeats, white, strict=True):
-            own, pushed = np.zeros((len(r), 3)), np.zeros((len(r), again.shape[1]))
-            own[at : at + cap_rows], pushed[at : at + len(part)] = self._caps_white(pose), again
+        nuisances, sized, begins, at = [], [], [], 0
+        grown = [one for run in self._grown for one in run]
+        for pose, columns, reach, (part, cap_rows) in zip(self._own, self._known, grown, white, strict=True):
+            own, of_size = np.zeros((len(r), 3)), np.zeros((len(r), columns.shape[1]))
+            own[at : at + cap_rows], of_size[at : at + len(part)] = self._caps_white(pose, reach), columns
             nuisances.append(own)
-            repeats.append(pushed)
+            sized.append(of_size)
             begins.append(at)
             at += len(part)
-        free, known = np.column_stack([self._common, *nuisances]), np.column_stack(repeats)
+        free, known = np.column_stack([self._common, *nuisances]), np.column_stack(sized)
         # Columns differ by orders of magnitude: scaled before the rank is decided.
         free = free / np.maximum(np.linalg.norm(free, axis=0), 1e-12)
-        # A start's pushes have a size, the other nuisances none.
+        # Pushes and clocks have a size, the other nuisances none.
         J = np.block([[free, known], [np.zeros((known.shape[1], free.shape[1])), np.eye(known.shape[1])]])
         padded = np.concatenate([r, np.zeros(known.shape[1])])
         left = padded - J @ np.linalg.lstsq(J, padded, rcond=1e-9)[0]
-        of_pushes = (left[len(r) :] ** 2).reshape(len(white), -1).sum(axis=1)
+        of_known = (left[len(r) :] ** 2).reshape(len(white), -1).sum(axis=1)
         last = [(b.p[-1] - a.p[-1]).ravel() for x, y in zip(self._base, other, strict=True)
                 for a, b in zip(x, y, strict=True)]  # fmt: skip
-        each = np.minimum(np.add.reduceat(left[: len(r)] ** 2, begins) + of_pushes, MOST**2)
+        each = np.minimum(np.add.reduceat(left[: len(r)] ** 2, begins) + of_known, MOST**2)
         return float(np.sqrt(each.sum())), float(np.sqrt(3 * np.mean(np.concatenate(last) ** 2)))
 
     def _white(self, other: list[list[_Looks]]) -> list[tuple[np.ndarray, int]]:
         """Whitened difference from the base of every interval, and how much of it is caps."""
         found = []
-        for mine, theirs in zip(self._base, other, strict=True):
-            for a, b in zip(mine, theirs, strict=True):
-                caps = self._caps_white((b.p - a.p).reshape(len(a.t), -1, 1)).ravel()
-                root = _root(len(a.t), LENGTH_SD_M, 0.0, np.hypot(LENGTH_FLOOR_M, DAY_SD_M), LENGTH_GROWN_M)
+        for mine, theirs, reach in zip(self._base, other, self._grown, strict=True):
+            for a, b, grown in zip(mine, theirs, reach, strict=True):
+                caps = self._caps_white((b.p - a.p).reshape(len(a.t), -1, 1), grown).ravel()
+                root = _root(len(a.t), LENGTH_SD_M, 0.0, LET_OUT_M, LENGTH_GROWN_M)
                 found.append((np.concatenate([caps, np.linalg.solve(root, b.length - a.length).ravel()]), len(caps)))
         return found
 
-    def _caps_white(self, columns: np.ndarray) -> np.ndarray:
-        """(look, coordinate, k) whitened over looks, as (look * coordinate, k)."""
+    def _caps_white(self, columns: np.ndarray, grown: float) -> np.ndarray:
+        """(look, coordinate, k) whitened over looks, as (look * coordinate, k). grown: of the floor at the end [m]."""
         h = self._hidden
         ar = h.ar1 ** (h.rate_hz * LOOK_S) if h.ar1 else 0.0
-        root = _root(len(columns), h.noise_m, ar, np.hypot(FLOOR_M, OFFSET_SHARE * h.noise_m), GROWN_M)
+        root = _root(len(columns), h.noise_m, ar, np.hypot(FLOOR_M, OFFSET_SHARE * h.noise_m), grown)
         return np.linalg.solve(root, columns.reshape(len(columns), -1)).reshape(-1, columns.shape[2])
 
 
@@ -162,6 +177,12 @@ def _root(n: int, sd: float, ar: float, constant: float, grown: float) -> np.nda
     return np.asarray(np.linalg.cholesky(sd**2 * np.where(lag == 0, 1.0, ar**lag) + constant**2 + walk))
 
 
+def _reach(base: _Looks, pushed: list[_Looks]) -> float:
+    """Floor of a cap's coordinate at the end of an interval [m]: of engines, and of how far pushes carry it."""
+    carried = np.sqrt(np.mean([(one.p[-1] - base.p[-1]) ** 2 for one in pushed]))
+    return float(np.hypot(GROWN_M, carried))
+
+
 def _poses(looks: _Looks) -> np.ndarray:
     """Sensitivity of the caps to x, y [1] and heading [m/rad] at the start, (look, coordinate, 3)."""
     about = looks.p - looks.p[0].mean(axis=0)
@@ -171,14 +192,14 @@ def _poses(looks: _Looks) -> np.ndarray:
     return np.stack([one.reshape(len(looks.t), -1) for one in (x, y, turned)], axis=-1)
 
 
-def _recorded(hidden: Hidden, run: Driven, gait: int) -> list[_Looks]:
-    """What really happened, seen by the camera of that world without noise."""
+def _recorded(hidden: Hidden, run: Driven, gait: int, later: float = 0.0) -> list[_Looks]:
+    """What really happened, seen by the camera of that world without noise. later: by a clock that is so far off [s]."""
     camera = hidden.world(gait, run.gait.position, run.gait.heading).seen()
     late = camera.clock.stamp_delay_s
     found = []
     for t in _times(run):
-        at = _between(t - late, run.t, run.caps)
-        found.append(_Looks(t, through(camera, t - late, at), _between(t, run.t, run.sensed)))
+        at = _between(t - late + later, run.t, run.caps)
+        found.append(_Looks(t, through(camera, t - late, at), _between(t + later, run.t, run.sensed)))
     return found
 
 
@@ -194,10 +215,10 @@ def _replayed(
     for t, moment, first in zip(_times(run), run.moments, run.starts, strict=True):
         body.restore(moment)
         if pushes is not None:
-            rods = run.caps.shape[1] // 2
-            body.push(
-                PUSH_M_PER_S * pushes.standard_normal((rods, 3)), PUSH_RAD_PER_S * pushes.standard_normal((rods, 3))
-            )
+            rods, by = run.caps.shape[1] // 2, max(1.0, START_SHARE * hidden.noise_m / PUSHED_M)
+            body.push(by * PUSH_M_PER_S * pushes.standard_normal((rods, 3)),
+                      by * PUSH_RAD_PER_S * pushes.standard_normal((rods, 3)),
+                      LET_OUT_M * pushes.standard_normal(len(robot.actuated)))  # fmt: skip
         k, now = int(first), float(run.t[first])
         p, length = [], []
         for due in t:

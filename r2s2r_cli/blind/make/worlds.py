@@ -116,7 +116,7 @@ def hidden(
     if camera:
         plain = replace(plain, noise_m=TRACKED_M, ar1=TRACKED_AR1, rate_hz=CAMERA_HZ, camera=True)
     wrong = np.random.default_rng([seed, 11])
-    s = size(bank, wrong) if factor is None else factor
+    s = size(bank, wrong, plain.noise_m) if factor is None else factor
     if kind is Kind.OUTSIDE:
         name = strange or str(wrong.choice(OUTSIDE if tier == "B" else STRANGE_WITHOUT_RIG))
         once = name in ("cable_snag", "lateral_push")
@@ -126,7 +126,7 @@ def hidden(
     number = {Kind.NONE: 0, Kind.SINGLE: 1, Kind.PAIR: 2}[kind]
     known = [name for name in STARRED if tier == "B" or name not in WITHOUT_RIG]
     names = effects or tuple(str(name) for name in wrong.choice(known, size=number, replace=False))
-    sizes = [s if i == 0 or factor is not None else size(bank, wrong) for i in range(len(names))]
+    sizes = [s if i == 0 or factor is not None else size(bank, wrong, plain.noise_m) for i in range(len(names))]
     planted = tuple(
         STARRED[name](Draw(wrong, USUAL.get(name, 1.0) * one, count)) for name, one in zip(names, sizes, strict=True)
     )

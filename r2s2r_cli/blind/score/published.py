@@ -124,6 +124,7 @@ def _diagnosis(document: Mapping[str, Any]) -> dict[str, Any]:
         found["shrinkage"] = _part(shrinkage, PublishedShrinkage)
     if (one := document.get("next_gait")) is not None:
         found["next_gait"] = {name: one[name] for name in ("name", "nats", "now") if one.get(name) is not None}
+    found["pairs"] = [{**one, "elpd_gain": _short(one["elpd_gain"])} for one in document.get("pairs") or ()]
     found["confusable"] = [[a, b, _short(nats)] for a, b, nats in document.get("confusable") or ()]
     found["parity"] = list(document.get("parity") or ())[:FINDINGS]
     return found

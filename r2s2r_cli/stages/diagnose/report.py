@@ -18,6 +18,7 @@ from schemas.results_diagnose import (
     DiagnoseReport,
     ElementFound,
     NextGaitFound,
+    PairFound,
     RankedName,
     SegmentFound,
     ShrinkageFound,
@@ -33,7 +34,9 @@ def diagnose_report(found: Diagnosis) -> DiagnoseReport:
     which = found.which
     return DiagnoseReport(
         verdict=which.verdict, sentence=sentence(found), effects=which.effects, probability=which.probability,  # type: ignore[arg-type]
-        set90=which.set90, ranking=tuple(_ranked(one) for one in which.ranking), where=_where(found),
+        set90=which.set90, ranking=tuple(_ranked(one) for one in which.ranking),
+        pairs=tuple(PairFound(effects=names, elpd_gain=gain) for names, gain in which.pairs if math.isfinite(gain)),
+        where=_where(found),
         shrinkage=_shrinkage(found), not_testable=which.not_testable,
         confusable=tuple(one for one in which.confusable if math.isfinite(one[2])), next_gait=_next(found),
         robot=found.robot, floor_m=found.floor.rmse, floor_from=found.floor.words, floor_given=found.floor.given,

@@ -27,9 +27,10 @@ def _verdict(found: Diagnosis) -> str:
     best = which.best
     refit, floor = 1e3 * which.no_gap.rmse, 1e3 * found.floor.rmse
     if which.verdict == "no_gap":
-        bound = "" if which.no_gap.upper is None else f", upper 90 % bound {1e3 * which.no_gap.upper:.1f} mm"
-        what = "There is no gap above the floor" if which.no_gap.equivalent else "No effect stands out from chance"
-        return f"{what}: {refit:.1f} mm after refitting{bound}; floor {floor:.1f} mm."
+        bound = f"upper 90 % bound {1e3 * (which.no_gap.upper or 0.0):.1f} mm"
+        text = f"There is no gap above the floor: {refit:.1f} mm after refitting, {bound}; floor {floor:.1f} mm."
+        small = best is not None and which.ranking[0] is best
+        return text + (f" Below it may hide {best.effect} (p = {best.probability:.2f})." if best and small else "")
     if which.verdict == "unknown":
         where = "" if found.channel is None else f" It acts most like something in channel {found.channel}."
         return (

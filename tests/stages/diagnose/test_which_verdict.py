@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.found import Ranked
+from r2s2r_cli.stages.diagnose.which.rivals import NoGap, no_gap
+from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.verdict import verdict_of
 
-BY = Calibration(commit=0.6, commit_none=0.8, commit_unknown=0.7)
+BY = Calibration(commit=0.6, commit_unknown=0.7)
 CHANCE = 5.0
+GAP, NO_GAP = NoGap(0.02, 0.03, 0.01, 0.0), NoGap(0.009, 0.011, 0.01, 0.95)
+"""A refit error of twice the floor, and one at the floor."""
 
 
 def ranking(first: str, probability: float, gain: float) -> list[Ranked]:
@@ -18,27 +23,49 @@ def ranking(first: str, probability: float, gain: float) -> list[Ranked]:
     return [Ranked(first, gain, probability), Ranked("backlash", 0.0, 1.0 - probability)]
 
 
-@pytest.mark.parametrize(("first", "kind", "at"), [("payload", "effect", 0.6), ("none", "no_gap", 0.8),
-                                                   ("unknown", "unknown", 0.7)])  # fmt: skip
+@pytest.mark.parametrize(("first", "kind", "at"), [("payload", "effect", 0.6), ("unknown", "unknown", 0.7)])
 def test_each_claim_has_its_threshold(first: str, kind: str, at: float) -> None:
     """From it on, and not below."""
-    assert verdict_of(ranking(first, at, 30.0), BY, None, CHANCE)[0] == kind
-    assert verdict_of(ranking(first, at - 0.01, 30.0), BY, None, CHANCE) == ("ambiguous", (), at - 0.01)
+    assert verdict_of(ranking(first, at, 30.0), BY, None, CHANCE, GAP)[0] == kind
+    assert verdict_of(ranking(first, at - 0.01, 30.0), BY, None, CHANCE, GAP) == ("ambiguous", (), at - 0.01)
+
+
+def test_no_gap_is_a_claim_about_size() -> None:
+    """Said where the error is at the floor and no cause is likelier than not, and never where the error is larger,
+    however probable it is that nothing is wrong."""
+    assert verdict_of(ranking("none", 0.99, 0.0), BY, None, CHANCE, GAP) == ("ambiguous", (), 0.99)
+    assert verdict_of(ranking("none", 0.3, 0.0), BY, None, CHANCE, NO_GAP) == ("no_gap", (), 0.95)
+    assert verdict_of(ranking("payload", 0.49, 30.0), BY, None, CHANCE, NO_GAP) == ("no_gap", (), 0.95)
+    assert verdict_of(ranking("payload", 0.51, 30.0), BY, None, CHANCE, NO_GAP) == ("ambiguous", (), 0.51)
+    assert verdict_of(ranking("payload", 0.7, 30.0), BY, None, CHANCE, NO_GAP)[0] == "effect"
+    assert verdict_of(ranking("sensor_bias", 0.7, CHANCE), BY, None, CHANCE, NO_GAP)[0] == "no_gap"
+
+
+def test_the_bound_and_its_confidence_agree() -> None:
+    """The 90 % bound lies below 1.25 floor just where the confidence is 90 % or more."""
+    rng = np.random.default_rng(3)
+    seen = set()
+    for scale in np.linspace(0.7, 1.3, 25):
+        squared = (0.01 * scale) ** 2 * rng.chisquare(6, size=15) / 6
+        found = no_gap(_score(squared), 0.01)
+        assert found.equivalent == (found.sure >= 0.9) and 0.0 <= found.sure <= 0.99
+        seen.add(found.equivalent)
+    assert seen == {True, False}
 
 
 def test_a_cause_predicts() -> None:
     """However probable the parity stage makes it: what gains no more than chance in the replay is not the cause. What
     changes no prediction at all needs none."""
-    assert verdict_of(ranking("sensor_bias", 0.99, 30.0), BY, None, CHANCE)[:2] == ("effect", ("sensor_bias",))
-    assert verdict_of(ranking("sensor_bias", 0.99, CHANCE), BY, None, CHANCE)[0] == "ambiguous"
-    assert verdict_of(ranking("dropout", 0.99, 0.0), BY, None, CHANCE)[:2] == ("effect", ("dropout",))
+    assert verdict_of(ranking("sensor_bias", 0.99, 30.0), BY, None, CHANCE, GAP)[:2] == ("effect", ("sensor_bias",))
+    assert verdict_of(ranking("sensor_bias", 0.99, CHANCE), BY, None, CHANCE, GAP)[0] == "ambiguous"
+    assert verdict_of(ranking("dropout", 0.99, 0.0), BY, None, CHANCE, GAP)[:2] == ("effect", ("dropout",))
 
 
 def test_a_pair_is_named_by_its_first() -> None:
     """Where the first guess belongs to the pair that was found."""
-    found = verdict_of(ranking("payload", 0.9, 30.0), BY, ("payload", "backlash"), CHANCE)
+    found = verdict_of(ranking("payload", 0.9, 30.0), BY, ("payload", "backlash"), CHANCE, GAP)
     assert found[:2] == ("pair", ("payload", "backlash"))
-    assert verdict_of(ranking("payload", 0.9, 30.0), BY, ("motor_lag", "backlash"), CHANCE)[0] == "effect"
+    assert verdict_of(ranking("payload", 0.9, 30.0), BY, ("motor_lag", "backlash"), CHANCE, GAP)[0] == "effect"
 
 
 def test_without_healthy_runs_the_parity_stage_counts_for_less() -> None:
@@ -49,3 +76,11 @@ def test_without_healthy_runs_the_parity_stage_counts_for_less() -> None:
     )
     assert own.score("payload", 7.0) == BY.score("payload", 7.0)
     assert "healthy runs" in own.words and own.commit == BY.commit
+
+
+def _score(squared: np.ndarray) -> Score:
+    """Of intervals with these errors, the same for all six caps."""
+    key = np.zeros((len(squared), 6, 3))
+    key[..., 0] = np.sqrt(squared)[:, None]
+    none = np.zeros(len(squared))
+    return Score(elpd=none, misfit=none, key=key, sd=np.zeros(0), without=np.zeros((1, 0)))

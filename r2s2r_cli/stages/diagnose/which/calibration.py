@@ -27,7 +27,7 @@ class Calibration:
     gains, and more where the equivalence test finds no gap; gap: what it loses for every nat that the refit model costs
     more than in healthy runs. unknown_share, left: what `unknown` has of what a wider floor gains and of every nat that
     the best effect leaves; unknown [nats]: what that must exceed. bias [nats]: of a name, what its gains are short of.
-    commit, commit_none, commit_unknown: probability from which an effect, `none` or `unknown` is the verdict.
+    commit, commit_unknown: probability from which an effect or `unknown` is the verdict.
     conformal: names whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many
     it rests on, 0 for the defaults. lapse: how often the evidence says nothing of the truth, so that no name is ever
     certain.
@@ -45,7 +45,6 @@ class Calibration:
     unknown_share: float = 0.3
     left: float = 0.0
     commit: float = 0.5
-    commit_none: float = 0.5
     commit_unknown: float = 0.5
     conformal: float = 0.05
     lapse: float = 0.0
@@ -74,7 +73,7 @@ class Calibration:
 
     def commits(self, name: str, probability: float) -> bool:
         """Whether a first guess of this probability is a verdict."""
-        return probability >= {NONE: self.commit_none, UNKNOWN: self.commit_unknown}.get(name, self.commit)
+        return probability >= (self.commit_unknown if name == UNKNOWN else self.commit)
 
     def probabilities(self, scores: Mapping[str, float]) -> dict[str, float]:
         """Softmax of scores [nats] by name; a share `lapse` of it goes to all names alike."""

@@ -67,7 +67,8 @@ class Screened:
 
 @dataclass(frozen=True)
 class Which:
-    """verdict: effect | pair | ambiguous | no_gap | unknown. effects: ids it commits to. probability: of them.
+    """verdict: effect | pair | ambiguous | no_gap | unknown. effects: ids it commits to. probability: of them;
+    of `no_gap` the confidence of its bound. pairs: two effects at once, best first, with their gains [nats].
     set90: names that hold the truth with 90 %. ranking: best first. chance: gain that the best of the catalogue reaches
     by chance in one of twenty cases [nats]. wider: by how much the floor must grow to explain what the best effect
     leaves; unexplained: what that gains [nats]. left: what today's runs cost more than healthy ones. within: groups
@@ -91,6 +92,7 @@ class Which:
     within: str
     calibrated: str
     warnings: tuple[str, ...] = ()
+    pairs: tuple[tuple[tuple[str, ...], float], ...] = ()
 
     @property
     def best(self) -> Ranked | None:

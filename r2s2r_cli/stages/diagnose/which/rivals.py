@@ -14,6 +14,8 @@ from r2s2r_cli.stages.measures.bootstrap import upper_bound
 
 EQUIVALENT = 1.25
 """Of the floor: a refit model whose error surely stays below that leaves no gap (design.md, Measures)."""
+LEVELS = (0.99, 0.975, 0.95, 0.9, 0.8, 0.7, 0.6)
+"""Of confidence that are told apart."""
 WIDER = (1.25, 1.5, 2.0, 3.0, 5.0, 8.0)
 """Factors on the floor: how large an error without a name may be."""
 DRAWS = 1000
@@ -22,11 +24,13 @@ DRAWS = 1000
 @dataclass(frozen=True)
 class NoGap:
     """The equivalence test. rmse: of the refit model at the ends of stretches left out [m]; upper: its upper 90 %
-    bound, None for fewer than two stretches; floor [m]; equivalent: the bound is below 1.25 floor."""
+    bound, None for fewer than two stretches; floor [m]; equivalent: the bound is below 1.25 floor. sure: confidence of
+    the largest bound that still is, 0 to 1."""
 
     rmse: float
     upper: float | None
     floor: float
+    sure: float = 0.0
 
     @property
     def equivalent(self) -> bool:
@@ -40,7 +44,17 @@ def no_gap(refit: Score, floor_m: float, *, kept: float = 1.0) -> NoGap:
     squared = refit.squared[np.isfinite(refit.squared)]
     squared = squared[squared <= np.quantile(squared, kept)] if len(squared) else squared
     rmse = float(np.sqrt(squared.mean())) if len(squared) else float("inf")
-    return NoGap(rmse, upper_bound(squared, level=0.90) if len(squared) else None, floor_m)
+    bound = upper_bound(squared, level=0.90) if len(squared) else None
+    return NoGap(rmse, bound, floor_m, _sure(squared, EQUIVALENT * floor_m))
+
+
+def _sure(squared: np.ndarray, limit: float) -> float:
+    """The largest of LEVELS at which the upper bound of the root mean square lies below `limit` [m], 0 for none."""
+    for level in LEVELS:
+        bound = upper_bound(squared, level=level) if len(squared) else None
+        if bound is not None and bound < limit:
+            return level
+    return 0.0
 
 
 def chance(

@@ -28,9 +28,6 @@ GIVING = 6
 """Fits whose nuisances and starts all are tried with."""
 SUSPECTED, LEAST_SAID = 3, 2.0
 """Effects that are fitted because the parity stage speaks for them, with so many nats at least."""
-PAIRED = 5
-"""Effects that are tried beside the best one."""
-PAIR_ITERATIONS = 4
 
 Told = Callable[[str, int, int], None]
 Said = Mapping[str, Mapping[int | None, float]]
@@ -74,15 +71,15 @@ def fitted(arena: Arena, base: Fit, picked: Sequence[Response], told_by: Said, t
     fits.settle([nominal, *going])
     for number, (iterations, kept) in enumerate(ROUNDS):
         fits.run([nominal, *going], iterations=iterations)
-        going = _kept(_best_of(going), told_by, kept)
+        going = _kept(best_of(going), told_by, kept)
         nominal, *going = exchanged(fits, [nominal, *going])
         told("fits", number + 1, len(ROUNDS) + 1)
     fits.run([nominal, *going], iterations=LAST)
     for _ in range(AGAIN):
-        nominal, *going = exchanged(fits, [nominal, *_best_of(going)])
+        nominal, *going = exchanged(fits, [nominal, *best_of(going)])
         fits.run([nominal, *going], iterations=BETWEEN)
     told("fits", len(ROUNDS) + 1, len(ROUNDS) + 1)
-    return nominal, _best_of(going)
+    return nominal, best_of(going)
 
 
 def exchanged(fits: Fits, found: Sequence[Fit]) -> list[Fit]:
@@ -122,7 +119,7 @@ def _kept(fits: Sequence[Fit], told_by: Said, count: int) -> list[Fit]:
     return [fit for k, fit in enumerate(fits) if k < count or id(fit) in also]
 
 
-def _best_of(fits: Sequence[Fit]) -> list[Fit]:
+def best_of(fits: Sequence[Fit]) -> list[Fit]:
     """Of every hypothesis the fit of least cost, best first."""
     best: dict[str, Fit] = {}
     for fit in fits:
@@ -130,27 +127,3 @@ def _best_of(fits: Sequence[Fit]) -> list[Fit]:
         if label not in best or fit.cost < best[label].cost:
             best[label] = fit
     return sorted(best.values(), key=lambda fit: fit.cost)
-
-
-def pairs_of(arena: Arena, base: Fit, fits: Sequence[Fit], gained: np.ndarray) -> list[Fit]:
-    """The best single effect with the next PAIRED ones: where one effect leaves something, two may not.
-    gained (fit,): by each [nats]."""
-    if len(fits) < 2:
-        return []
-    order = np.argsort(-gained, kind="stable")
-    first = fits[order[0]]
-    others = [fits[i] for i in order[1:] if fits[i].hypothesis.effects != first.hypothesis.effects]
-    seen: set[str] = set()
-    points = []
-    for other in others:
-        if other.hypothesis.effects[0] in seen or len(seen) == PAIRED:
-            continue
-        seen.add(other.hypothesis.effects[0])
-        both = Hypothesis((*first.hypothesis.parts, *other.hypothesis.parts))
-        z = np.clip(first.z + other.z - base.z, arena.lower, arena.upper)
-        points.append((both, z, np.concatenate([first.x, other.x])))
-        points.append((both, first.z, np.concatenate([first.x, 0.5 * (other.x + other.hypothesis.stack("off"))])))
-    fits_of = Fits(arena)
-    begun = fits_of.begun(points)
-    fits_of.run(begun, iterations=PAIR_ITERATIONS)
-    return _best_of(begun)[:3]

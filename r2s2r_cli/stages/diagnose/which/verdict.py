@@ -14,6 +14,7 @@ from r2s2r_cli.stages.diagnose.which.confusable import confusable
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked, Screened, Shift, Which
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.material import Material
+from r2s2r_cli.stages.diagnose.which.rivals import NoGap
 from r2s2r_cli.stages.diagnose.which.score import Score, gain_sds, gains as gains_of
 from r2s2r_cli.stages.diagnose.which.screen import Response
 
@@ -24,6 +25,8 @@ PAIR_SHARE = 1.0
 NINETY = 1.645
 INDISTINCT = 3.0
 """[nats] Two hypotheses nearer than this cannot be told apart."""
+LIKELY = 0.5
+"""Probability from which an effect is likelier than not: then there is something to be found, however small."""
 SHIFTED = 1.0
 """Posterior sd by which an effect moves a nuisance before it is worth saying."""
 
@@ -61,7 +64,7 @@ def concluded(m: Material) -> Which:
         Ranked(UNKNOWN, m.unexplained, probability[UNKNOWN]),
     ]
     ranking.sort(key=lambda one: (-one.probability, -one.gain))
-    verdict, effects, p = verdict_of(ranking, calibration, pair, m.chance)
+    verdict, effects, p = verdict_of(ranking, calibration, pair, m.chance, m.no_gap)
     top = best.get(effects[0]) if effects else None
     return Which(
         verdict=verdict, effects=effects, probability=p, set90=calibration.within(probability), ranking=tuple(ranking),
@@ -72,6 +75,7 @@ def concluded(m: Material) -> Which:
         confusable=confusable(m, [best[name] for name in sorted(names, key=lambda n: -names[n])[:4]]),
         not_testable=_not_testable(m.responses), shifts=() if top is None else _shifts(m, m.fits[top]),
         within=_left_out(m), calibrated=calibration.words, warnings=_warnings(m, [best[name] for name in names]),
+        pairs=tuple((m.fits[i].hypothesis.effects, gains[i]) for i in order if len(m.fits[i].hypothesis.parts) == 2),
     )  # fmt: skip
 
 
@@ -104,16 +108,18 @@ def _channel(name: str) -> str:
 
 
 def verdict_of(
-    ranking: list[Ranked], calibration: Calibration, pair: tuple[str, ...] | None, chance: float
+    ranking: list[Ranked], calibration: Calibration, pair: tuple[str, ...] | None, chance: float, gap: NoGap
 ) -> tuple[str, tuple[str, ...], float]:
     """What the first of the ranking is worth. A cause predicts: an effect that gains no more in the replay than the
-    best of the catalogue does by chance is not named, whatever the parity stage says."""
+    best of the catalogue does by chance is not named, whatever the parity stage says. Where no cause is named, that
+    there is no gap is a claim about its size (design.md, Measures), not about causes that hide below the floor."""
     first = ranking[0]
     predicts = first.gain > chance or first.effect in (NONE, UNKNOWN, *NO_REPLAY)
-    if not (predicts and calibration.commits(first.effect, first.probability)):
+    if not (predicts and first.effect != NONE and calibration.commits(first.effect, first.probability)):
+        likely = predicts and first.effect not in (NONE, UNKNOWN) and first.probability >= LIKELY
+        if gap.equivalent and not likely:
+            return "no_gap", (), gap.sure
         return "ambiguous", (), first.probability
-    if first.effect == NONE:
-        return "no_gap", (), first.probability
     if first.effect == UNKNOWN:
         return "unknown", (), first.probability
     if pair is not None and first.effect in pair:

@@ -16,10 +16,11 @@ from r2s2r_cli.stages.diagnose.which.found import Which
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.left import expected, left
 from r2s2r_cli.stages.diagnose.which.material import Material
+from r2s2r_cli.stages.diagnose.which.pairs import pairs_of
 from r2s2r_cli.stages.diagnose.which.rivals import WIDER, chance, no_gap
 from r2s2r_cli.stages.diagnose.which.score import ENOUGH, Score, gains, groups_of, scores
 from r2s2r_cli.stages.diagnose.which.screen import screen
-from r2s2r_cli.stages.diagnose.which.search import Said, Told, fitted, pairs_of, picked_of
+from r2s2r_cli.stages.diagnose.which.search import Said, Told, fitted, picked_of
 from r2s2r_cli.stages.diagnose.which.verdict import concluded
 
 PLACES = 8
@@ -84,7 +85,7 @@ def compare_effects(
     told("left out", 0, 1)
     refit, *own = scores(arena, [base, *fits], groups, held_out=ways.held_out)
     old = chronic(arena, healthy, fits)
-    pairs = pairs_of(arena, base, fits, gains(refit, own) - old)
+    pairs = pairs_of(arena, base, fits, gains(refit, own) - old, responses, told_by or {})
     if pairs:
         fits, own = [*fits, *pairs], [*own, *scores(arena, pairs, groups, held_out=ways.held_out)]
         old = np.concatenate([old, chronic(arena, healthy, pairs)])

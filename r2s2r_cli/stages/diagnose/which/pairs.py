@@ -35,7 +35,7 @@ def pairs_of(
         fitted.setdefault(fits[i].hypothesis.effects[0], fits[i])
     fits_of = Fits(arena)
     points = []
-    for response in _partners(fits_of, first, responses, told_by)[:PAIRED]:
+    for response in partners(fits_of, first, responses, told_by)[:PAIRED]:
         known = fitted.get(response.candidate.effect)
         part = response.candidate if known is None else known.hypothesis.parts[0]
         x, z = (response.size, response.start_z) if known is None else (known.x, known.z)
@@ -47,7 +47,7 @@ def pairs_of(
     return best_of(begun)[:KEPT]
 
 
-def _partners(fits: Fits, first: Fit, responses: Sequence[Response], told_by: Said) -> list[Response]:
+def partners(fits: Fits, first: Fit, responses: Sequence[Response], told_by: Said) -> list[Response]:
     """The best element of every other effect, in the order of what it would explain of what `first` leaves. Alone an
     effect may explain nothing that a larger one does not; beside that one it is judged by what is left."""
     likely = fits.likely(first)

@@ -21,7 +21,10 @@ class CommandLog:
         self._knots = switched if run.sampled else run.t_command
         self._control = np.vstack([np.zeros((1, control.shape[1])), control])
         spans = np.diff(self._knots)[:, None] * control[:-1]
-        self._wound = np.vstack([np.zeros((1, control.shape[1])), np.cumsum(spans, axis=0)])
+        wound = np.vstack([np.zeros((1, control.shape[1])), np.cumsum(spans, axis=0)])
+        # By how many rows have begun: where the last of them did, and what was wound by then.
+        self._begun = np.concatenate([self._knots[:1], self._knots])
+        self._wound = np.concatenate([wound[:1], wound])
 
     def at(self, t: np.ndarray) -> np.ndarray:
         """Commands in force at times t (n,) [s], (n, actuated)."""
@@ -41,15 +44,16 @@ class CommandLog:
         edges = start + step * np.arange(count + 1) - delay
         return np.asarray(-np.diff(self.at(edges), axis=0) / step)
 
-    def all_means(self, start: float, count: int, *, step: float, delays: np.ndarray) -> np.ndarray:
-        """The commands for several delays (d,) [s], (d, row, actuated)."""
-        edges = start + step * np.arange(count + 1) - delays[:, None]
+    def all_means(self, starts: np.ndarray, count: int, *, step: float, delays: np.ndarray) -> np.ndarray:
+        """The commands from several starts (n,) [s] for several delays (d,) [s], (d, n, row, actuated)."""
+        edges = (starts[:, None] + step * np.arange(count + 1)) - delays[:, None, None]
         wound = self._integral(edges.ravel()).reshape(*edges.shape, -1)
-        return np.asarray(np.diff(wound, axis=1) / step)
+        return np.asarray(np.diff(wound, axis=2) / step)
 
     def _integral(self, t: np.ndarray) -> np.ndarray:
         """Integral of the commands from the first row to t (n,) [s], (n, actuated)."""
         row = np.searchsorted(self._knots, t, side="right")
-        last = np.maximum(row - 1, 0)
-        before = np.where(row > 0, t - self._knots[last], 0.0)[:, None]
-        return np.asarray(self._wound[last] + before * self._control[row])
+        found = self._control.take(row, axis=0)  # 0 before the first row
+        found *= (t - self._begun.take(row))[:, None]
+        found += self._wound.take(row, axis=0)
+        return found

@@ -5,10 +5,12 @@ Columns are random numbers here: no engine has a part in them.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.parity.finding import Element
-from r2s2r_cli.stages.diagnose.where.channels import fitted, gains, held_out, sizes
+from r2s2r_cli.stages.diagnose.where.channels import _free, _normal, _part, _squares, fitted, gains, held_out, sizes
 from r2s2r_cli.stages.diagnose.where.columns import Column, Design
 from r2s2r_cli.stages.diagnose.where.found import SegmentGap
 from r2s2r_cli.stages.diagnose.where.onset import onset
@@ -69,6 +71,25 @@ def test_an_error_that_changes_its_sign_is_found_too() -> None:
     assert int(np.argmax(spread.variance)) == 2
     plain = held_out(made, np.zeros(0, int), GAIT)
     assert gains(made, CABLE, GAIT, plain).sum() > 30
+
+
+def test_free_probes_are_part_of_the_covariance() -> None:
+    """Squares, log determinants and weighed products as of the covariance 1 + C' variance C itself, row by row."""
+    rng = np.random.default_rng(2)
+    columns = rng.standard_normal((STRETCHES, len(FACTORS), 9, ROWS))
+    variance = np.array([0.3, 1e-4, 2.0])
+    C = columns[:, :, 1:4]
+    covariance = np.eye(ROWS) + np.einsum("scki,k,sckj->scij", C, variance, C)
+    kept = np.concatenate([columns[:, :, :4], columns[:, :, 8:]], axis=2)
+    precise = kept @ np.linalg.solve(covariance, kept.swapaxes(-1, -2))
+    design = replace(_design(0, np.zeros((STRETCHES, 7))), gram=columns @ columns.swapaxes(-1, -2))
+    T = _part(design, MOTOR)
+    free, b = _free(T, design.q, variance), rng.standard_normal(5)
+    w = rng.uniform(size=T.shape[:2])
+    w[3] = 0.0
+    np.testing.assert_allclose(_squares(T, free, b), (precise @ b) @ b, rtol=1e-10)
+    np.testing.assert_allclose(free.logdet, np.linalg.slogdet(covariance)[1], rtol=1e-10)
+    np.testing.assert_allclose(_normal(T, free, w), np.tensordot(w, precise, 2), rtol=1e-9, atol=1e-9)
 
 
 def test_freedom_alone_gains_nothing() -> None:

@@ -102,3 +102,13 @@ def test_the_derivative_by_the_delay_is_the_difference(sampled: bool) -> None:
     assert 0 < int((by_delay != 0).sum()) <= switches
     ends = log.at(np.array([0.9, 0.9 + 130 * step]) - delay)
     np.testing.assert_allclose(step * by_delay.sum(axis=0), ends[0] - ends[1], atol=1e-12)
+
+
+def test_several_starts_and_delays_at_once() -> None:
+    """Bit by bit the rows of each start and delay alone, before the first stamp and after the last one too."""
+    log = CommandLog(logged(3))
+    starts, delays = np.array([0.2, 0.9, 1.7, 5.0]), np.array([-0.3, 0.0, 0.0137])
+    found = log.all_means(starts, 70, step=0.01, delays=delays)
+    for d, delay in enumerate(delays.tolist()):
+        for k, start in enumerate(starts.tolist()):
+            np.testing.assert_array_equal(found[d, k], log.means(start, 70, step=0.01, delay=delay))

@@ -9,12 +9,12 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.which.bent import bent
 from r2s2r_cli.stages.diagnose.which.likely import better_of, likely_start
 from r2s2r_cli.stages.diagnose.which.looks import Seen
-from r2s2r_cli.stages.diagnose.which.mixture import density
+from r2s2r_cli.stages.diagnose.which.mixture import FACTORS, density
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
 from r2s2r_cli.stages.diagnose.which.shifts import CAMERA, Shifts, camera_columns
 from r2s2r_cli.stages.diagnose.which.starting import Starting, clipped
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
-from r2s2r_cli.stages.diagnose.which.white import White, whitened, whitened_of, whites
+from r2s2r_cli.stages.diagnose.which.white import Alone, White, whitened, whitened_of, whites
 
 SECANT = 0.3
 """Of a nuisance's prior sd, to both sides: over what its derivative is taken."""
@@ -149,18 +149,21 @@ class Arena:
         only = range(len(self.many)) if only is None else only
         if away is None and self.away.any():
             away = np.repeat(self.away[None], len(values), axis=0)
-        by = None if away is None else [away[:, k] * self.many[k].start_sd for k in only]
-        seen = self.replayer.seen([self.many[k] for k in only], values, by)
-        place = {k: i for i, k in enumerate(only)}
+        far = None if away is None else [away[:, k] * self.many[k].start_sd for k in only]
+        seen = self.replayer.seen([self.many[k] for k in only], values, far)
+        there = dict(zip(only, seen, strict=True))
+        before, ways = self.starting.before, self.starting.ways
+        linked = {k: j for k in only if (j := before[k]) is not None and j in there and ways[k] is not None}
+        ends = dict(zip(linked, self.starting.apart([(there[k], there[j]) for k, j in linked.items()]), strict=True))
         found = []
-        for k, one in zip(only, seen, strict=True):
-            own, j = self.residual(k, one, z), self.starting.before[k]
+        for k, one in there.items():
+            own = self.residual(k, one, z)
             if away is not None:
                 own = own - np.einsum("ko,ocf->kcf", away[:, k], self.starting.by_start[k])
             ahead = np.zeros((len(values), self.starting.offsets))
-            if j in place and self.starting.ways[k] is not None:
-                both = (None, None) if away is None else (away[:, k], away[:, j])
-                ahead = self.starting.ahead(k, one, seen[place[j]], *both)
+            if k in ends:
+                by = (None, None) if away is None else (away[:, k], away[:, linked[k]])
+                ahead = self.starting.led(k, ends[k], *by)
             found.append(np.concatenate([clipped(own).reshape(len(values), -1), ahead], axis=1))
         return found
 
@@ -171,10 +174,11 @@ class Arena:
         white = []
         for at in (away, wanted):
             raw = self._with_before(values, z, only, at)
-            white.append([whitened_of(self.white, raw, k) for k in only])
+            alone: Alone = {}
+            white.append([whitened_of(self.white, raw, k, alone) for k in only])
             if at is away:
                 for k in only:
-                    wanted[:, k] = self._likely_start(k, raw)
+                    wanted[:, k] = self._likely_start(k, raw, alone)
         found = np.zeros((len(values), self.by_nuisance.shape[0]))
         for k, first, second in zip(only, *white, strict=True):
             own = self.white[k]
@@ -185,10 +189,11 @@ class Arena:
     def likely_starts(self, raw: Sequence[np.ndarray]) -> np.ndarray:
         """Where stretches most likely begin that leave raw residuals (k, n) each: in sd from the starts, (k, stretch,
         offset)."""
-        return np.stack([self._likely_start(k, raw) for k in range(len(self.many))], axis=1)
+        alone: Alone = {}
+        return np.stack([self._likely_start(k, raw, alone) for k in range(len(self.many))], axis=1)
 
-    def _likely_start(self, k: int, raw: Sequence[np.ndarray] | Mapping[int, np.ndarray]) -> np.ndarray:
-        return likely_start(self.white, raw, k, self.starting.offsets) - self.starting.settled[k]
+    def _likely_start(self, k: int, raw: Sequence[np.ndarray] | Mapping[int, np.ndarray], alone: Alone) -> np.ndarray:
+        return likely_start(self.white, raw, k, self.starting.offsets, alone) - self.starting.settled[k]
 
     def keys(self, values: np.ndarray, z: np.ndarray, only: Sequence[int] | None = None) -> np.ndarray:
         """Simulated minus observed caps [m] at the ends of whole target intervals, the key frames, (k, interval, cap,
@@ -211,7 +216,9 @@ class Arena:
 
     def squares(self, residual: np.ndarray) -> np.ndarray:
         """Sums of squares (k, stretch, kind) of white residuals (k, M)."""
-        found = [[np.sum(residual[:, kind.rows] ** 2, axis=1) for kind in white.kinds] for white in self.white]
+        # The kinds of a stretch have as many rows each, and those of the first kind of all stretches come first.
+        square = (residual**2).reshape(len(residual), len(FACTORS), -1)
+        found = [square[:, :, white.rows].sum(axis=2).T for white in self.white]
         return np.array(found).transpose(2, 0, 1)
 
     def residual(self, k: int, seen: Seen, z: np.ndarray) -> np.ndarray:

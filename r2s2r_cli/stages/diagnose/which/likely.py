@@ -7,26 +7,29 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
-from r2s2r_cli.stages.diagnose.which.white import White, begun
+from r2s2r_cli.stages.diagnose.which.white import Alone, White, begun, rooted_alone
 
 MOST_SD = 2.5
 """How far from where it is known to be a start may be moved, every coordinate in its sd."""
 
 
 def likely_start(
-    white: Sequence[White], raw: Sequence[np.ndarray] | Mapping[int, np.ndarray], k: int, offsets: int
+    white: Sequence[White], raw: Sequence[np.ndarray] | Mapping[int, np.ndarray], k: int, offsets: int,
+    alone: Alone | None = None,
 ) -> np.ndarray:  # fmt: skip
     """Of the stretch k that leaves raw residuals (hypothesis, n), under the kind of error that explains it best, in sd
-    of its start as it was seen, (hypothesis, offset). offsets: how many there are."""
+    of its start as it was seen, (hypothesis, offset). offsets: how many there are; alone: as `white.rooted_alone`."""
+    alone = {} if alone is None else alone
     own = white[k].residual(raw[k])
     squares, starts = [], []
-    for kind in white[k].kinds:
+    for c, kind in enumerate(white[k].kinds):
         link = kind.link
         if link is None:
-            rooted = kind.rooted(own)
+            # Without a link the first kind is the second one.
+            rooted = rooted_alone(white, raw, k, alone) if c < 2 else kind.rooted(own)
             start = kind.start(rooted)[:, :offsets]
         else:
-            middle = begun(white, raw, k)
+            middle = begun(white, raw, k, alone)
             rooted = kind.rooted(own + link.shift(middle))
             start = middle + kind.start(rooted)[:, :offsets] @ link.root.T
         squares.append(np.sum(kind.off_start(rooted) ** 2, axis=1))

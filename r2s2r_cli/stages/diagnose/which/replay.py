@@ -31,17 +31,23 @@ MOST = 256
 """Simulations in one batch."""
 FEW = 4
 """Hypotheses whose stretches are all simulated in one batch."""
+ROUNDING = 1e-9
+"""Of a step: by so much it may be longer than the longest stable one."""
 
 
 class Replayer(Predictor):
     """Simulates stretches by command replay, many hypotheses at once."""
 
     def __init__(self, model: Model, **how: object) -> None:
+        from r2s2r_cli.engine.hooks import effective
+
         super().__init__(model, **how)  # type: ignore[arg-type]
         self.model = model
-        self._logs: dict[int, tuple[RunData, CommandLog]] = {}
+        self._logs: dict[tuple[int, int, bool], tuple[RunData, CommandLog]] = {}
         self._packed: dict[int, tuple[Stretch, Tensor]] = {}
-        self._stable = Stable(self.structure, model.theta(model.values0))
+        nominal = model.theta(model.values0)
+        self._stable = Stable(self.structure, nominal)
+        self._p_BE = effective(self.structure, nominal).p_BE
 
     def seen(
         self, many: Sequence[Stretch], values: np.ndarray, by: Sequence[np.ndarray] | None = None
@@ -131,8 +137,8 @@ class Replayer(Predictor):
         with torch.no_grad():
             flat = self.simulator.advance(s0[moved], u, packed[whose[moved]], h=step / n, hold=n, every=EVERY * n)
             seen = looked(
-                structure, own, flat, all_of, many, behind, every=EVERY * step, cable_caps=self.cable_caps,
-                up=late.ground_height,
+                structure, own, flat, all_of, many, behind, every=EVERY * step, p_BE=self._p_BE,
+                cable_caps=self.cable_caps, up=late.ground_height,
             )  # fmt: skip
         lasted = [(one.window.duration + one.goes_on) / (EVERY * step) for one in many]
         last = between(flat, torch.as_tensor(lasted, dtype=torch.float64).repeat(len(first))[:, None])[
@@ -174,13 +180,15 @@ class Replayer(Predictor):
     def _substeps(self, many: Sequence[Stretch], own: Parameters, whose: Tensor, s0: Tensor) -> int:
         """Engine steps a step, as stiff cables need. own: batch k; whose (row,): of the starts s0 (row, NS)."""
         from r2s2r_cli.engine.flat import unpack_state
+        from r2s2r_cli.engine.reading import longest_step
 
         places: set[object] = {(one.run, one.interval, one.piece) for one in many}
         for one in many:
             self._stable.learn((one.run, one.interval, one.piece), self._flat(one))
         if self.step <= self._stable.step(places, own):
             return 1
-        return self.simulator.substeps(rows_of(own, whose), unpack_state(self.structure, s0), self.step)
+        longest = longest_step(self.structure, rows_of(own, whose), unpack_state(self.structure, s0))
+        return max(1, math.ceil(self.step / longest - ROUNDING))
 
     def _undelayed(self, own: Parameters, k: int) -> tuple[Parameters, np.ndarray]:
         """The parameters without the camera's delay, and that delay (k,) [s]. A stretch starts where the camera saw the
@@ -198,15 +206,20 @@ class Replayer(Predictor):
         import torch
 
         own, back = np.unique(delays, return_inverse=True)
-        made = np.stack([self._log(one.window.run).all_means(one.window.start, rows, step=self.step, delays=own)
-                         for one in many], axis=1)  # fmt: skip
+        logs = [self._log(one.window.run) for one in many]
+        made = np.empty((len(own), len(many), rows, self.structure.n_actuated))
+        for log in dict.fromkeys(logs):
+            places = [i for i, one in enumerate(logs) if one is log]
+            starts = np.array([many[i].window.start for i in places])
+            made[:, places] = log.all_means(starts, rows, step=self.step, delays=own)
         return torch.as_tensor(made[back].reshape(-1, *made.shape[2:]))
 
     def _log(self, run: RunData) -> CommandLog:
-        """Of a run, made once."""
-        if id(run) not in self._logs:
-            self._logs[id(run)] = (run, CommandLog(run))  # the run is kept: no other one gets its id
-        return self._logs[id(run)][1]
+        """Of a run, made once: stretches have frames of their own, and the commands of their run."""
+        key = (id(run.t_command), id(run.control), run.sampled)
+        if key not in self._logs:
+            self._logs[key] = (run, CommandLog(run))  # the run is kept: nothing else gets these ids
+        return self._logs[key][1]
 
 
 def _joined(parts: Sequence[Seen]) -> Seen:

@@ -65,7 +65,7 @@ def screen(arena: Arena, base: Fit, candidates: Sequence[Candidate]) -> tuple[Re
     likely = fits.likely(base)
     by_row = likely**2
     Jn = base.jacobian[:, : len(base.z)]
-    plain = _Projection(Jn, by_row, arena.precision)
+    made: dict[tuple[int, ...], _Projection] = {}
     pull = arena.precision @ (base.z - arena.mean)
     best: dict[int, tuple[float, np.ndarray, np.ndarray, np.ndarray]] = {}
     shown: dict[int, tuple[float, float, np.ndarray]] = {}
@@ -76,8 +76,10 @@ def screen(arena: Arena, base: Fit, candidates: Sequence[Candidate]) -> tuple[Re
         ])  # fmt: skip
         residuals = arena.residuals(values, np.repeat(base.z[None], len(some), axis=0))
         for (i, size), residual in zip(some, residuals, strict=True):
-            held = fits.overruled(Hypothesis((candidates[i],)))
-            own = plain if not held else _Projection(Jn, by_row, arena.precision, held)
+            held = tuple(fits.overruled(Hypothesis((candidates[i],))))
+            if held not in made:
+                made[held] = _Projection(Jn, by_row, arena.precision, held)
+            own = made[held]
             response = likely * (residual - base.residual)
             length = float(np.linalg.norm(response))
             left = response - own.Q @ (own.Q.T @ response)

@@ -36,11 +36,11 @@ class Stable:
             self._longest[name] = longest_step(self.structure, self.nominal, unpack_state(self.structure, start[None]))
 
     def step(self, names: set[object], theta: Parameters) -> float:
-        """Stable for robots theta (batch k) near these poses: that of the nominal one there, as much shorter as the
-        bound that holds in every pose is. 0 where there is no such bound."""
+        """Stable for robots theta (batch k) near these poses: as their bound that holds in every pose says, or that of
+        the nominal one there, as much shorter as the bound is. 0 where there is no such bound."""
         from r2s2r_cli.engine.reading import always_stable_step
 
         if not self._always > 0:
             return 0.0
-        shorter = always_stable_step(self.structure, theta) / self._always
-        return ROOM * shorter * min(self._longest[name] for name in names)
+        always = always_stable_step(self.structure, theta)
+        return max(always, ROOM * (always / self._always) * min(self._longest[name] for name in names))

@@ -64,9 +64,23 @@ class Starting:
     ) -> np.ndarray:  # fmt: skip
         """Where the stretch before ends, in sd of this one's start, (hypothesis, offset), along straight lines as if
         both began where they were seen. by, by_before (hypothesis, offset): where they did begin [sd]."""
+        return self.led(k, self.apart([(own, before)])[0], by, by_before)
+
+    def apart(self, pairs: Sequence[tuple[Seen, Seen]]) -> list[np.ndarray]:
+        """From where each stretch begins to where the one before it ends, (hypothesis, offset) each, in the units of
+        `offsets.displaced`."""
+        if not pairs:
+            return []
+        both = [np.concatenate(one) for one in zip(*((own.begin, before.end) for own, before in pairs), strict=True)]
+        return np.split(self._apart(*both), np.cumsum([len(own.begin) for own, _ in pairs[:-1]]))
+
+    def led(
+        self, k: int, apart: np.ndarray, by: np.ndarray | None = None, by_before: np.ndarray | None = None
+    ) -> np.ndarray:  # fmt: skip
+        """`ahead` of a stretch that is so far `apart` (hypothesis, offset) from the end of the one before it."""
         j, way = self.before[k], self.ways[k]
         assert j is not None and way is not None  # noqa: S101 - only of linked stretches
-        found = self._apart(own.begin, before.end) / way.sd + self.settled[k] + (0.0 if by is None else by)
+        found = apart / way.sd + self.settled[k] + (0.0 if by is None else by)
         behind = self.settled[j] + (0.0 if by_before is None else by_before)
         return followed(found - behind @ way.through.T, way.rods)
 

@@ -27,6 +27,9 @@ TINY = 1e-9
 FLOOR_S = 1.0
 """The floor is what a simulator errs by after so long."""
 
+Alone = dict[int, np.ndarray]
+"""Rooted residuals of stretches seen alone (k, channel F), by place."""
+
 
 @dataclass(frozen=True)
 class Kind:
@@ -147,28 +150,41 @@ def _kind(roots: np.ndarray, d: np.ndarray, first: int) -> Kind:
 def whitened(many: Sequence[White], raw: Sequence[np.ndarray]) -> np.ndarray:
     """Raw residuals (k, n) of every stretch (`Arena.raw`), white under each kind, (k, M)."""
     kinds = range(len(FACTORS))
-    parts = [whitened_of(many, raw, k) for k in range(len(many))]
+    alone: Alone = {}
+    parts = [whitened_of(many, raw, k, alone) for k in range(len(many))]
     return np.concatenate([part[c] for c in kinds for part in parts], axis=1)
 
 
 def whitened_of(
-    many: Sequence[White], raw: Sequence[np.ndarray] | Mapping[int, np.ndarray], k: int
+    many: Sequence[White], raw: Sequence[np.ndarray] | Mapping[int, np.ndarray], k: int, alone: Alone | None = None
 ) -> list[np.ndarray]:  # fmt: skip
-    """Raw residuals of the stretch k, white under each kind, (k, channel F) each."""
-    own, (first, *others) = many[k].residual(raw[k]), many[k].kinds
-    found = [kind.white(own) for kind in others]
+    """Raw residuals of the stretch k, white under each kind, (k, channel F) each. alone: as `rooted_alone`."""
+    alone = {} if alone is None else alone
+    own, (first, second, *others) = many[k].residual(raw[k]), many[k].kinds
+    found = [second.off_start(rooted_alone(many, raw, k, alone)), *(kind.white(own) for kind in others)]
     # Without a link the first kind is the second one.
     if first.link is None:
         return [found[0], *found]
-    return [first.white(own + first.link.shift(begun(many, raw, k))), *found]
+    return [first.white(own + first.link.shift(begun(many, raw, k, alone))), *found]
 
 
-def begun(many: Sequence[White], raw: Sequence[np.ndarray] | Mapping[int, np.ndarray], k: int) -> np.ndarray:
+def begun(
+    many: Sequence[White], raw: Sequence[np.ndarray] | Mapping[int, np.ndarray], k: int, alone: Alone
+) -> np.ndarray:  # fmt: skip
     """Where a linked stretch begins by the piece before and what its frames say, in sd of its start, (k, offset)."""
     link = many[k].kinds[0].link
     assert link is not None  # noqa: S101 - only linked ones are asked for
-    before = many[link.before]
-    return link.middle(many[k].ahead(raw[k]), before.kinds[1].rooted(before.residual(raw[link.before])))
+    return link.middle(many[k].ahead(raw[k]), rooted_alone(many, raw, link.before, alone))
+
+
+def rooted_alone(
+    many: Sequence[White], raw: Sequence[np.ndarray] | Mapping[int, np.ndarray], k: int, alone: Alone
+) -> np.ndarray:  # fmt: skip
+    """Rooted residuals of the stretch k seen alone. alone: those that are known, by stretch, to which it is added: the
+    next one asks for them again."""
+    if k not in alone:
+        alone[k] = many[k].kinds[1].rooted(many[k].residual(raw[k]))
+    return alone[k]
 
 
 def _roots(one: Stretch, sensors: int, floor_m: float, noise: float, lasts: float) -> tuple[np.ndarray, int]:

@@ -28,6 +28,17 @@ class Seen:
     begin: np.ndarray
     end: np.ndarray
 
+    def of(self, rows: np.ndarray | Sequence[int]) -> Seen:
+        """Some of the hypotheses."""
+        return Seen(self.caps[rows], self.length[rows], self.begin[rows], self.end[rows])
+
+
+def joined(parts: Sequence[Seen]) -> Seen:
+    """Of one stretch, all hypotheses."""
+    if len(parts) == 1:
+        return parts[0]
+    return Seen(*(np.concatenate([getattr(one, name) for one in parts]) for name in ("caps", "length", "begin", "end")))
+
 
 def looked(
     structure: Structure, theta: Parameters, flat: Tensor, rows: Tensor, many: Sequence[Stretch], behind: np.ndarray, *,
@@ -84,25 +95,26 @@ def caps_of(structure: Structure, p_BE: Tensor, flat: Tensor) -> np.ndarray:
 
     slots = state_slots(structure)
     states = flat.numpy().reshape(-1, flat.shape[-1])
-    q, p = (
-        states[:, slots[name].start : slots[name].start + slots[name].size].reshape(-1, *slots[name].shape)
-        for name in ("q_WR", "p_WB")
-    )
+    p, q = (
+        np.ascontiguousarray(states[:, slots[name].start : slots[name].start + slots[name].size].T)
+        .reshape(*slots[name].shape, -1) for name in ("p_WB", "q_WR")
+    )  # fmt: skip
     if not structure.axial:
         return _turned(p, q, p_BE)
-    x, y, z, w = np.moveaxis(q, -1, 0)
-    axis = np.stack([2 * (x * z + y * w), 2 * (y * z - x * w), -(x * x) - y * y + z * z + w * w], axis=-1)
-    caps = p[:, :, None] + axis[:, :, None] * p_BE.numpy()[0, :, :, 2:]
-    return np.asarray(caps.reshape(len(caps), -1))
+    x, y, z, w = np.moveaxis(q, 1, 0)
+    axis = np.stack([2 * (x * z + y * w), 2 * (y * z - x * w), -(x * x) - y * y + z * z + w * w], axis=1)
+    caps = p[:, None] + axis[:, None] * p_BE.numpy()[0, :, :, 2, None, None]
+    return np.ascontiguousarray(caps.reshape(-1, len(states)).T)
 
 
 def _turned(p: np.ndarray, q: np.ndarray, p_BE: Tensor) -> np.ndarray:
-    """Caps anywhere on rods, (state, 3 cap): whole rotations."""
+    """Caps anywhere on rods, (state, 3 cap), from places (rod, 3, state) and turns (rod, 4, state): whole rotations."""
     import roma
     import torch
 
-    R = roma.unitquat_to_rotmat(torch.as_tensor(q)).numpy()
-    return np.asarray((p[:, :, None] + np.einsum("brij,rej->brei", R, p_BE[0].numpy())).reshape(len(p), -1))
+    R = roma.unitquat_to_rotmat(torch.as_tensor(np.moveaxis(q, -1, 0))).numpy()
+    caps = p.transpose(2, 0, 1)[:, :, None] + np.einsum("brij,rej->brei", R, p_BE[0].numpy())
+    return np.asarray(caps.reshape(p.shape[-1], -1))
 
 
 def _since(many: Sequence[Stretch]) -> np.ndarray:

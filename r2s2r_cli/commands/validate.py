@@ -16,7 +16,7 @@ from schemas.results import Finding, ValidateResult
 
 if TYPE_CHECKING:
     from r2s2r_cli.checks.base import Check
-    from r2s2r_cli.commands.validation import Place, Places
+    from r2s2r_cli.commands.places import Place, Places
 
 
 def validate(
@@ -43,7 +43,7 @@ def validate(
 
     Example: r2s2r validate iterations/001/10-record.h5
     """
-    from r2s2r_cli.commands.validation import Places, files_of, journals_of, shown
+    from r2s2r_cli.commands.places import Places, files_of, journals_of, shown
 
     console = Console(json=json, quiet=quiet)
     chosen = choose(select, ignore)
@@ -130,7 +130,8 @@ def _check(
 
 def _remarks(place: Place | None, names: Sequence[str]) -> Iterator[str]:
     """What could not be checked. Why is said here only where no finding says it: where that file is not looked at."""
-    from r2s2r_cli.commands.validation import PROJECT_FILE, shown
+    from r2s2r_cli.commands.places import shown
+    from r2s2r_cli.store.project import PROJECT_FILE
 
     if place is None:
         yield "no project above these files: checks against the robot and the inputs are left out"

@@ -85,14 +85,17 @@ def compare_effects(
     told("left out", 0, 1)
     refit, *own = scores(arena, [base, *fits], groups, held_out=ways.held_out)
     old = chronic(arena, healthy, fits)
-    pairs = pairs_of(arena, base, fits, gains(refit, own) - old, responses, told_by or {})
+    by_chance = chance(arena, responses, groups, seed=seed)
+    gained = gains(refit, own) - old
+    # Beside an effect that gains no more than chance does, a second one is no second cause.
+    pairs = pairs_of(arena, base, fits, gained, responses, told_by or {}) if gained.max(initial=0.0) > by_chance else []
     if pairs:
         fits, own = [*fits, *pairs], [*own, *scores(arena, pairs, groups, held_out=ways.held_out)]
         old = np.concatenate([old, chronic(arena, healthy, pairs)])
     told("left out", 1, 1)
     material = Material(
         arena=arena, base=base, refit=refit, fits=tuple(fits), scores=tuple(own), responses=responses,
-        chance=chance(arena, responses, groups, seed=seed), no_gap=no_gap(refit, floor_m, kept=kept), wider=wider,
+        chance=by_chance, no_gap=no_gap(refit, floor_m, kept=kept), wider=wider,
         left=left(at_least, refit, own, healthy),
         unexplained=unexplained if ways.unknown else -np.inf, groups=groups, calibration=calibration,
         chronic=old,

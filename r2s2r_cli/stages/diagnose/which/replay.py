@@ -111,15 +111,15 @@ class Replayer(Predictor):
         self, many: Sequence[Stretch], values: np.ndarray, begin: Sequence[Tensor | None] = (), *,
         by: Sequence[np.ndarray] | None = None,
     ) -> list[Seen]:  # fmt: skip
-        """K hypotheses of some stretches of about the same length.
-        begin: states (k, NS) that the piece before each ended in, None: its own start is all there is. by: as
-        `seen`."""
+        """K hypotheses of some stretches of about the same length. begin: states (k, NS) that the piece before each
+        ended in, None: its own start is all there is. by: as `seen`."""
         import torch
 
         from r2s2r_cli.engine import delay_of
         from r2s2r_cli.engine.flat import pack_parameters
 
-        structure, step, k, count = self.structure, self.step, len(values), len(many)
+        structure, engine, step = self.structure, self.simulator, self.step
+        k, count = len(values), len(many)
         own, behind = self._undelayed(self.model.theta(values), k)
         own = own.map(lambda x: x.expand(k, *x.shape[1:]))
         whose = torch.arange(k).repeat_interleave(count)
@@ -145,7 +145,10 @@ class Replayer(Predictor):
             u = self._commands_at(many, rows, delays[which])
             theta = own if new.all() else rows_of(own, torch.as_tensor(new))
             with torch.no_grad():
-                flat = self.simulator.advance(s0[moved], u, packed[whose[moved]], h=step / n, hold=n, every=EVERY * n)
+                # Not `advance`: nothing is differentiated here, and that keeps a copy of all frames.
+                flat = engine.kernels.forward(
+                    s0[moved], u, packed[whose[moved]], h=step / n, hold=n, every=EVERY * n, threads=engine.threads
+                )
                 seen = looked(
                     structure, theta, flat, all_of, many, behind[new], every=EVERY * step, p_BE=self._p_BE,
                     cable_caps=self.cable_caps, up=late.ground_height,

@@ -14,7 +14,7 @@ from schemas.header import InputRef
 
 if TYPE_CHECKING:
     from r2s2r_cli.stages.plan.belief import Belief
-    from r2s2r_cli.stages.plan.route import Goal
+    from r2s2r_cli.stages.plan.goal import Goal
     from r2s2r_cli.stages.plan.stage import Request
     from schemas.config import PlanSettings
 
@@ -93,7 +93,7 @@ class Asked:
         return identified(robot, read_numbers(self.project, self.identified), self.project.relative(self.identified))
 
     def _goal(self, text: str, settings: PlanSettings) -> Goal:
-        from r2s2r_cli.stages.plan.route import Goal
+        from r2s2r_cli.stages.plan.goal import Goal
 
         try:
             x, y, heading = (float(part) for part in text.split(","))

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group, Scalar
-from r2s2r_cli.views.figure import new_figure, png_bytes, rod_color
+from r2s2r_cli.views.figure import BLUE, GREEN, ORANGE, PURPLE, new_figure, png_bytes, rod_color
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 REAL = "#111111"
-MODELS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9")
+MODELS = (BLUE, ORANGE, GREEN, PURPLE, "#56b4e9")
 """Colours of the simulators in their order (Okabe and Ito), used again beyond the last."""
 _WIDTH, _HEIGHT = 13.0, 8.0
 

@@ -10,20 +10,20 @@ import numpy as np
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.diagnose_floor import floor_picture
 from r2s2r_cli.views.diagnose_page import element_words
-from r2s2r_cli.views.figure import new_figure, png_bytes, rod_color
+from r2s2r_cli.views.figure import BLUE, GREEN, PURPLE, RED, new_figure, png_bytes, rod_color
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from schemas.results_diagnose import DiagnoseReport
 
-GUILTY = "#d55e00"
+GUILTY = RED
 PLAIN = "#8792a2"
 NINETY = 1.645
 """Sd to either side of a 90 % interval."""
 LABELS = 60
 """Letters that fit below an axis side by side."""
-BEFORE, AFTER, STALE, BLACK_BOX = "#0072b2", "#009e73", "#b8bec8", "#cc79a7"
+BEFORE, AFTER, STALE, BLACK_BOX = BLUE, GREEN, "#b8bec8", PURPLE
 
 
 def draw_diagnosis(data: ArtifactData, report: DiagnoseReport) -> Iterator[tuple[str, str, bytes]]:

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData
-from r2s2r_cli.views.figure import new_figure, png_bytes, rod_color
+from r2s2r_cli.views.figure import RED, new_figure, png_bytes, rod_color
 
 if TYPE_CHECKING:
     from schemas.results_diagnose import DiagnoseReport
 
-GUILTY = "#d55e00"
+GUILTY = RED
 ARROW = 5.0
 """Times that errors are drawn larger than they are."""
 

@@ -18,6 +18,9 @@ ROD_COLORS = ("#c1272d", "#2a7f3e", "#0b5fa5", "#b8860b", "#6b3fa0", "#3b8ea5")
 """Rods in their order; the first three are the robot's own red, green and blue."""
 CAP_STYLE = ("-", "--")
 """Even caps are drawn solid, odd ones dashed."""
+BLUE, ORANGE, GREEN, PURPLE, RED = "#0072b2", "#e69f00", "#009e73", "#cc79a7", "#d55e00"
+"""Of the palette of Okabe and Ito, which colour-blind people can tell apart."""
+GREY, PALE = "#555555", "#bbbbbb"
 _BAND = ("#eef2f7", "#dbe3ee")
 _NUMBER = "#5a6675"
 _MIN_BAND_SHARE = 0.02
@@ -39,6 +42,11 @@ def png_bytes(figure: Figure, dpi: int = 100) -> bytes:
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=dpi, metadata={"Software": None})
     return buffer.getvalue()
+
+
+def texts(group: Group, name: str) -> list[str]:
+    """A dataset of texts."""
+    return [bytes(value).decode() for value in group[name]]
 
 
 def rod_color(cap: int) -> str:

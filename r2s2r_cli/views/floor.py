@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
-from r2s2r_cli.views.figure import new_figure, png_bytes
+from r2s2r_cli.views.figure import BLUE, RED, new_figure, png_bytes
 from r2s2r_cli.views.page import Page, PageTable, Picture, counted, render
 from schemas.results_floor import FloorReport
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _WIDTH, _HEIGHT = 11.0, 3.0
-_DOT, _LINE, _NOISE = "#0072b2", "#d55e00", "#999999"
+_DOT, _LINE, _NOISE = BLUE, RED, "#999999"
 
 
 def draw_floor(data: ArtifactData) -> bytes:

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
-from r2s2r_cli.views.figure import draw_bands, legend_beside
+from r2s2r_cli.views.figure import BLUE, GREEN, ORANGE, PURPLE, RED, draw_bands, legend_beside
 
 if TYPE_CHECKING:
     from matplotlib.figure import SubFigure
 
 _PANEL_HEIGHT = 1.8
 """[inches]"""
-_COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#e69f00")
+_COLORS = (BLUE, RED, GREEN, PURPLE, "#000000", ORANGE)
 """Okabe and Ito's, which colour-blind people can tell apart; from the seventh line on dashed."""
 
 

@@ -36,8 +36,8 @@ STEP = 0.05
 PUSHES = 6
 """Of every interval's start: what of it nobody knows, and how far the robot repeats itself."""
 PUSH_M_PER_S, PUSH_RAD_PER_S, PUSHED_M = 0.02, 0.1, 0.001
-"""Sd of the least push in every coordinate of a rod, and what it comes to: cables stop it within a twentieth of a second,
-a millimetre or a third of a degree away."""
+"""Sd of the least push in every coordinate of a rod, and what it comes to: cables stop it within a twentieth of a
+second, a millimetre or a third of a degree away."""
 START_SHARE = 0.4
 """Of the camera's noise, to which a start pose is known: errors that stay over an interval are 0.3 of it, and some
 frames before the start leave as much of the rest."""
@@ -193,7 +193,7 @@ def _poses(looks: _Looks) -> np.ndarray:
 
 
 def _recorded(hidden: Hidden, run: Driven, gait: int, later: float = 0.0) -> list[_Looks]:
-    """What really happened, seen by the camera of that world without noise. later: by a clock that is so far off [s]."""
+    """What really happened, seen by the camera of that world without noise. later: by a clock so far off [s]."""
     camera = hidden.world(gait, run.gait.position, run.gait.heading).seen()
     late = camera.clock.stamp_delay_s
     found = []

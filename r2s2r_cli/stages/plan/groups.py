@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.artifact import Group
+from r2s2r_cli.stages.plan.goal import Goal
 from r2s2r_cli.stages.plan.long import Walk
 from r2s2r_cli.stages.plan.placement import Reference
 from r2s2r_cli.stages.plan.rewards import Outcomes
 from r2s2r_cli.stages.plan.robust import Primitive
-from r2s2r_cli.stages.plan.route import Goal, Paths, farthest, walked
+from r2s2r_cli.stages.plan.route import Paths, farthest, walked
 from schemas.results_plan import GaitFigures, PolicyFigures
 
 

@@ -6,14 +6,12 @@ symmetry. A primitive, relabelled for the triangle that the robot stands on, mov
 
 from __future__ import annotations
 
-import heapq
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.plan.placement import Reference, turned, wrapped
 from r2s2r_cli.stages.plan.robust import Primitive
 
@@ -97,8 +95,6 @@ def extended(moves: Moves, paths: Paths) -> Paths:
 
 RISK = 2.0
 """[m] or [rad] that a sequence may be shorter for not going wrong once."""
-SLOWER = 20.0
-"""Times its duration that a detour may take for it, on the way to a goal."""
 
 
 def best_sequences(
@@ -194,92 +190,6 @@ LONG: dict[str, Callable[[Paths], np.ndarray]] = {
     "turn-counterclockwise": in_place(1.0),
 }
 """The four long gaits of the paper and what each is to be good at."""
-
-
-@dataclass(frozen=True)
-class Goal:
-    """Where to go, in the frame of the start: x along the principal axis, y forward [m], heading: turn of the principal
-    axis [rad]. within_m, within_rad: near enough."""
-
-    xy: tuple[float, float]
-    heading: float
-    within_m: float = 0.1
-    within_rad: float = math.radians(20.0)
-
-    def miss(self, paths: Paths) -> np.ndarray:
-        """How far paths end from it, 1 each at the edge of what is near enough in place and in heading, (B,)."""
-        far = np.linalg.norm(paths.xy[:, -1] - np.array(self.xy), axis=1)
-        turn = np.abs(wrapped(paths.heading[:, -1] - self.heading))
-        return np.asarray(far / self.within_m + turn / self.within_rad)
-
-
-CELL_M, CELL_RAD = 0.04, math.radians(10.0)
-"""States nearer than this count as one in the search for a way."""
-GREED = 1.5
-"""The estimate of what is left counts so much more: less search, a way at most so much longer."""
-NODES = 12_000
-"""Poses that are looked at."""
-NEARLY = 4.0
-"""A way that misses the goal by so much (`Goal.miss`; 2 is the corner of what is near enough) is better than none."""
-
-
-def way_to(moves: Moves, goal: Goal) -> Paths:
-    """The sequence of moves that takes least time to a goal, by A* (weighted by GREED) on their displacements; moves
-    that may go wrong count as slower.
-
-    Where none leads there within NODES poses, the one that comes nearly there; raises NumericalError where none does,
-    with the nearest place.
-    """
-    turn_by = np.abs(wrapped(moves.yaw + moves.axis[moves.element] - moves.axis[0]))
-    # Of a robot that cannot turn, or cannot travel, no time is foretold for that.
-    speed = float((np.linalg.norm(moves.shift, axis=1) / moves.duration).max()) or math.inf
-    rate = float((turn_by / moves.duration).max()) or math.inf
-    target = np.array(goal.xy)
-
-    def left(paths: Paths) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        far = np.linalg.norm(paths.xy[:, -1] - target, axis=1)
-        turn = np.abs(wrapped(paths.heading[:, -1] - goal.heading))
-        time = np.maximum(np.maximum(far - goal.within_m, 0) / speed, np.maximum(turn - goal.within_rad, 0) / rate)
-        return far, turn, time
-
-    begun = start_paths()
-    count, best = 0, (math.inf, begun)
-    _, _, time = left(begun)
-    queue: list[tuple[float, int, float, Paths, int]] = [(GREED * float(time[0]), 0, 0.0, begun, 0)]
-    done: set[tuple[int, ...]] = set()
-    while queue and len(done) < NODES:
-        _, _, spent, batch, row = heapq.heappop(queue)
-        paths = batch.take(np.array([row]))
-        (key,) = _cells(paths)
-        if key in done:
-            continue
-        done.add(key)
-        far, turn, _ = left(paths)
-        if far[0] <= goal.within_m and turn[0] <= goal.within_rad:
-            return paths
-        best = min(best, (float(goal.miss(paths)[0]), paths), key=lambda pair: pair[0])
-        after = extended(moves, paths)
-        _, _, time = left(after)
-        for k, cell in enumerate(_cells(after)):
-            if cell not in done:
-                count += 1
-                cost = spent + float(moves.duration[k] * (1.0 + SLOWER * moves.risk[k]))
-                heapq.heappush(queue, (cost + GREED * float(time[k]), count, cost, after, k))
-    near = best[1]
-    if best[0] <= NEARLY:
-        return near
-    raise NumericalError(
-        "no sequence of the gaits leads there", where="--to", expected=f"({goal.xy[0]:g}, {goal.xy[1]:g}) m, "
-        f"{math.degrees(goal.heading):g} deg, within {goal.within_m:g} m and {math.degrees(goal.within_rad):.0f} deg",
-        received=f"nearest ({near.xy[0, -1, 0]:.2f}, {near.xy[0, -1, 1]:.2f}) m, "
-        f"{math.degrees(near.heading[0, -1]):.0f} deg", hint="r2s2r plan --set plan.goal_within_m=0.2",
-    )  # fmt: skip
-
-
-def _cells(paths: Paths) -> list[tuple[int, ...]]:
-    """The cells of the last poses."""
-    place = np.column_stack([paths.xy[:, -1] / CELL_M, wrapped(paths.yaw) / CELL_RAD, paths.element])
-    return [tuple(row) for row in np.round(place).astype(int).tolist()]
 
 
 def without_rare(primitives: Sequence[Primitive], least: float = 0.95) -> list[Primitive]:

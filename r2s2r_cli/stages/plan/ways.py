@@ -9,11 +9,11 @@ from functools import partial
 import numpy as np
 
 from r2s2r_cli.errors import NumericalError
+from r2s2r_cli.stages.plan.goal import Goal, way_to
 from r2s2r_cli.stages.plan.long import Walk, walks
 from r2s2r_cli.stages.plan.robust import Primitive, usual_ends
 from r2s2r_cli.stages.plan.route import (
     LONG,
-    Goal,
     Moves,
     Paths,
     best_sequences,
@@ -21,7 +21,6 @@ from r2s2r_cli.stages.plan.route import (
     farthest,
     moves_of,
     walked,
-    way_to,
     without_rare,
 )
 from r2s2r_cli.stages.plan.standing import Standing

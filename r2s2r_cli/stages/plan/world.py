@@ -12,10 +12,10 @@ import numpy as np
 
 from r2s2r_cli.stages.plan.belief import Belief
 from r2s2r_cli.stages.plan.executor import Executor
+from r2s2r_cli.stages.plan.goal import Goal
 from r2s2r_cli.stages.plan.placement import Reference, reference_of
 from r2s2r_cli.stages.plan.rewards import Reward
 from r2s2r_cli.stages.plan.robust import start_poses
-from r2s2r_cli.stages.plan.route import Goal
 from r2s2r_cli.stages.plan.standing import Standing
 from r2s2r_cli.stages.plan.symmetry import symmetry_group
 from schemas.config import PlanSettings

@@ -10,12 +10,12 @@ import pytest
 
 from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.plan.gaits import Gait
+from r2s2r_cli.stages.plan.goal import Goal, way_to
 from r2s2r_cli.stages.plan.placement import Reference, reference_of, turned, wrapped
 from r2s2r_cli.stages.plan.robust import Primitive
 from r2s2r_cli.stages.plan.route import (
     ARC,
     LONG,
-    Goal,
     Moves,
     Paths,
     arching,
@@ -26,7 +26,6 @@ from r2s2r_cli.stages.plan.route import (
     moves_of,
     start_paths,
     walked,
-    way_to,
     without_rare,
 )
 from r2s2r_cli.stages.plan.symmetry import principal_axis, symmetry_group

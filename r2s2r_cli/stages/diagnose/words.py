@@ -29,8 +29,9 @@ def _verdict(found: Diagnosis) -> str:
     if which.verdict == "no_gap":
         bound = f"upper 90 % bound {1e3 * (which.no_gap.upper or 0.0):.1f} mm"
         text = f"There is no gap above the floor: {refit:.1f} mm after refitting, {bound}; floor {floor:.1f} mm."
-        small = best is not None and which.ranking[0] is best
-        return text + (f" Below it may hide {best.effect} (p = {best.probability:.2f})." if best and small else "")
+        if best is not None and which.ranking[0] is best:
+            text += f" Below it may hide {best.effect} (p = {best.probability:.2f})."
+        return text
     if which.verdict == "unknown":
         where = "" if found.channel is None else f" It acts most like something in channel {found.channel}."
         return (

@@ -12,13 +12,16 @@ from r2s2r_cli.stages.diagnose.words import sentence
 
 def found(verdict: str, **changes: object) -> SimpleNamespace:
     """A diagnosis with a payload on rod 1 as its best effect, and 12 mm that become 6 at a floor of 5."""
-    best = SimpleNamespace(effect="payload", element=changes.pop("element", Element("rod", 1)))
+    best = SimpleNamespace(effect="payload", element=changes.pop("element", Element("rod", 1)), probability=0.4)
     much = SimpleNamespace(
         effects=("payload",), names=("b:1", "b:2"), floor=0.005, within_run=False, share=0.7, ci90=(-0.004, 0.9),
         predicted=0.65, rmse={"refit": 0.012, "effect": 0.006}.get,
     )  # fmt: skip
     values = {"verdict": verdict, "effects": ("payload",), "probability": 0.9, "set90": ("payload", "none", "unknown"),
-              "best": best, "no_gap": SimpleNamespace(rmse=0.012, upper=0.014, equivalent=False)}  # fmt: skip
+              "best": best, "ranking": (SimpleNamespace(effect="none"), best),
+              "no_gap": SimpleNamespace(rmse=0.012, upper=0.014)}  # fmt: skip
+    if changes.pop("first", False):
+        values["ranking"] = (best, SimpleNamespace(effect="none"))
     return SimpleNamespace(
         which=SimpleNamespace(**{**values, **changes}), much=much, channel="mass", floor=SimpleNamespace(rmse=0.005)
     )
@@ -39,9 +42,10 @@ SHRUNK = "key-frame error from 12.0 to 6.0 mm (floor 5.0), which closes 70 % (0 
          "the best of them, payload, takes"),
         (found("unknown"), "Something is wrong that none of the effects looked for explains (p = 0.90): 12.0 mm",
          "It acts most like something in channel mass."),
-        (found("no_gap"), "No effect stands out from chance: 12.0 mm after refitting, upper 90 % bound 14.0 mm", "5.0"),
-        (found("no_gap", no_gap=SimpleNamespace(rmse=0.005, upper=0.006, equivalent=True)),
-         "There is no gap above the floor: 5.0 mm", "bound 6.0 mm"),
+        (found("no_gap", no_gap=SimpleNamespace(rmse=0.005, upper=0.006)),
+         "There is no gap above the floor: 5.0 mm after refitting, upper 90 % bound 6.0 mm; floor 5.0 mm.", "5.0 mm."),
+        (found("no_gap", no_gap=SimpleNamespace(rmse=0.005, upper=0.006), first=True),
+         "There is no gap above the floor: 5.0 mm", "floor 5.0 mm. Below it may hide payload (p = 0.40)."),
     ],
 )  # fmt: skip
 def test_each_verdict_has_its_sentence(diagnosis: SimpleNamespace, begins: str, holds: str) -> None:

@@ -8,6 +8,7 @@ import pytest
 from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.found import Ranked
+from r2s2r_cli.stages.diagnose.which.pair_share import LEAST, TwoCauses, with_pairs
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.verdict import verdict_of
@@ -61,11 +62,41 @@ def test_a_cause_predicts() -> None:
     assert verdict_of(ranking("dropout", 0.99, 0.0), BY, None, CHANCE, GAP)[:2] == ("effect", ("dropout",))
 
 
-def test_a_pair_is_named_by_its_first() -> None:
-    """Where the first guess belongs to the pair that was found."""
-    found = verdict_of(ranking("payload", 0.9, 30.0), BY, ("payload", "backlash"), CHANCE, GAP)
-    assert found[:2] == ("pair", ("payload", "backlash"))
-    assert verdict_of(ranking("payload", 0.9, 30.0), BY, ("motor_lag", "backlash"), CHANCE, GAP)[0] == "effect"
+def test_a_pair_is_as_probable_as_both_its_names() -> None:
+    """What speaks for both is shared between them, so that neither alone need reach the threshold."""
+    pair = [Ranked("payload", 30.0, 0.4), Ranked("motor_lag", 8.0, 0.3), Ranked("none", 0.0, 0.3)]
+    assert verdict_of(pair, BY, ("payload", "motor_lag"), CHANCE, GAP) == ("pair", ("payload", "motor_lag"), 0.7)
+    assert verdict_of(pair, BY, None, CHANCE, GAP)[0] == "ambiguous"
+    assert verdict_of(ranking("payload", 0.9, 30.0), BY, ("motor_lag", "none"), CHANCE, GAP)[0] == "effect"
+
+
+ALONE = {"payload": 40.0, "motor_lag": 10.0, "backlash": 2.0}
+NAMES = {"payload": 0.7, "motor_lag": 0.1, "backlash": 0.1, "none": 0.1}
+
+
+def shared(gain: float) -> tuple[dict[str, float], tuple[str, str] | None]:
+    """With one pair of this gain."""
+    return with_pairs(NAMES, [TwoCauses(("payload", "motor_lag"), gain)], ALONE, CHANCE, 6.0)
+
+
+def test_a_second_effect_must_add_as_much_as_the_first_and_more() -> None:
+    """At just that the pair is as probable as its first effect alone; half of it goes to each name."""
+    needed = 2 * ALONE["payload"] + LEAST + CHANCE
+    at, believed = shared(needed)
+    assert believed is None
+    assert at["payload"] == pytest.approx(1.05 / 1.7) and at["motor_lag"] == pytest.approx(0.45 / 1.7)
+    assert shared(needed + 0.1)[1] == ("payload", "motor_lag")
+
+
+def test_pairs_share_without_adding() -> None:
+    """Probabilities stay ones of a whole, the second name rises with what it adds, and a pair that adds nothing changes
+    next to nothing."""
+    seen = [shared(gain)[0] for gain in (40.0, 80.0, 120.0, 200.0, 1e6)]
+    assert all(sum(one.values()) == pytest.approx(1.0) for one in seen)
+    second = [one["motor_lag"] for one in seen]
+    assert second == sorted(second) and second[-1] == pytest.approx(0.5)
+    assert seen[0]["payload"] == pytest.approx(NAMES["payload"], abs=0.05)
+    assert with_pairs(NAMES, [], ALONE, CHANCE, 6.0) == (NAMES, None)
 
 
 def test_without_healthy_runs_the_parity_stage_counts_for_less() -> None:

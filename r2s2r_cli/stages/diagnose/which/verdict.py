@@ -14,14 +14,11 @@ from r2s2r_cli.stages.diagnose.which.confusable import confusable
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked, Screened, Shift, Which
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.material import Material
+from r2s2r_cli.stages.diagnose.which.pair_share import TwoCauses, with_pairs
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap
 from r2s2r_cli.stages.diagnose.which.score import Score, gain_sds, gains as gains_of
 from r2s2r_cli.stages.diagnose.which.screen import Response
 
-PAIR = 15.0
-"""[nats] beyond chance that a second effect must add: one law is never quite right, and a second mends its faults."""
-PAIR_SHARE = 1.0
-"""Of the first effect's gain, which it must add at least as well."""
 NINETY = 1.645
 INDISTINCT = 3.0
 """[nats] Two hypotheses nearer than this cannot be told apart."""
@@ -47,9 +44,10 @@ def concluded(m: Material) -> Which:
     table |= {one.effect: calibration.score(one.effect, one.gain, parity=one.parity) for one in others}
     table[NONE] = calibration.score(NONE, m.chance, equivalent=m.no_gap.equivalent, beyond=m.left.refit)
     table[UNKNOWN] = calibration.score(UNKNOWN, m.unexplained, beyond=m.left.best)
-    probability = calibration.probabilities(table)
+    both = [TwoCauses((m.fits[i].hypothesis.effects[0], m.fits[i].hypothesis.effects[1]), gains[i]) for i in order
+            if len(m.fits[i].hypothesis.parts) == 2]  # fmt: skip
+    probability, pair = with_pairs(calibration.probabilities(table), both, names, m.chance, calibration.temperature)
     sds = gain_sds(m.refit, m.scores, m.groups).tolist() if m.scores else []
-    pair = _pair(m, order, gains, best)
     ranking = [
         replace(
             _ranked(m, i, gains[i], probability[name], singles, gains),
@@ -75,7 +73,7 @@ def concluded(m: Material) -> Which:
         confusable=confusable(m, [best[name] for name in sorted(names, key=lambda n: -names[n])[:4]]),
         not_testable=_not_testable(m.responses), shifts=() if top is None else _shifts(m, m.fits[top]),
         within=_left_out(m), calibrated=calibration.words, warnings=_warnings(m, [best[name] for name in names]),
-        pairs=tuple((m.fits[i].hypothesis.effects, gains[i]) for i in order if len(m.fits[i].hypothesis.parts) == 2),
+        pairs=tuple((one.effects, one.gain) for one in both),
     )  # fmt: skip
 
 
@@ -115,6 +113,11 @@ def verdict_of(
     there is no gap is a claim about its size (design.md, Measures), not about causes that hide below the floor."""
     first = ranking[0]
     predicts = first.gain > chance or first.effect in (NONE, UNKNOWN, *NO_REPLAY)
+    if pair is not None and first.effect in pair:
+        # What speaks for both together is shared between their names.
+        p = sum(one.probability for one in ranking if one.effect in pair)
+        if calibration.commits(first.effect, p):
+            return "pair", pair, p
     if not (predicts and first.effect != NONE and calibration.commits(first.effect, first.probability)):
         likely = predicts and first.effect not in (NONE, UNKNOWN) and first.probability >= LIKELY
         if gap.equivalent and not likely:
@@ -122,19 +125,7 @@ def verdict_of(
         return "ambiguous", (), first.probability
     if first.effect == UNKNOWN:
         return "unknown", (), first.probability
-    if pair is not None and first.effect in pair:
-        return "pair", pair, first.probability
     return "effect", (first.effect,), first.probability
-
-
-def _pair(m: Material, order: list[int], gains: dict[int, float], best: dict[str, int]) -> tuple[str, ...] | None:
-    """The pair that predicts most, where each of its effects is needed beside the other; None: there is none."""
-    for i in order:
-        effects = m.fits[i].hypothesis.effects
-        if len(effects) == 2:
-            alone = max((gains[k] for k in best.values()), default=0.0)
-            return effects if gains[i] - alone > m.chance + max(PAIR, PAIR_SHARE * alone) else None
-    return None
 
 
 def _ranked(

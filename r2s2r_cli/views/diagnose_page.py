@@ -36,6 +36,14 @@ def diagnose_tables(report: DiagnoseReport) -> Iterator[PageTable]:
         ],
         [_ranked(one) for one in report.ranking],
     )
+    if report.pairs:
+        alone = {one.effect: one.elpd_gain for one in report.ranking}
+        yield PageTable(
+            "two effects at once: laws mend each other's faults, so a second cause must add as much as the first",
+            ["effects", "gain [nats]", "more than the first alone [nats]"],
+            [[" + ".join(one.effects), f"{one.elpd_gain:.1f}", f"{one.elpd_gain - alone.get(one.effects[0], 0.0):+.1f}"]
+             for one in report.pairs],
+        )  # fmt: skip
     if report.shrinkage is not None:
         yield _shrinkage(report)
     yield PageTable("where", ["what", "found"], list(_where(report)))

@@ -13,6 +13,7 @@ from schemas.results_diagnose import (
     DiagnoseReport,
     ElementFound,
     NextGaitFound,
+    PairFound,
     RankedName,
     ShrinkageFound,
     WhereFound,
@@ -92,6 +93,14 @@ def test_what_was_not_fitted_has_no_gain() -> None:
     assert rows["dropout"][2] == "-" and "not fitted" in rows["dropout"][-1]
     assert rows["payload"][2].startswith("31.0")
     assert rows["payload"][5] == "mass_kg 0.03 .. 0.05 kg; place_m 0.05 .. 0.15 m"
+
+
+def test_two_effects_at_once_say_what_the_second_one_adds() -> None:
+    """Over the first alone; without pairs there is no such table."""
+    made = report().model_copy(update={"pairs": (PairFound(effects=("payload", "backlash"), elpd_gain=44.5),)})
+    rows = [row for table in diagnose_tables(made) for row in table.rows if row[0] == "payload + backlash"]
+    assert rows == [["payload + backlash", "44.5", "+13.5"]]
+    assert len(list(diagnose_tables(made))) == len(list(diagnose_tables(report()))) + 1
 
 
 def test_what_was_named_comes_with_the_command_that_uses_it() -> None:

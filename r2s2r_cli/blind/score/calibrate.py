@@ -49,11 +49,15 @@ BY_CHANCE = 4.0
 """[nats] That the parity stage says for the best of a whole catalogue where nothing is wrong: less than that says
 nothing, and weighed like more it outdoes gains that are real."""
 
+MOST = 8.0
+"""[nats] beyond that which count: look-alikes share a finding, and 48 nats for one with 36 for the other, weighed
+several times, outvoted the replay, which tells them apart."""
+
 
 @dataclass(frozen=True)
 class Case:
     """One set. names: what was ranked; score, parity (n,) [nats]: without the numbers that are learned, parity beyond
-    BY_CHANCE; equivalent: the test found no gap. truth: the right name, not among `names` where the screening had lost
+    BY_CHANCE, MOST at most; equivalent: the test found no gap. truth: the right name, not among `names` where the screening had lost
     it. gap, left [nats]: what pieces cost beyond those of healthy runs, under the refit model and under the best
     effect; 0 where they cost less."""
 
@@ -75,7 +79,7 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
     score = [chance if row["effect"] == NONE else float(row["elpd_gain"]) for row in rows]
     upper, floor = document.get("refit_upper_m"), document["floor_m"]
     equivalent = upper is not None and float(upper) < 1.25 * float(floor)
-    parity = np.array([max(float(row.get("parity_nats", 0.0)) - BY_CHANCE, 0.0) for row in rows])
+    parity = np.array([min(max(float(row.get("parity_nats", 0.0)) - BY_CHANCE, 0.0), MOST) for row in rows])
     gap, left = (max(float(document.get(key) or 0.0), 0.0) for key in ("gap_nats", "left_nats"))
     names = tuple(row["effect"] for row in rows)
     return Case(names, np.array(score), parity, equivalent, truth.right, gap, left)
@@ -108,6 +112,7 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
         "temperature": 1.0 / sharp,
         "parity": learned["parity"] / sharp,
         "by_chance": BY_CHANCE,
+        "most": MOST,
         "usual": USUAL,
         "usual_share": learned["usual"] * SHARPNESS / sharp,
         "none": learned["none"] / sharp,

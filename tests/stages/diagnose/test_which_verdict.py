@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -107,6 +109,15 @@ def test_without_healthy_runs_the_parity_stage_counts_for_less() -> None:
     )
     assert own.score("payload", 7.0) == BY.score("payload", 7.0)
     assert "healthy runs" in own.words and own.commit == BY.commit
+
+
+def test_between_look_alikes_that_both_stand_out_the_replay_decides() -> None:
+    """A lag and a latency, 36 and 48 nats from the ramps of the winches, 69 and 33 from the replay."""
+    learned = replace(BY, parity=4.5, by_chance=4.0, most=8.0)
+    lag, late = learned.score("motor_lag", 69.0, parity=36.0), learned.score("command_latency", 33.0, parity=48.0)
+    assert lag - late == pytest.approx(36.0)
+    assert learned.score("motor_lag", 0.0, parity=4.0) == learned.score("motor_lag", 0.0)
+    assert learned.score("motor_lag", 0.0, parity=9.0) - learned.score("motor_lag", 0.0) == pytest.approx(4.5 * 5.0)
 
 
 def _score(squared: np.ndarray) -> Score:

@@ -23,7 +23,8 @@ class Calibration:
     temperature [nats]: of the softmax over names. usual [nats]: about what chance gives to the best of a catalogue;
     usual_share: what a nat below it counts. parity: nats of gain that a nat of the parity stage is worth, which
     needs no simulator and errs far less, beyond by_chance [nats], which it says for the best of a whole catalogue where
-    nothing is wrong. none, equivalent [nats]: what `none`
+    nothing is wrong; most [nats]: of them that count, since a finding that stands out says that something is wrong, and
+    which of its look-alikes it is the replay tells better. none, equivalent [nats]: what `none`
     gains, and more where the equivalence test finds no gap; gap: what it loses for every nat that the refit model costs
     more than in healthy runs. unknown_share, left: what `unknown` has of what a wider floor gains and of every nat that
     the best effect leaves; unknown [nats]: what that must exceed. bias [nats]: of a name, what its gains are short of.
@@ -36,6 +37,7 @@ class Calibration:
     temperature: float = 25.0
     parity: float = 15.0
     by_chance: float = 0.0
+    most: float = float("inf")
     usual: float = 0.0
     usual_share: float = 1.0
     none: float = 20.0
@@ -64,7 +66,7 @@ class Calibration:
         gain = self.usual_share * min(gain, self.usual) + max(gain - self.usual, 0.0)
         if name == NONE:
             return gain + self.none + (self.equivalent if equivalent else 0.0) - self.gap * max(beyond, 0.0)
-        return gain + self.parity * max(parity - self.by_chance, 0.0)
+        return gain + self.parity * min(max(parity - self.by_chance, 0.0), self.most)
 
     def absolute(self) -> Calibration:
         """For a diagnosis without healthy runs."""

@@ -57,9 +57,9 @@ several times, outvoted the replay, which tells them apart."""
 @dataclass(frozen=True)
 class Case:
     """One set. names: what was ranked; score, parity (n,) [nats]: without the numbers that are learned, parity beyond
-    BY_CHANCE, MOST at most; equivalent: the test found no gap. truth: the right name, not among `names` where the screening had lost
-    it. gap, left [nats]: what pieces cost beyond those of healthy runs, under the refit model and under the best
-    effect; 0 where they cost less."""
+    BY_CHANCE, MOST at most; equivalent: the test found no gap. truth: the right name, not among `names` where the
+    screening had lost it. gap, left [nats]: what pieces cost beyond those of healthy runs, under the refit model and
+    under the best effect; 0 where they cost less."""
 
     names: tuple[str, ...]
     score: np.ndarray

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from r2s2r_cli.blind.score.facts import NONE, UNKNOWN, Truth
+from r2s2r_cli.blind.score.facts import NO_REPLAY, NONE, UNKNOWN, Truth
 from r2s2r_cli.errors import InputError
 
 LEAST_SETS = 12
@@ -57,9 +57,9 @@ several times, outvoted the replay, which tells them apart."""
 @dataclass(frozen=True)
 class Case:
     """One set. names: what was ranked; score, parity (n,) [nats]: without the numbers that are learned, parity beyond
-    BY_CHANCE, MOST at most; equivalent: the test found no gap. truth: the right name, not among `names` where the
-    screening had lost it. gap, left [nats]: what pieces cost beyond those of healthy runs, under the refit model and
-    under the best effect; 0 where they cost less."""
+    BY_CHANCE, MOST at most where a replay tells; equivalent: the test found no gap. truth: the right name, not among
+    `names` where the screening had lost it. gap, left [nats]: what pieces cost beyond those of healthy runs, under the
+    refit model and under the best effect; 0 where they cost less."""
 
     names: tuple[str, ...]
     score: np.ndarray
@@ -79,7 +79,10 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
     score = [chance if row["effect"] == NONE else float(row["elpd_gain"]) for row in rows]
     upper, floor = document.get("refit_upper_m"), document["floor_m"]
     equivalent = upper is not None and float(upper) < 1.25 * float(floor)
-    parity = np.array([min(max(float(row.get("parity_nats", 0.0)) - BY_CHANCE, 0.0), MOST) for row in rows])
+    parity = np.array([
+        min(max(float(row.get("parity_nats", 0.0)) - BY_CHANCE, 0.0), np.inf if row["effect"] in NO_REPLAY else MOST)
+        for row in rows
+    ])  # fmt: skip
     gap, left = (max(float(document.get(key) or 0.0), 0.0) for key in ("gap_nats", "left_nats"))
     names = tuple(row["effect"] for row in rows)
     return Case(names, np.array(score), parity, equivalent, truth.right, gap, left)

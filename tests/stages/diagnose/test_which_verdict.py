@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from r2s2r_cli.blind.score import facts
 from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
+from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.found import Ranked
 from r2s2r_cli.stages.diagnose.which.pair_share import LEAST, TwoCauses, with_pairs
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap, no_gap
@@ -117,6 +119,8 @@ def test_between_look_alikes_that_both_stand_out_the_replay_decides() -> None:
     lag, late = learned.score("motor_lag", 69.0, parity=36.0), learned.score("command_latency", 33.0, parity=48.0)
     assert lag - late == pytest.approx(36.0)
     assert learned.score("motor_lag", 0.0, parity=4.0) == learned.score("motor_lag", 0.0)
+    assert learned.score("dropout", 0.0, parity=36.0) == pytest.approx(learned.score("dropout", 0.0) + 4.5 * 32.0)
+    assert facts.NO_REPLAY == NO_REPLAY
     assert learned.score("motor_lag", 0.0, parity=9.0) - learned.score("motor_lag", 0.0) == pytest.approx(4.5 * 5.0)
 
 

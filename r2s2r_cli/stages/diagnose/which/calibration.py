@@ -10,6 +10,7 @@ from importlib import resources
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
+from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN
 
 FILE = "calibration.json"
@@ -24,7 +25,7 @@ class Calibration:
     usual_share: what a nat below it counts. parity: nats of gain that a nat of the parity stage is worth, which
     needs no simulator and errs far less, beyond by_chance [nats], which it says for the best of a whole catalogue where
     nothing is wrong; most [nats]: of them that count, since a finding that stands out says that something is wrong, and
-    which of its look-alikes it is the replay tells better. none, equivalent [nats]: what `none`
+    which of its look-alikes it is the replay tells better, where there is one. none, equivalent [nats]: what `none`
     gains, and more where the equivalence test finds no gap; gap: what it loses for every nat that the refit model costs
     more than in healthy runs. unknown_share, left: what `unknown` has of what a wider floor gains and of every nat that
     the best effect leaves; unknown [nats]: what that must exceed. bias [nats]: of a name, what its gains are short of.
@@ -66,7 +67,8 @@ class Calibration:
         gain = self.usual_share * min(gain, self.usual) + max(gain - self.usual, 0.0)
         if name == NONE:
             return gain + self.none + (self.equivalent if equivalent else 0.0) - self.gap * max(beyond, 0.0)
-        return gain + self.parity * min(max(parity - self.by_chance, 0.0), self.most)
+        most = float("inf") if name in NO_REPLAY else self.most
+        return gain + self.parity * min(max(parity - self.by_chance, 0.0), most)
 
     def absolute(self) -> Calibration:
         """For a diagnosis without healthy runs."""

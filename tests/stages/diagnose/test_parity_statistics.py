@@ -17,6 +17,8 @@ from r2s2r_cli.stages.diagnose.parity.finding import (
     Suspicion,
     discoveries,
 )
+from r2s2r_cli.stages.diagnose.parity.parity import finding_of
+from r2s2r_cli.stages.diagnose.parity.quantities import Quantities
 from r2s2r_cli.stages.diagnose.parity.series import Measured, combined, regression
 from r2s2r_cli.stages.identify.data import Selection
 from tests.support.parity_log import evidence_of, foremost, swaying, with_caps
@@ -133,6 +135,17 @@ def test_what_findings_say_in_nats_is_half_their_square_by_effect_and_element() 
     for index, nats in found.nats()["sensor_bias"].items():
         assert nats >= 0.8 * min(by_sensor.get(index, 0.0), MOST_NATS)
         assert nats <= MOST_NATS
+
+
+@pytest.mark.parametrize(("height", "compared"), [(0.0045, False), (-0.0045, False), (0.0025, True)])
+def test_a_cap_that_hung_in_healthy_runs_is_not_compared_with_them(height: float, compared: bool) -> None:
+    """Millimetres above the ground are no wear: today's cap, which stands, had looked as if it had shrunk."""
+    key = ("cap_height", "cap", 2)
+    healthy = Quantities({key: Measured(height, 5e-4)}, {}, 0.03, (), np.zeros(9))
+    today = Quantities({key: Measured(-3e-4, 4e-4)}, {}, 0.03, (), np.zeros(9))
+    found = finding_of(key, today.of[key], healthy, today)
+    assert found is not None and found.differential == compared
+    assert (abs(found.z) > 2.0) == compared
 
 
 def test_what_no_healthy_run_confirms_counts_less_beside_them() -> None:

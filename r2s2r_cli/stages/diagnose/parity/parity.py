@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from r2s2r_cli.stages.diagnose.evidence import Evidence
-from r2s2r_cli.stages.diagnose.parity.expected import EXPECTED
+from r2s2r_cli.stages.diagnose.parity.expected import EXPECTED, Expected
 from r2s2r_cli.stages.diagnose.parity.finding import Element, Finding, Parity
 from r2s2r_cli.stages.diagnose.parity.fitted import fitted_runs
 from r2s2r_cli.stages.diagnose.parity.mismatch import mismatches
@@ -49,7 +49,7 @@ def parity(evidence: Evidence, *, level: float = 0.05) -> Parity:
         missing.append("healthy runs: findings are against robot.toml, so what it has wrong counts as well")
     else:
         missing += [f"in healthy runs, {what}" for what in base.missing]
-    findings = [one for key, value in first.of.items() if (one := _finding(key, value, base, first)) is not None]
+    findings = [one for key, value in first.of.items() if (one := finding_of(key, value, base, first)) is not None]
     findings.sort(key=lambda one: -abs(one.z))
     return Parity(tuple(findings), (), tuple(missing), base is not None, level)
 
@@ -57,7 +57,7 @@ def parity(evidence: Evidence, *, level: float = 0.05) -> Parity:
 def _scale(found: Quantities, base: Quantities | None) -> float:
     """By how much the camera shows everything too large, 1 where that does not stand out."""
     key: Key = ("camera_scale", "camera", None)
-    one = _finding(key, found.of[key], base, found)
+    one = finding_of(key, found.of[key], base, found)
     return 1.0 if one is None or abs(one.z) < SCALED else one.value / one.expected
 
 
@@ -68,15 +68,16 @@ def _by_true_length(found: Quantities, base: Quantities | None, actuated: Sequen
         rate, gain = ("winch_rate", "motor", k), ("sensor_gain", "sensor", cable)
         if rate not in of or gain not in of:
             continue
-        one = _finding(gain, of[gain], base, found)
+        one = finding_of(gain, of[gain], base, found)
         if one is not None and abs(one.z) >= SCALED:
             by, sd = math.log1p(one.value) - math.log1p(one.expected), math.hypot(one.sd, one.expected_sd)
             of[rate] = Measured(of[rate].value - by, math.hypot(of[rate].sd, sd))
     return replace(found, of=of)
 
 
-def _finding(key: Key, value: Measured, base: Quantities | None, found: Quantities) -> Finding | None:
-    """None where nothing was measured."""
+def finding_of(key: Key, value: Measured, base: Quantities | None, found: Quantities) -> Finding | None:
+    """What a quantity (check, kind and index of the element) says beside its value in healthy runs, or beside the
+    nominal; None where nothing was measured."""
     check, kind, index = key
     if not (math.isfinite(value.value) and math.isfinite(value.sd)):
         return None
@@ -84,7 +85,7 @@ def _finding(key: Key, value: Measured, base: Quantities | None, found: Quantiti
     expected, differential = Measured(scale.nominal, scale.built), False
     if base is not None and check == "lag":
         expected, differential = Measured(base.lag, scale.changed), True
-    elif base is not None and key in base.of and math.isfinite(base.of[key].value) and math.isfinite(base.of[key].sd):
+    elif base is not None and key in base.of and _usable(base.of[key], scale):
         expected, differential = _posterior(expected, base.of[key], scale.changed), True
     difference = value.value - expected.value
     error = math.sqrt(value.sd**2 + expected.sd**2)
@@ -105,6 +106,12 @@ def _finding(key: Key, value: Measured, base: Quantities | None, found: Quantiti
         check, element, float(value.value), float(value.sd), scale.unit, float(expected.value), float(expected.sd),
         differential, z, math.erfc(abs(z) / math.sqrt(2)), what, suspected,
     )  # fmt: skip
+
+
+def _usable(healthy: Measured, scale: Expected) -> bool:
+    """Whether healthy runs have measured the quantity."""
+    known = math.isfinite(healthy.value) and math.isfinite(healthy.sd)
+    return known and abs(healthy.value - scale.nominal) <= scale.most
 
 
 def _posterior(built: Measured, healthy: Measured, changed: float) -> Measured:

@@ -18,7 +18,7 @@ LEAST_SD_M = 5e-4
 """Of a mean height of one cap over one interval: the ground of a room, and a tracker."""
 SLOPE_RAD, HEIGHT_M = 0.1, 2e-3
 """Prior sd of a slope and of a cap's height: few intervals tell them apart."""
-STANDS_M = 0.006
+STANDS_M = 0.004
 """A cap whose mean height is further off than this from that of the others does not stand: it hangs by its cables."""
 NEAR_M = 0.012
 """A cap stands if its smoothed centre lies within this and three times its error of its radius over the plane."""
@@ -57,15 +57,32 @@ def heights(runs: Sequence[Series], robot: Robot) -> Heights | None:
     mean = np.stack([np.bincount(place, table[:, j], len(names)) / np.maximum(count, 1) for j in (3, 4, 5)], axis=1)
     kept = count >= LEAST_FRAMES
     names, mean = names[kept], mean[kept]
+    stands = np.ones(len(radius), dtype=bool)
+    while True:
+        own = stands[names[:, 2].astype(int)]
+        found = _fitted(names[own], mean[own], len(radius))
+        if found is None:
+            return None
+        off = np.array([abs(one.value) > STANDS_M for one in found.cap])
+        if not off.any():
+            return found
+        # One cap that hangs lifts the plane that all the others are measured from: they are fitted anew without it.
+        worst = int(np.nanargmax([abs(one.value) for one in found.cap]))
+        stands[worst] = False
+
+
+def _fitted(names: np.ndarray, mean: np.ndarray, count: int) -> Heights | None:
+    """Of means of a cap over an interval: names (row, 3) run, interval, cap; mean (row, 3) x, y, height less radius.
+    count: of caps. None where fewer than three are there."""
     cap, run = names[:, 2].astype(int), names[:, 0].astype(int)
     if len(np.unique(cap)) < 3 or len(names) < 6:
         return None
     # One level a run (its ground was put to z = 0 by its own caps), one slope, one height a cap with its prior.
     levels = (run[:, None] == np.unique(run)).astype(float)
-    each = (cap[:, None] == np.arange(len(radius))).astype(float)
+    each = (cap[:, None] == np.arange(count)).astype(float)
     x = np.column_stack([levels, mean[:, :2] - mean[:, :2].mean(axis=0), each])
     n = levels.shape[1]
-    prior = np.concatenate([np.zeros(n), np.full(2, SLOPE_RAD**-2), np.full(len(radius), HEIGHT_M**-2)])
+    prior = np.concatenate([np.zeros(n), np.full(2, SLOPE_RAD**-2), np.full(count, HEIGHT_M**-2)])
     weight, beta = np.ones(len(mean)), np.zeros(x.shape[1])
     sigma = LEAST_SD_M
     for _ in range(5):
@@ -77,14 +94,12 @@ def heights(runs: Sequence[Series], robot: Robot) -> Heights | None:
         )
         weight = np.minimum(1.0, 1.345 * sigma / np.maximum(np.abs(rest), 1e-12))
     cov = np.linalg.inv(normal)
-    average = np.eye(len(radius)) - 1.0 / len(radius)
+    seen = np.isin(np.arange(count), cap)
+    average = np.eye(count) - seen / seen.sum()
     own, wide = average @ beta[n + 2 :], average @ cov[n + 2 :, n + 2 :] @ average.T
-    seen = np.isin(np.arange(len(radius)), cap)
     found = [
-        Measured(float(own[k]), float(np.sqrt(wide[k, k])))
-        if seen[k] and abs(own[k]) < STANDS_M
-        else Measured(float("nan"), float("nan"))
-        for k in range(len(radius))
+        Measured(float(own[k]), float(np.sqrt(wide[k, k]))) if seen[k] else Measured(float("nan"), float("nan"))
+        for k in range(count)
     ]
     sd = np.sqrt(np.diag(cov))
     slope = Measured(float(beta[n + 1]), float(sd[n + 1])), Measured(float(-beta[n]), float(sd[n]))

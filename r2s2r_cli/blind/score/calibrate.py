@@ -34,6 +34,8 @@ COVER = 0.90
 PRECISION = {"commit": 0.90, "commit_unknown": 0.75}
 """How often a verdict that commits shall be right: to an effect, to `unknown` (the reference, section 4). That there is
 no gap is a test of its own."""
+LEAST_SURE = 0.5
+"""A verdict is likelier than not, however often less likely ones were right."""
 BELIEVED = 10.0
 """Sets' worth of belief that probabilities are as often right as they say: few sets alone would set any threshold."""
 BIAS_SD = 0.5
@@ -211,7 +213,7 @@ def _commit(sure: np.ndarray, right: np.ndarray, precision: float) -> float:
     order = np.argsort(-sure)
     count = np.arange(1, len(order) + 1)
     share = (np.cumsum(right[order]) + BELIEVED * np.cumsum(sure[order]) / count) / (count + BELIEVED)
-    good = np.flatnonzero(share >= precision)
+    good = np.flatnonzero((share >= precision) & (sure[order] >= LEAST_SURE))
     return float(sure[order[good[-1]]]) if len(good) else 1.0
 
 

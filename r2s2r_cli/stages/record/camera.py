@@ -18,6 +18,8 @@ from schemas.config import RecordSettings
 _IDLE_S = 0.004
 """Between two looks for a frame: an eighth of the time between frames."""
 _PNG_LEVEL = 1
+WAITED_S = 60.0
+"""A robot in lock-step waits for its camera, so that one on a busy machine is slow and not gone, for so long."""
 LATE_S = 0.06
 """A picture is stamped when it comes, this much after its exposure at most (tick, transfer): stamped earlier than that
 in a run it may show the robot where it lay before, and a tracker that begins there finds it nowhere."""
@@ -58,7 +60,7 @@ class Pictures:
         if self._error is not None:
             raise self._error
         silent = time.monotonic() - self._last_seen
-        if silent > self._settings.camera_gone_s:
+        if silent > (max(self._settings.camera_gone_s, WAITED_S) if self._waits else self._settings.camera_gone_s):
             raise HardwareError(
                 "the camera gives no frames, the motors were stopped", where="--camera",
                 expected=f"a frame every {1e3 / 30:.0f} ms", received=f"none for {silent:.1f} s",

@@ -202,6 +202,22 @@ def test_a_silent_camera_ends_the_run() -> None:
     assert not link.driven.any()
 
 
+@pytest.mark.parametrize(("waits", "silent_s", "gone"), [(False, 1.0, False), (False, 3.0, True), (True, 3.0, False),
+                                                         (True, 61.0, True)])  # fmt: skip
+def test_in_lock_step_a_slow_camera_is_not_gone(
+    waits: bool, silent_s: float, gone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The robot's time stands still until the picture is there; two seconds of a busy machine had ended the run."""
+    pictures = Pictures(Still([]), Writer(Rows()), "camera", RecordSettings(), lambda frame: 0.0, waits=waits)  # type: ignore[arg-type]
+    begun = time.monotonic()
+    monkeypatch.setattr(time, "monotonic", lambda: begun + silent_s)
+    if gone:
+        with pytest.raises(HardwareError, match="no frames"):
+            pictures.check()
+    else:
+        pictures.check()
+
+
 def test_a_writer_waits_for_its_rows_and_says_what_the_disk_said() -> None:
     """All rows are with the sink at the end of the context; a refusal comes out as a hardware error, once."""
     rows = Rows()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import roma
@@ -130,3 +131,8 @@ def longest_step(structure: Structure, theta: Parameters, state: State) -> float
         matrix = root[..., :, None] * (jacobian.flatten(2) @ heavy.flatten(2).mT) * root[..., None, :]
         largest = float(torch.linalg.eigvalsh(0.5 * (matrix + matrix.mT))[..., -1].max())
     return 1.1 / largest**0.5 if largest > 0 else float("inf")
+
+
+def stable_substeps(structure: Structure, theta: Parameters, state: State, step: float) -> int:
+    """Engine steps per `step` [s] that keep explicit stiff cables stable at this state (see `longest_step`)."""
+    return max(1, math.ceil(step / longest_step(structure, theta, state) - 1e-9))

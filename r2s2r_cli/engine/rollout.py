@@ -29,7 +29,7 @@ from r2s2r_cli.engine.late import delay_of, observe, shifted
 from r2s2r_cli.engine.native import NativeStep, rollout
 from r2s2r_cli.engine.nonfinite import require_finite
 from r2s2r_cli.engine.parameters import Parameters, check_parameters
-from r2s2r_cli.engine.reading import always_stable_step, longest_step
+from r2s2r_cli.engine.reading import always_stable_step, stable_substeps
 from r2s2r_cli.engine.state import State, check_state, end_caps
 from r2s2r_cli.engine.structure import Detach, Structure
 from r2s2r_cli.engine.trace_key import trace_key
@@ -131,7 +131,7 @@ class Simulator:
         known = self._checked is not None and self._checked[0] is theta
         if step <= (self._always if known else always_stable_step(self.structure, theta)):
             return 1
-        return max(1, math.ceil(step / longest_step(self.structure, theta, state) - 1e-9))
+        return stable_substeps(self.structure, theta, state, step)
 
     def jvp(
         self,

@@ -35,7 +35,9 @@ def diagnose_report(found: Diagnosis) -> DiagnoseReport:
     return DiagnoseReport(
         verdict=which.verdict, sentence=sentence(found), effects=which.effects, probability=which.probability,  # type: ignore[arg-type]
         set90=which.set90, ranking=tuple(_ranked(one) for one in which.ranking),
-        pairs=tuple(PairFound(effects=names, elpd_gain=gain) for names, gain in which.pairs if math.isfinite(gain)),
+        pairs=tuple(
+            PairFound(effects=one.effects, elpd_gain=one.gain) for one in which.pairs if math.isfinite(one.gain)
+        ),
         where=_where(found),
         shrinkage=_shrinkage(found), not_testable=which.not_testable,
         confusable=tuple(one for one in which.confusable if math.isfinite(one[2])), next_gait=_next(found),

@@ -38,6 +38,7 @@ class Pictures:
         *, waits: bool = False, since: float = 0.0,
     ) -> None:  # fmt: skip
         self._waits, self._since = waits, since
+        self._gone_s = max(settings.camera_gone_s, WAITED_S) if waits else settings.camera_gone_s
         self._feed, self._writer, self._stream, self._settings, self._stamp = feed, writer, stream, settings, stamp
         self._ended = threading.Event()
         self._error: BaseException | None = None
@@ -60,7 +61,7 @@ class Pictures:
         if self._error is not None:
             raise self._error
         silent = time.monotonic() - self._last_seen
-        if silent > (max(self._settings.camera_gone_s, WAITED_S) if self._waits else self._settings.camera_gone_s):
+        if silent > self._gone_s:
             raise HardwareError(
                 "the camera gives no frames, the motors were stopped", where="--camera",
                 expected=f"a frame every {1e3 / 30:.0f} ms", received=f"none for {silent:.1f} s",

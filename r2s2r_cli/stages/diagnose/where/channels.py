@@ -61,12 +61,8 @@ def _fitted(design: Design, part: np.ndarray, places: np.ndarray, rows: np.ndarr
     return Spread(nuisance, mean, variance)
 
 
-def densities(design: Design, places: np.ndarray, spread: Spread, rows: np.ndarray) -> np.ndarray:
-    """Log density of the stretches `rows` (R,) [nats], up to what all probes share."""
-    return _densities(design, _part(design, places), spread, rows)
-
-
 def _densities(design: Design, part: np.ndarray, spread: Spread, rows: np.ndarray) -> np.ndarray:
+    """Log density of the stretches `rows` (R,) [nats], up to what all probes share. part: as of `_part`."""
     T = part[rows]
     free = _free(T, design.q, spread.variance)
     square = _squares(T, free, _left(spread.nuisance, spread.mean))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from r2s2r_cli.stages.diagnose.parity.finding import Element
 from r2s2r_cli.stages.diagnose.which.left import Left
+from r2s2r_cli.stages.diagnose.which.pair_share import TwoCauses
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap
 
 NONE, UNKNOWN = "none", "unknown"
@@ -68,7 +69,7 @@ class Screened:
 @dataclass(frozen=True)
 class Which:
     """verdict: effect | pair | ambiguous | no_gap | unknown. effects: ids it commits to. probability: of them;
-    of `no_gap` the confidence of its bound. pairs: two effects at once, best first, with their gains [nats].
+    of `no_gap` the confidence of its bound. pairs: two effects at once, best first.
     set90: names that hold the truth with 90 %. ranking: best first. chance: gain that the best of the catalogue reaches
     by chance in one of twenty cases [nats]. wider: by how much the floor must grow to explain what the best effect
     leaves; unexplained: what that gains [nats]. left: what today's runs cost more than healthy ones. within: groups
@@ -92,7 +93,7 @@ class Which:
     within: str
     calibrated: str
     warnings: tuple[str, ...] = ()
-    pairs: tuple[tuple[tuple[str, ...], float], ...] = ()
+    pairs: tuple[TwoCauses, ...] = ()
 
     @property
     def best(self) -> Ranked | None:

@@ -32,8 +32,6 @@ MOST = 256
 """Simulations in one batch."""
 FEW = 4
 """Hypotheses whose stretches are all simulated in one batch."""
-ROUNDING = 1e-9
-"""Of a step: by so much it may be longer than the longest stable one."""
 
 
 class Replayer(Predictor):
@@ -195,15 +193,14 @@ class Replayer(Predictor):
     def _substeps(self, many: Sequence[Stretch], own: Parameters, whose: Tensor, s0: Tensor) -> int:
         """Engine steps a step, as stiff cables need. own: batch k; whose (row,): of the starts s0 (row, NS)."""
         from r2s2r_cli.engine.flat import unpack_state
-        from r2s2r_cli.engine.reading import longest_step
+        from r2s2r_cli.engine.reading import stable_substeps
 
         places: set[object] = {(one.run, one.interval, one.piece) for one in many}
         for one in many:
             self._stable.learn((one.run, one.interval, one.piece), self._flat(one))
         if self.step <= self._stable.step(places, own):
             return 1
-        longest = longest_step(self.structure, rows_of(own, whose), unpack_state(self.structure, s0))
-        return max(1, math.ceil(self.step / longest - ROUNDING))
+        return stable_substeps(self.structure, rows_of(own, whose), unpack_state(self.structure, s0), self.step)
 
     def _undelayed(self, own: Parameters, k: int) -> tuple[Parameters, np.ndarray]:
         """The parameters without the camera's delay, and that delay (k,) [s]. A stretch starts where the camera saw the

@@ -11,9 +11,8 @@ from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.screen import Response
 from r2s2r_cli.stages.measures.bootstrap import upper_bound
+from r2s2r_cli.stages.measures.gap import no_gap as at_floor
 
-EQUIVALENT = 1.25
-"""Of the floor: a refit model whose error surely stays below that leaves no gap (design.md, Measures)."""
 LEVELS = (0.99, 0.975, 0.95, 0.9, 0.8, 0.7, 0.6)
 """Of confidence that are told apart."""
 WIDER = (1.25, 1.5, 2.0, 3.0, 5.0, 8.0)
@@ -35,7 +34,7 @@ class NoGap:
     @property
     def equivalent(self) -> bool:
         """Whether there is no gap above the floor. Not found is not absent: this is a claim of its own."""
-        return self.upper is not None and self.upper < EQUIVALENT * self.floor
+        return self.upper is not None and at_floor(self.upper, self.floor)
 
 
 def no_gap(refit: Score, floor_m: float, *, kept: float = 1.0) -> NoGap:
@@ -45,14 +44,14 @@ def no_gap(refit: Score, floor_m: float, *, kept: float = 1.0) -> NoGap:
     squared = squared[squared <= np.quantile(squared, kept)] if len(squared) else squared
     rmse = float(np.sqrt(squared.mean())) if len(squared) else float("inf")
     bound = upper_bound(squared, level=0.90) if len(squared) else None
-    return NoGap(rmse, bound, floor_m, _sure(squared, EQUIVALENT * floor_m))
+    return NoGap(rmse, bound, floor_m, 0.0 if bound is None else _sure(squared, floor_m))
 
 
-def _sure(squared: np.ndarray, limit: float) -> float:
-    """The largest of LEVELS at which the upper bound of the root mean square lies below `limit` [m], 0 for none."""
+def _sure(squared: np.ndarray, floor_m: float) -> float:
+    """The largest of LEVELS at which the upper bound of the root mean square is at the floor, 0 for none."""
     for level in LEVELS:
-        bound = upper_bound(squared, level=level) if len(squared) else None
-        if bound is not None and bound < limit:
+        bound = upper_bound(squared, level=level)
+        if bound is not None and at_floor(bound, floor_m):
             return level
     return 0.0
 

@@ -73,7 +73,7 @@ def concluded(m: Material) -> Which:
         confusable=confusable(m, [best[name] for name in sorted(names, key=lambda n: -names[n])[:4]]),
         not_testable=_not_testable(m.responses), shifts=() if top is None else _shifts(m, m.fits[top]),
         within=_left_out(m), calibrated=calibration.words, warnings=_warnings(m, [best[name] for name in names]),
-        pairs=tuple((one.effects, one.gain) for one in both),
+        pairs=tuple(both),
     )  # fmt: skip
 
 

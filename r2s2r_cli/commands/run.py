@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -73,7 +73,8 @@ def run(
     """Record (or import), estimate, identify, plan, execute, estimate again and compare: one iteration of the loop.
 
     Every stage is the command of that name; a fresh one says so and costs nothing, one that was interrupted goes on
-    where it was, a robot that has moved is not moved again. The first stage that fails ends the run, with its code.
+    where it was, a robot that has moved is not moved again. A recording that was cut off, and that nothing was made of
+    yet, is done again; what it holds is kept. The first stage that fails ends the run, with its code.
 
     Example: r2s2r run --port /dev/ttyUSB0 --camera realsense
     """  # fmt: skip
@@ -93,9 +94,18 @@ def run(
     for number, step in enumerate(steps, start=1):
         words = ("r2s2r", *step.words, "--iteration", str(place.number))
         if step.robot and step.target.exists():
-            console.say(f"[{number}/{len(steps)}] {here.relative(step.target)} is there: the robot is not moved again")
-            _warn_of_old(here, step, console)
-            continue
+            name, again = here.relative(step.target), (*step.words, "--force")
+            why = _cut_off(step.target)
+            # What somebody went on from is theirs to judge.
+            used = place.artifact("estimate", executed=step.name == "execute").exists()
+            if not why or used or not robot:
+                console.say(f"[{number}/{len(steps)}] {name} is there: the robot is not moved again")
+                _warn_of_old(here, step, console)
+                if why:
+                    console.warn(f"{name} was cut off ({why}); to do it again: {shlex.join(['r2s2r', *again])}")
+                continue
+            console.say(f"[{number}/{len(steps)}] {name} was cut off ({why}): it is done again, and kept as .replaced")
+            words, step = ("r2s2r", *again, *words[-2:]), replace(step, words=again)
         if why := _kept(here, place, step, steps):
             console.say(f"[{number}/{len(steps)}] {here.relative(step.target)} is used as it is: {why}")
             continue
@@ -163,6 +173,24 @@ def _warn_of_old(project: Project, step: Step, console: Console) -> None:
             f"{project.relative(step.target)} holds runs of what has changed since: {'; '.join(changed)}. To run the "
             f"present policies: {shlex.join(['r2s2r', *step.words, '--force'])}"
         )
+
+
+def _cut_off(target: Path) -> str:
+    """What ended a recording before its last run was through; empty: nothing, or it cannot be read, which the stage
+    that reads it says."""
+    from r2s2r_cli.commands.wanted import MEASURED
+    from r2s2r_cli.store.header import read_header
+
+    try:
+        made = read_header(target).provenance
+    except R2S2RError:
+        return ""
+    if made.stage in MEASURED and not made.report:
+        return "recovered after a crash"
+    runs = [one for one in made.report.get("runs", ()) if one.get("ended", "complete") != "complete"]
+    early = [f"{one['run']}: {one['ended']}" for one in runs]
+    early += [f"{name}: not begun" for name in made.report.get("not_begun", ())]
+    return "; ".join(early)
 
 
 def _resumed(step: Step) -> tuple[str, ...]:

@@ -9,7 +9,8 @@ from typing import Any, ClassVar
 import pytest
 
 from tests.commands.conftest import invoke
-from tests.commands.test_mend import without_pictures
+from tests.commands.test_mend import put, without_pictures
+from tests.support import builders
 
 Calls = list[list[str]]
 
@@ -72,6 +73,35 @@ def test_a_robot_that_has_moved_is_not_moved_again(estimated: Path, calls: Calls
     result = invoke("run", "--port", "socket://nowhere:1", "--until", "plan")
     assert result.exit_code == 0, result.stderr
     assert "not moved again" in result.stderr
+    assert stages(Child.calls) == ["estimate", "identify", "plan"]
+
+
+CUT_OFF = {"runs": [{"run": "gait", "ended": "interrupted"}], "not_begun": ["gait-2"]}
+"""Of a report of `record`."""
+
+
+def test_a_recording_that_was_cut_off_is_done_again(project: Path, calls: Calls) -> None:
+    """`record --force` keeps what there was beside it. Without a robot it is used as it is."""
+    put(project, "10-record.h5", builders.recording(), "record", report=CUT_OFF)
+    assert invoke("run", "--until", "plan").exit_code == 0
+    assert stages(Child.calls) == ["estimate", "identify", "plan"]
+    Child.calls.clear()
+    result = invoke("run", "--port", "socket://nowhere:1", "--until", "plan")
+    said = " ".join(result.stderr.split())
+    assert result.exit_code == 0, result.stderr
+    assert "was cut off (gait: interrupted; gait-2: not begun): it is done again" in said
+    assert stages(Child.calls) == ["record", "estimate", "identify", "plan"]
+    assert "--force" in Child.calls[0]
+
+
+def test_a_recording_that_was_cut_off_and_used_stays(project: Path, calls: Calls) -> None:
+    """Somebody estimated states from it: they know. The way to another one is said."""
+    put(project, "10-record.h5", builders.recording(), "record", report=CUT_OFF)
+    put(project, "20-estimate.h5", builders.estimate(), "estimate")
+    result = invoke("run", "--port", "socket://nowhere:1", "--until", "plan")
+    said = " ".join(result.stderr.split())
+    assert result.exit_code == 0, result.stderr
+    assert "r2s2r record --random 15 --port socket://nowhere:1 --protocol checked --force" in said
     assert stages(Child.calls) == ["estimate", "identify", "plan"]
 
 

@@ -8,6 +8,7 @@ import pytest
 import torch
 from torch import Tensor
 
+import r2s2r_cli.engine.native.run_backward as backward_module
 import r2s2r_cli.engine.native.step as step_module
 from r2s2r_cli.engine.errors import EngineInputError
 from r2s2r_cli.engine.native import NativeStep, eager, machine, rollout
@@ -127,9 +128,9 @@ def test_checkpoints_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     step, s, u, p = setting(3)
     adjoint = torch.randn(3, 11, 2 * N, dtype=torch.float64)
     whole = step.vjp(s, u, p, adjoint, **PLAN)
-    monkeypatch.setattr(step_module, "STATES", 0)
+    monkeypatch.setattr(backward_module, "STATES", 0)
     for chunk in (1, 7, 25, 49, 50, 64):
-        monkeypatch.setattr(step_module, "CHUNK", chunk)
+        monkeypatch.setattr(backward_module, "CHUNK", chunk)
         parts = step.vjp(s, u, p, adjoint, **PLAN)
         close(parts[0], whole[0], 1e-14)
         # Sums over the rollout are added up in another order.

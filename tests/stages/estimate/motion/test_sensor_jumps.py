@@ -108,7 +108,7 @@ def test_names_exchanged_out_of_sight_are_still_noticed() -> None:
         forward.sense(t - LATE_S, length)
         forward.predict(t)
         if k == 45:
-            forward._x[:6] = swapped[:2].ravel()
+            forward.states.x[:6] = swapped[:2].ravel()
         if k > 45 and forward.lost and forward.reacquire(t, blobs, COV):
             break
         rod = p[:2] if k < 30 else swapped[:2] if k >= 45 else np.full((2, 3), np.nan)

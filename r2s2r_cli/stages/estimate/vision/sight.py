@@ -8,8 +8,9 @@ import numpy as np
 
 from r2s2r_cli.devices.camera import Intrinsics
 from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.estimate.vision.ball import DEPTHS_LEAST, BallFit, BallFitter
+from r2s2r_cli.stages.estimate.vision.ball import BallFit, BallFitter
 from r2s2r_cli.stages.estimate.vision.colors import blank, hsv_of, mask, ranges_of
+from r2s2r_cli.stages.estimate.vision.depths import DEPTHS_LEAST
 from r2s2r_cli.stages.estimate.vision.detect import balls, candidates
 from r2s2r_cli.stages.estimate.vision.frames import ImageFrame
 from r2s2r_cli.stages.estimate.vision.known import Survey
@@ -26,6 +27,7 @@ from r2s2r_cli.stages.estimate.vision.sightings import (
     Sightings,
 )
 from r2s2r_cli.stages.estimate.vision.solids import Body, ball_depth
+from r2s2r_cli.stages.estimate.vision.start_place import start_place
 from schemas.robot import Robot
 
 GATE_SD = 3.0
@@ -231,9 +233,10 @@ class Sighter:
         )
         told = ~in_front(patch, np.full_like(patch.z, center[2] - radius), self._noise_sd(center[2]))
         twin = self._twin(patch, p_C, cap, margin)
-        return self._fitter.place(
-            patch, told if twin is None else told & ~twin, about, hidden, center, radius, reach_px
-        )
+        return start_place(
+            patch, told if twin is None else told & ~twin, about, hidden, center, radius, reach_px, f=self._f,
+            swell_px=self.survey.swell_px,
+        )  # fmt: skip
 
     def _twin(self, patch: Patch, p_C: np.ndarray, cap: int, margin: np.ndarray) -> np.ndarray | None:
         """Pixels beside a cap, or before it, that may show its rod's other cap, which has its colour; None: none."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from r2s2r_cli.devices.camera import Intrinsics
 from r2s2r_cli.stages.estimate.vision.frames import ImageFrame
-from r2s2r_cli.stages.estimate.vision.sight import GATE_SD, REACH_M
+from r2s2r_cli.stages.estimate.vision.sight_cap import GATE_SD, REACH_M
 from r2s2r_cli.stages.estimate.vision.sightings import HIDDEN, SEEN, Candidate, Sightings
 
 LENS = Intrinsics(640, 480, 615.0, 615.0, 320.0, 240.0)

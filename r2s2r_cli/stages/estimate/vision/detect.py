@@ -12,7 +12,8 @@ from r2s2r_cli.stages.estimate.vision.sightings import Candidate
 
 if TYPE_CHECKING:
     from r2s2r_cli.stages.estimate.vision.ball import BallFit
-    from r2s2r_cli.stages.estimate.vision.sight import Pictures, Sighter
+    from r2s2r_cli.stages.estimate.vision.sight_cap import CapSighter
+    from r2s2r_cli.stages.estimate.vision.view import Pictures
 
 PATCH_PX = 8
 """A smaller connected patch is noise."""
@@ -30,7 +31,7 @@ def candidates(fits: list[list[BallFit]]) -> tuple[Candidate, ...]:
     )
 
 
-def balls(sighter: Sighter, pictures: Pictures) -> list[list[BallFit]]:
+def balls(sighter: CapSighter, pictures: Pictures) -> list[list[BallFit]]:
     """Caps of each rod in a frame; a rod's best pair comes first, then what else is left, the more visible first."""
     fits = [_of_rod(sighter, pictures, rod) for rod in range(sighter.rods)]
     pairs = [_best_pair(found, length) for found, length in zip(fits, sighter.rod_length, strict=True)]
@@ -51,7 +52,7 @@ def balls(sighter: Sighter, pictures: Pictures) -> list[list[BallFit]]:
     return result
 
 
-def _of_rod(sighter: Sighter, pictures: Pictures, rod: int) -> list[BallFit]:
+def _of_rod(sighter: CapSighter, pictures: Pictures, rod: int) -> list[BallFit]:
     """Balls of a rod's colour, the more visible first; no two at one place."""
     import cv2
 
@@ -69,7 +70,7 @@ def _of_rod(sighter: Sighter, pictures: Pictures, rod: int) -> list[BallFit]:
         box = (slice(top, top + height), slice(left, left + width))
         z = pictures.z[box][(label[box] == i) & (pictures.z[box] > 0)]
         u, v = (int(np.clip(w, 0, n - 1)) for w, n in zip(middle[i], pictures.z.shape[::-1], strict=True))
-        ray = np.array([sighter.lens.x[v, u], sighter.lens.y[v, u], 1.0])
+        ray = np.array([sighter.view.lens.x[v, u], sighter.view.lens.y[v, u], 1.0])
         depth = float(np.median(z)) if len(z) else sighter.floor_depth(ray)
         if depth is None:
             continue

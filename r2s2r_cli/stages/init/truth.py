@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.errors import UsageError
-from r2s2r_cli.stages.init.facts import RobotFacts
 from r2s2r_cli.stages.init.prism import PRISM_CABLES, PRISM_SUPPORT, prism_caps, prism_caps_rate, resting_rotation
+from r2s2r_cli.stages.init.robot_facts import RobotFacts
 
 SHAPES: tuple[tuple[float, float], ...] = ((0.2, 1.0), (0.2, 0.3), (1.0, 0.3), (1.0, 1.0), (0.5, 0.6), (0.9, 0.2))
 """Target positions (odd triangle, even triangle), one a target interval, repeated; the start is (1, 1), the rest."""

@@ -18,8 +18,9 @@ from r2s2r_cli.stages.init.attachment import (
     rod_frames,
     site_points,
 )
-from r2s2r_cli.stages.init.facts import FACTS, RobotFacts
+from r2s2r_cli.stages.init.facts import FACTS
 from r2s2r_cli.stages.init.prism import PRISM_CABLES
+from r2s2r_cli.stages.init.robot_facts import RobotFacts
 from r2s2r_cli.views.attachment import attachment_png
 
 ROBOTS = sorted(FACTS)

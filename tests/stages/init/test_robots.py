@@ -13,8 +13,9 @@ import tomlkit
 
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.init.attachment import MODES, Mode, rod_frames, site_points
-from r2s2r_cli.stages.init.facts import FACTS, Fact
+from r2s2r_cli.stages.init.facts import FACTS
 from r2s2r_cli.stages.init.init import init_texts
+from r2s2r_cli.stages.init.robot_facts import Fact
 from r2s2r_cli.stages.init.robots import ROBOTS, robot_toml
 from schemas.robot import Robot
 

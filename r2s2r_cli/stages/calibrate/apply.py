@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-import math
-import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from pydantic import ValidationError
-
 from r2s2r_cli.errors import InputError, NumericalError
+from r2s2r_cli.stages.calibrate.robot_text import comment, cut_tail, edited, put, rounded, set_value
 from r2s2r_cli.stages.calibrate.tendons import stiffness_min
 from schemas.results_calibrate import RobotChanges
-from schemas.robot import Lump, Robot
+from schemas.robot import Lump
 
 if TYPE_CHECKING:
     from tomlkit.items import Table
 
-DIGITS = 7
-"""Significant digits written: an error of 1e-7 in a 20 pF offset is 0.1 micrometre of length."""
-
-MARK = "calibrate"
-"""First word of the comments that are written here, and that a later calibration replaces."""
-
-_BEFORE = " | before: "
 _TENDON_KEYS = ("stiffness_n_per_m", "stiffness2_n_per_m2", "stiffness3_n_per_m3")
 
 
@@ -99,106 +89,11 @@ def with_parts(text: str, rod: str | None, parts: Sequence[Lump], *, source: str
     return edited(text, edit)
 
 
-def edited(text: str, edit: Callable[[Any], None]) -> str:
-    """The text after `edit` of its tomlkit document. Raises InputError where it, or the result, is no valid robot."""
-    import tomlkit
-    from tomlkit.exceptions import TOMLKitError
-
-    _validate(text, "robot.toml")
-    try:
-        document = tomlkit.parse(text)
-        edit(document)
-        result = tomlkit.dumps(document)
-    except TOMLKitError as error:
-        raise InputError(
-            "robot.toml cannot be edited in place", where="robot.toml", expected="TOML that tomlkit understands",
-            received=str(error)[:120], hint="write [[sensors]], [[cables]], [[rods]] tables, as `r2s2r init` does",
-        ) from None  # fmt: skip
-    _validate(result, "robot.toml after the change")
-    return result
-
-
-def _validate(text: str, where: str) -> None:
-    try:
-        Robot.model_validate(tomllib.loads(text))
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise InputError(
-            "the robot description is not valid", where=f"{where}, {'.'.join(map(str, first['loc']))}",
-            expected=first["msg"].removeprefix("Value error, "), received=repr(first["input"])[:80],
-            hint="r2s2r validate",
-        ) from None  # fmt: skip
-    except (ValueError, RecursionError) as error:
-        raise InputError(
-            "the robot description is not valid TOML", where=where, expected="TOML", received=str(error)[:120],
-            hint="correct the file at that place",
-        ) from None  # fmt: skip
-
-
 def _absent(where: str, received: str) -> InputError:
     return InputError(
         "robot.toml lacks what the measurement belongs to", where=f"robot.toml, {where}", expected="its table",
         received=received, hint="add the table to robot.toml, or calibrate in the project of the robot measured",
     )  # fmt: skip
-
-
-def set_value(table: Any, key: str, value: float | list[float | int], source: str) -> None:
-    """Set a number, or a list of them, and its comment; what the user wrote there stays behind the new one."""
-    from tomlkit.items import Table
-
-    number = value if isinstance(value, list) else _rounded(value, key)
-    if not isinstance(table, Table):
-        raise InputError(
-            "robot.toml holds an inline table where a comment cannot stand", where=f"robot.toml, {key}",
-            expected="a table of its own, [[sensors]], [[cables]] or [[colors]]", received="an inline table in braces",
-            hint="write one table in double brackets per element, as `r2s2r init` does",
-        )  # fmt: skip
-    old = table[key].trivia.comment.lstrip("# ").rstrip() if key in table else ""
-    if old == MARK or old.startswith(f"{MARK}: "):  # ours; "calibrated by hand" is the user's and stays
-        old = old.partition(_BEFORE)[2]
-    _put(table, key, number)
-    _comment(table[key], source, old)
-
-
-def _comment(item: Any, source: str, before: str = "") -> None:
-    # Names of sets come from files: a line break in one would end the comment.
-    note = f"{MARK}: {source}" if source else MARK
-    text = note + (f"{_BEFORE}{before}" if before else "")
-    item.comment("".join(c if c.isprintable() else " " for c in text))
-    item.trivia.comment_ws = "  "
-
-
-def _put(table: Table, key: str, value: str | float | list[float | int]) -> None:
-    """Set a value; a new key goes below the last one, above blank lines and the comments of the next table."""
-    if key in table:
-        table[key] = value
-        return
-    body = table.value.body
-    indent = next((item.trivia.indent for name, item in body if name is not None), "")
-    tail = _cut_tail(table)
-    table[key] = value
-    table[key].trivia.indent = indent
-    table.value.body.extend(tail)
-
-
-def _cut_tail(table: Table) -> list[Any]:
-    """Take the blank lines and comments off the end of a table."""
-    body = table.value.body
-    cut = len(body)
-    while cut and body[cut - 1][0] is None:
-        cut -= 1
-    tail = list(body[cut:])
-    del body[cut:]
-    return tail
-
-
-def _rounded(value: float, name: str) -> float:
-    if not math.isfinite(value):
-        raise InputError(
-            "not a finite number for robot.toml", where=name, expected="a finite number", received=repr(value),
-            hint="leave the sensor or curve out whose fit failed",
-        )  # fmt: skip
-    return float(f"{value:.{DIGITS}g}")
 
 
 def _set_parts(rod: Any, parts: Sequence[Lump], source: str) -> None:
@@ -213,15 +108,15 @@ def _set_parts(rod: Any, parts: Sequence[Lump], source: str) -> None:
             inline.update(_fields(part))
             array.append(inline)
         rod["parts"] = array
-        _comment(rod["parts"], source)
+        comment(rod["parts"], source)
         return
 
     new = {part.name: part for part in parts}
-    tail = _cut_tail(old[-1])
+    tail = cut_tail(old[-1])
     for i in reversed(range(len(old))):
         name = str(old[i]["name"])
         if name not in new:
-            orphans = [] if i == len(old) - 1 else _cut_tail(old[i])
+            orphans = [] if i == len(old) - 1 else cut_tail(old[i])
             (old[i - 1].value.body if i else tail).extend(orphans)
     kept = [table for table in old if str(table["name"]) in new]
     for table in kept:
@@ -235,7 +130,7 @@ def _set_parts(rod: Any, parts: Sequence[Lump], source: str) -> None:
         for key, value in _fields(part).items():
             old[-1][key] = value
             old[-1][key].trivia.indent = first
-        _comment(old[-1]["mass_kg"], source)
+        comment(old[-1]["mass_kg"], source)
     for i in reversed(range(len(old))):
         if str(old[i]["name"]) not in {part.name for part in parts}:
             del old[i]
@@ -252,12 +147,12 @@ def _update_part(table: Table, part: Lump, source: str) -> None:
         if isinstance(value, float):
             set_value(table, key, value, source)
         else:
-            _put(table, key, value)
+            put(table, key, value)
 
 
 def _fields(part: Lump) -> dict[str, str | float]:
     """What is written of a part: its numbers as measured, dimensions only where the shape has them."""
     values: dict[str, str | float] = {"name": part.name, "shape": part.shape}
-    values |= {"mass_kg": _rounded(part.mass_kg, "mass_kg"), "offset_m": _rounded(part.offset_m, "offset_m")}
+    values |= {"mass_kg": rounded(part.mass_kg, "mass_kg"), "offset_m": rounded(part.offset_m, "offset_m")}
     sizes = {key: getattr(part, key) for key in ("radius_m", "length_m", "inner_radius_m")}
-    return values | {key: _rounded(value, key) for key, value in sizes.items() if value > 0}
+    return values | {key: rounded(value, key) for key, value in sizes.items() if value > 0}

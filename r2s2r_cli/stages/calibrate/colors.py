@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.calibrate.apply import edited, set_value
+from r2s2r_cli.stages.calibrate.robot_text import edited, set_value
 from schemas.robot import HsvRange
 
 _COMMENT = "Colours of the rods' caps in the camera's picture: hue 0..180, saturation and value 0..255, as in OpenCV."

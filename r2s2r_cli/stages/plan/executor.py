@@ -1,7 +1,7 @@
 """Many policies at once: the robot's controller in the loop, every environment with targets and numbers of its own.
 
 `engine.closed_loop` runs one policy from many starts; the search needs another target in every environment, and
-environments that end at different times. This is the same loop, tick by tick; finished environments leave the batch.
+environments that end at different times. The loop itself is `together.run_together`.
 """
 
 from __future__ import annotations
@@ -16,19 +16,17 @@ from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.init.attachment import rod_frames
 from r2s2r_cli.stages.model import structure_of
 from r2s2r_cli.stages.plan.belief import Belief
-from r2s2r_cli.stages.plan.standing import Executed, Standing, stacked, tracks
+from r2s2r_cli.stages.plan.standing import Executed, Standing, stacked
+from r2s2r_cli.stages.plan.together import run_together
 from schemas.robot import Robot
 
 if TYPE_CHECKING:
     from torch import Tensor
 
     from r2s2r_cli.engine import LatchedPid, Parameters
-    from r2s2r_cli.engine.link import DelayLine
 
 CHUNK = 4096
 """Environments that are simulated together: more is not faster, and takes memory."""
-STALL_S, STALL_M = 0.2, 2e-4
-"""A target whose cables move less than this [m] in that time [s] is not reached any more: a winch is at its end."""
 RESTLESS = 0.01
 """[m/s] a start whose caps still move so fast after settling is none."""
 
@@ -76,7 +74,6 @@ class Executor:
         self.delay = late if measured is None else (late + measured - numbers).clamp(min=0.0)
         limit = robot.pid.step_timeout_s if timeout_s is None else timeout_s
         self.timeout = int(ticks(torch.tensor([limit], dtype=torch.float64), self.period)[0])
-        self.steps = 0
         self._substeps: int | None = None
 
     def __len__(self) -> int:
@@ -156,7 +153,7 @@ class Executor:
         for first in range(0, len(at), CHUNK):
             rows = np.arange(first, min(first + CHUNK, len(at)))
             goals = torch.as_tensor(np.ascontiguousarray(targets[rows], dtype=float))
-            parts.append(self._run(at.take(rows), goals, counts[rows], record))
+            parts.append(run_together(self, at.take(rows), goals, counts[rows], record=record))
         if len(parts) == 1:
             return parts[0]
         ends = tuple(stacked([p.ends[k] for p in parts]) for k in range(targets.shape[1]))
@@ -166,99 +163,13 @@ class Executor:
         }
         return Executed(ends, **named, tracks=tuple(track for p in parts for track in p.tracks))
 
-    def _run(self, at: Standing, targets: Tensor, counts: np.ndarray, record: bool) -> Executed:
-        import torch
-
-        from r2s2r_cli.engine.flat import unpack_state
-        from r2s2r_cli.engine.pid import advance, start_progress
-        from r2s2r_cli.engine.reading import cap_lengths
-        from r2s2r_cli.engine.state import end_caps
-
-        batch, steps, _ = targets.shape
-        ends_s = at.s[:, None].repeat(1, steps, 1)
-        ends_line = at.line[:, None].repeat(1, steps, 1, 1)
-        ticks, given_up = np.zeros((batch, steps), dtype=np.int64), np.zeros((batch, steps), dtype=bool)
-        failed = np.zeros(batch, dtype=bool)
-        hold, timeout = torch.zeros(steps, dtype=torch.long), torch.full((steps,), self.timeout)
-        n = self.substeps(at)
-        h, count = self.step / n, self.whole * n
-        delayed = bool((self.delay > 0).any())
-        kept: list[tuple[Tensor, ...]] = []
-
-        live = torch.arange(batch)
-        s, s_line, draw, goal, asked = at.s, at.line, at.draw, targets, torch.as_tensor(counts)
-        theta, p, pid = self._numbers(draw)
-        memory, where = pid.start(s.new_zeros(batch, self.structure.n_cables)), start_progress(batch)
-        line = self._line(draw, s_line) if delayed else None
-        stall, length_then = max(1, round(STALL_S / self.period)), s.new_zeros(batch, self.structure.n_actuated)
-        with torch.no_grad():
-            for tick in range(1, steps * (self.timeout + 1) + 1):
-                state = unpack_state(self.structure, s)
-                length = cap_lengths(self.cable_caps, end_caps(theta, state)) + self.bias[draw]
-                for effect in self.structure.effects:
-                    length = effect.sensing(theta.of(effect.name), length)
-                running = where.index < asked
-                wanted = goal[torch.arange(len(s)), where.index.clamp(max=steps - 1)]
-                u, memory = pid.tick(memory, length, wanted)
-                u = torch.where(running[:, None], u, torch.zeros_like(u))
-                before, done = where.index, memory.done
-                where, moved = advance(where, memory.done, hold, timeout)
-                memory = memory.restarted(moved.changed)
-                if line is None:
-                    s = self.simulator.advance(s, u[:, None], p, h=h, hold=count, every=count)[:, -1]
-                else:
-                    rows, line = line.pushed(u)
-                    s = self.simulator.advance(s, rows, p, h=h, hold=n, every=count)[:, -1]
-                    s_line = torch.cat([s_line[:, 1:], u[:, None]], dim=1)
-                self.steps += len(s) * count
-                sane = torch.isfinite(s).all(dim=1)
-                changed = moved.changed & running
-                if bool(changed.any()):
-                    left, step_of = live[changed], before[changed]
-                    ends_s[left, step_of], ticks[left.numpy(), step_of.numpy()] = s[changed], tick
-                    ends_line[left, step_of] = s_line[changed]
-                    given_up[left.numpy(), step_of.numpy()] = moved.timed_out[changed].numpy()
-                if record:
-                    kept.append((live[running], s[running], u[running], before[running], done[running]))
-                over = (where.index >= asked) | ~sane
-                if self.hurried and tick % stall == 0:
-                    now = length[:, list(self.structure.actuated)]
-                    still = (torch.where(memory.done, 0.0, now - length_then).abs() < STALL_M).all(dim=1)
-                    stalled = still & (where.elapsed > stall) & ~over
-                    given_up[live[stalled].numpy(), where.index[stalled].numpy()] = True
-                    over, length_then = over | stalled, now
-                if self.hurried:
-                    over = over | moved.timed_out
-                failed[live[~sane].numpy()] = True
-                if bool(over.all()):
-                    break
-                if int(over.sum()) * 8 >= len(over):
-                    keep = ~over
-                    live, s, s_line, draw = live[keep], s[keep], s_line[keep], draw[keep]
-                    goal, asked, length_then = goal[keep], asked[keep], length_then[keep]
-                    theta, p, pid = self._numbers(draw)
-                    memory = replace(memory, total=memory.total[keep], previous=memory.previous[keep],
-                                     done=memory.done[keep])  # fmt: skip
-                    where = replace(where, index=where.index[keep], elapsed=where.elapsed[keep], held=where.held[keep])
-                    line = None if line is None else self._line(draw, s_line)
-        ends = tuple(Standing(ends_s[:, k], ends_line[:, k], at.draw) for k in range(steps))
-        return Executed(ends, ticks, given_up, failed, counts, tuple(tracks(at.s, kept)) if record else ())
-
-    def _numbers(self, draw: Tensor) -> tuple[Parameters, Tensor, LatchedPid]:
+    def numbers(self, draw: Tensor) -> tuple[Parameters, Tensor, LatchedPid]:
         """Parameters, packed ones and the controller of environments with these draws."""
 
         def of(x: Tensor) -> Tensor:
             return x[draw]
 
         return self.theta.map(of), self.packed[draw], self.pid(draw)
-
-    def _line(self, draw: Tensor, recent: Tensor) -> DelayLine:
-        """The commands under way as the engine's link takes them."""
-        from r2s2r_cli.engine.link import Link
-
-        made = Link(delay=self.delay[draw][:, None]).line(len(draw), recent[:, 0], self.period, self.whole)
-        depth = made.recent.shape[1]
-        return replace(made, recent=recent[:, recent.shape[1] - depth :])
 
     def substeps(self, at: Standing) -> int:
         """Engine steps per `step`, as many as the stiffest of all draws needs."""

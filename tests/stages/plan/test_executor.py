@@ -44,7 +44,7 @@ def test_a_batch_does_what_the_closed_loop_does_one_by_one() -> None:
                         [[1, 1, 1, 1, 1, 0.5], [0, 1, 1, 1, 1, 1]]], dtype=float)  # fmt: skip
     run = made.run(at, targets)
     for k in range(3):
-        theta, _, pid = made._numbers(torch.tensor([k]))
+        theta, _, pid = made.numbers(torch.tensor([k]))
         one = closed_loop(
             made.simulator, theta, unpack_state(made.structure, at.s[k : k + 1]), pid,
             torch.as_tensor(targets[k]), torch.zeros(2, dtype=torch.float64),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from pathlib import Path
+from shlex import quote
 
 
 class ExitCode(IntEnum):
@@ -28,6 +30,14 @@ EXIT_CODE_MEANING: dict[ExitCode, str] = {
     ExitCode.NUMERICAL: "numerical failure: not finite, not converged, not identifiable",
     ExitCode.INTERRUPTED: "interrupted; nothing is half-written, long work can be resumed",
 }
+
+
+def install_extra(extra: str) -> str:
+    """The command that installs an extra. From the clone that this is: no package index has r2s2r."""
+    root = Path(__file__).resolve().parents[1]
+    if (root / "pyproject.toml").is_file():
+        return f"pip install -e {quote(f'{root}[{extra}]')}"
+    return f"pip install -e '.[{extra}]'   # in a clone of r2s2r"
 
 
 class R2S2RError(Exception):

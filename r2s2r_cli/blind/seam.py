@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TypeVar
 
-from r2s2r_cli.errors import HardwareError, R2S2RError, UsageError
+from r2s2r_cli.errors import HardwareError, R2S2RError, UsageError, install_extra
 
 LOCAL, DASK = "local", "dask://"
 Item = TypeVar("Item")
@@ -91,7 +91,7 @@ def _dask(spec: str) -> tuple[Executor, Callable[[], object]]:
     except ImportError as error:
         raise UsageError(
             "dask.distributed is not installed", where="--executor", expected="the extra `cluster`",
-            received=str(error), hint="pip install 'r2s2r[cluster]'",
+            received=str(error), hint=install_extra("cluster"),
         ) from error  # fmt: skip
     address = "tcp://" + spec.removeprefix(DASK)
     try:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import NumericalError, UsageError
+from r2s2r_cli.errors import NumericalError, UsageError, install_extra
 from r2s2r_cli.options import JsonOption, QuietOption
 from schemas.results_bench import IdentifiedBy, IdentifiedCase, IdentifyBenchResult, Share
 
@@ -95,7 +95,7 @@ def _require_sysid() -> None:
     if not found:
         raise UsageError(
             "mujoco.sysid is not installed", where="bench identify", expected="mujoco[sysid] of the extra `rig`",
-            received="none", hint="pip install 'r2s2r[rig]'   # without it: r2s2r bench identify --cases 10",
+            received="none", hint=install_extra("rig") + "   # without it: r2s2r bench identify --cases 10",
         )  # fmt: skip
 
 

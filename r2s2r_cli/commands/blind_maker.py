@@ -8,7 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 
-from r2s2r_cli.errors import InputError, NumericalError, UsageError
+from r2s2r_cli.errors import InputError, NumericalError, UsageError, install_extra
 
 
 def make_sets(asked: Sequence[str], advance: Callable[[int], None]) -> None:
@@ -20,7 +20,7 @@ def make_sets(asked: Sequence[str], advance: Callable[[int], None]) -> None:
     for module, extra in (("mujoco", "rig"), ("cryptography", "blind")):
         if importlib.util.find_spec(module) is None:
             raise UsageError(f"{module} is not installed", where="r2s2r blind make", expected=f"the extra `{extra}`",
-                             received="no such module", hint="pip install 'r2s2r[blind]'")  # fmt: skip
+                             received="no such module", hint=install_extra("blind"))  # fmt: skip
     command = [sys.executable, "-m", "r2s2r_cli.blind.make", *asked]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as maker:
         assert maker.stdout is not None and maker.stderr is not None  # noqa: S101 - both are pipes

@@ -46,7 +46,7 @@ def score(
 
     With --published several banks (shards) of one tier and kind are scored as one.
 
-    Example: r2s2r blind score --published docs/blind/blind-b-1.json docs/blind/blind-b-2.json
+    Example: r2s2r blind score --published docs/blind/blind-b-1.json.gz docs/blind/blind-b-2.json.gz
     """
     from r2s2r_cli.blind.score import score as of_bank, score_published
     from r2s2r_cli.views.blind import blind_page, blind_tables, draw_blind
@@ -98,7 +98,7 @@ def publish(
 
     It opens every label that has a verdict: from then on the bank is not blind any more.
 
-    Example: r2s2r blind publish bank --verdicts verdicts --key labels.key --out docs/blind/blind-b-1.json
+    Example: r2s2r blind publish bank --verdicts verdicts --key labels.key --out docs/blind/blind-b-1.json.gz
     """
     from r2s2r_cli.blind.labels import read_key
     from r2s2r_cli.blind.score import publish as opened
@@ -144,7 +144,7 @@ def calibrate(
 ) -> None:
     """Learn from a calibration bank how gains become probabilities, and from which one on a name is committed to.
 
-    Example: r2s2r blind calibrate --published docs/blind/calibration-1.json --out calibration.json
+    Example: r2s2r blind calibrate --published docs/blind/calibration-7.json.gz --out calibration.json
     """
     import json as format_json
 

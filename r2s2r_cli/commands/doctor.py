@@ -16,7 +16,7 @@ from r2s2r_cli import __version__
 from r2s2r_cli.commands.doctor_camera import camera
 from r2s2r_cli.commands.doctor_ports import NO_PORTS, ports
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import GateError, R2S2RError
+from r2s2r_cli.errors import GateError, R2S2RError, install_extra
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from schemas.results import DoctorResult, Probe
 
@@ -25,7 +25,7 @@ LIBRARIES: dict[str, tuple[str, str]] = {
     "torch": ("error", "pip install torch==2.13.0"),
     "cv2": ("error", "pip install --force-reinstall opencv-python-headless"),
     "serial": ("error", "pip install --force-reinstall pyserial"),
-    "mujoco": ("warning", "pip install 'r2s2r[rig]'"),
+    "mujoco": ("warning", install_extra("rig")),
     "open3d": ("warning", "apt-get install libusb-1.0-0 libgl1 libegl1 libx11-6 libudev1 libidn2-0"),
 }
 """What is imported, in a process of its own; what its failure means; the remedy."""

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.errors import InputError, UsageError, install_extra
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from schemas.results_rig import RigResult
 
@@ -163,7 +163,7 @@ def _need_mujoco() -> None:
 
     if importlib.util.find_spec("mujoco") is None:
         raise InputError("MuJoCo is not installed", where="r2s2r rig", expected="mujoco of the extra `rig`",
-                         received="no such package", hint="pip install 'r2s2r[rig]'")  # fmt: skip
+                         received="no such package", hint=install_extra("rig"))  # fmt: skip
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from r2s2r_cli.commands.bench_sides import MujocoSide, OurSide
 from r2s2r_cli.rig.model import body_of
 from r2s2r_cli.rig.model.mjcf_text import winch_speed
 from tests.commands.conftest import document, invoke
+from tests.guards.listing import ROOT
 from tests.support.rig_robots import known
 
 ROBOT = known()
@@ -128,7 +129,7 @@ def test_without_mujoco_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "mujoco" else find(name))
     result = invoke("bench", "engine")
     assert result.exit_code == 4
-    assert "hint: pip install 'r2s2r[rig]'" in result.stderr
+    assert f"hint: pip install -e '{ROOT}[rig]'" in result.stderr
 
 
 @pytest.mark.parametrize(

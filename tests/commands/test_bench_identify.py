@@ -16,6 +16,7 @@ from r2s2r_cli.commands.bench_identify_tally import judged, share, summed_up
 from r2s2r_cli.stages.identify.growing import problem_of
 from r2s2r_cli.stages.identify.solve.population import HELD
 from tests.commands.conftest import document, invoke
+from tests.guards.listing import ROOT
 from tests.support.rig_robots import known
 
 ROBOT = known()
@@ -160,7 +161,7 @@ def test_without_sysid_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setitem(sys.modules, "mujoco", None)
     result = invoke("bench", "identify")
     assert result.exit_code == 2
-    assert "hint: pip install 'r2s2r[rig]'" in result.stderr
+    assert f"hint: pip install -e '{ROOT}[rig]'" in result.stderr
 
 
 @pytest.mark.parametrize(

@@ -168,16 +168,34 @@ def test_unpluggings_at_random_moments(protocol: str) -> None:
             assert isinstance(error, SafetyStop) or "stop" in error.received.lower() or "handshake" in error.where
 
 
-def test_the_library_of_the_guide_works() -> None:
-    """The Python block of docs/guides/connect.md, as it stands there, drives the rig to a target."""
-    page = (Path(__file__).parents[2] / "docs" / "guides" / "connect.md").read_text()
+def _guide(name: str) -> dict[str, Any]:
+    """What the first Python block of a guide defines."""
+    page = (Path(__file__).parents[2] / "docs" / "guides" / name).read_text()
     found = re.search(r"^```python\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL)
     assert found is not None
     names: dict[str, Any] = {}
     exec(found[1], names)  # the guide is ours
+    return names
+
+
+def test_the_library_of_the_guide_works() -> None:
+    """The Python block of docs/guides/connect.md, as it stands there, drives the rig to a target."""
     robot = calibrated()
     with running_rig(robot) as rig:
-        length = names["to_target"](rig.address, robot, TARGET)
+        length = _guide("connect.md")["to_target"](rig.address, robot, TARGET)
         assert not rig.truth()[1].any()
     position = (length[:6] - robot.pid.min_length_m) / robot.pid.range_m
     assert np.abs(position - TARGET).max() < 1.5 * robot.pid.tolerance
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_the_script_of_the_guide_finds_a_wrong_sign(protocol: str) -> None:
+    """The script of docs/guides/record.md: every motor shortens its own cable, but the one whose sign is wrong."""
+    robot = calibrated()
+    wrong = robot.motors[2].model_copy(update={"sign": -robot.motors[2].sign})
+    told = robot.model_copy(update={"motors": (*robot.motors[:2], wrong, *robot.motors[3:])})
+    with running_rig(robot, protocol=protocol) as rig:
+        found = np.array(list(_guide("record.md")["changes"](rig.address, told, protocol)))
+    own = np.diag(found)
+    assert (np.delete(own, 2) < -0.005).all() and own[2] > 0.005, own
+    assert (np.abs(found).argmax(axis=1) == np.arange(len(own))).all()

@@ -1,10 +1,11 @@
 """Drag of a tether.
 
 What it is: a cable to a power supply or a safety line pulls the robot towards its anchor.
-Where it acts: channel world; a force of constant size towards a fixed point, shared equally by the rods.
-Parameters: force_n; anchor_x_m, anchor_y_m, anchor_z_m, place of the anchor.
-What it looks like in data: a drift towards one point of the room, whose direction turns as the robot moves on.
-What it is confused with: ground_slope (whose direction stays).
+Where it acts: channel world; a force of constant size towards a fixed point, at the centre of mass of its rod.
+Parameters: force_n of each rod; anchor_x_m, anchor_y_m, anchor_z_m, place of the anchor.
+What it looks like in data: a drift towards one point of the room, whose direction turns as the robot moves on; the rod
+leads the others.
+What it is confused with: ground_slope (whose direction stays, and which pulls all rods alike), payload.
 Source: statics; diagnosis.md catalogue E3.
 """
 
@@ -27,7 +28,7 @@ class TetherDrag(Effect):
     channel = Channel.WORLD
     title = "drag of a tether"
     own = (
-        EffectParameter("force_n", "N", 0.0, 0.5, off=0.0, scale=0.15, what="of the tether, on the whole robot"),
+        EffectParameter("force_n", "N", 0.0, 0.5, off=0.0, scale=0.15, what="of the tether", per="rod"),
         EffectParameter("anchor_x_m", "m", -3.0, 3.0, off=1.0, scale=1.0, what="of the anchor"),
         EffectParameter("anchor_y_m", "m", -3.0, 3.0, off=0.0, scale=1.0, what="of the anchor"),
         EffectParameter("anchor_z_m", "m", 0.0, 3.0, off=0.5, scale=0.5, what="of the anchor"),
@@ -37,12 +38,11 @@ class TetherDrag(Effect):
     @classmethod
     def signature(cls) -> str:
         """What it looks like in data."""
-        return "drift towards one point of the room, whatever the gait"
+        return "drift towards one point of the room, one rod ahead, whatever the gait"
 
     def world(self, x: Values, terms: WorldTerms, force: Tensor, torque: Tensor) -> tuple[Tensor, Tensor]:
         """The pull on every rod."""
-        rods = terms.p_GB.shape[1]
         anchor = torch.stack([x["anchor_x_m"], x["anchor_y_m"], x["anchor_z_m"]], dim=-1)
         way = anchor - terms.p_GB
         distance = torch.sqrt((way * way).sum(-1, keepdim=True) + NEAR * NEAR)
-        return force + x["force_n"][..., None] / rods * way / distance, torque
+        return force + x["force_n"][..., None] * way / distance, torque

@@ -10,7 +10,7 @@ from torch import Tensor
 from r2s2r_cli.engine.body import Bodies, angular_change
 from r2s2r_cli.engine.hooks import CableTerms, overrides
 from r2s2r_cli.engine.parameters import Parameters
-from r2s2r_cli.engine.state import State, cable_ends
+from r2s2r_cli.engine.state import cable_ends
 from r2s2r_cli.engine.structure import Structure
 
 
@@ -60,26 +60,17 @@ def spread(structure: Structure, winched: Tensor, passive: Tensor) -> Tensor:
     return both[:, [place[k] for k in range(structure.n_cables)]]
 
 
-def drawn(structure: Structure, theta: Parameters, state: State) -> Tensor:
-    """How fast the winches shorten the rest lengths [m/s], (B, cable): nothing where they are at their ends."""
-    inward = state.winding > 0
-    stopped = torch.where(inward, state.rest <= theta.rest_min, state.rest >= theta.rest_max)
-    moving = torch.where(stopped, torch.zeros_like(state.winding), state.winding)
-    return spread(structure, moving, torch.zeros_like(theta.rest))
-
-
-def spring_force(
-    structure: Structure, theta: Parameters, rows: CableRows, rest: Tensor, drawn: Tensor | None = None
-) -> CableTerms:
-    """Stretch and spring force, sensor tendons not included. Slack cables have no force. drawn: see CableTerms."""
+def spring_force(structure: Structure, theta: Parameters, rows: CableRows, rest: Tensor) -> CableTerms:
+    """Stretch and spring force, sensor tendons not included. Slack cables have no force."""
     stretch = rows.length - rest
     pull, tangent = theta.stiffness * stretch, theta.stiffness
     if structure.cubic:
         pull = stretch * (theta.stiffness + stretch * (theta.stiffness2 + stretch * theta.stiffness3))
         tangent = tangent + stretch * (2.0 * theta.stiffness2 + stretch * (3.0 * theta.stiffness3))
-    drawn = torch.zeros_like(stretch) if drawn is None else drawn
     force = torch.where(stretch > 0, pull, torch.zeros_like(pull))
-    return CableTerms(stretch, rows.rate, force, drawn, tangent.expand_as(stretch))
+    winched = stretch.new_zeros(len(stretch), structure.n_actuated)
+    passive = spread(structure, winched, torch.ones_like(theta.rest))
+    return CableTerms(stretch, rows.rate, force, tangent.expand_as(stretch), passive)
 
 
 def tension_impulse(

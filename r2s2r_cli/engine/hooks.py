@@ -38,15 +38,14 @@ class Channel(StrEnum):
 @dataclass(frozen=True)
 class CableTerms:
     """All cables at the start of a step. stretch: beyond the rest length [m], (B, cable); negative: slack.
-    rate: of the length between the attachment points [m/s]. force: of the spring [N], 0 where slack. drawn: how fast
-    its winch shortens the rest length [m/s], 0 without a winch and where the winch is at its end. stiffness:
-    of the spring where it is now, tangent [N/m]."""
+    rate: of the length between the attachment points [m/s]. force: of the spring [N], 0 where slack. stiffness:
+    of the spring where it is now, tangent [N/m]. passive: 1 where no winch winds it, else 0."""
 
     stretch: Tensor
     rate: Tensor
     force: Tensor
-    drawn: Tensor
     stiffness: Tensor
+    passive: Tensor
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from r2s2r_cli.engine.body import angular_change, bodies, gyroscopic
-from r2s2r_cli.engine.cable import cable_rows, drawn, pulled, rest_lengths, spring_force, tension_impulse
+from r2s2r_cli.engine.cable import cable_rows, pulled, rest_lengths, spring_force, tension_impulse
 from r2s2r_cli.engine.centred import centred, weighed
 from r2s2r_cli.engine.contact import contact_rows
 from r2s2r_cli.engine.friction_solve import solve
@@ -41,7 +41,7 @@ def read(structure: Structure, theta: Parameters, state: State, h: float = 1e-3)
     rods = bodies(theta, state, axial=structure.axial)
     rows = cable_rows(structure, theta, rods)
     rest = rest_lengths(structure, theta, state.rest)
-    terms = spring_force(structure, theta, rows, rest, drawn(structure, theta, state) if structure.effects else None)
+    terms = spring_force(structure, theta, rows, rest)
     force = terms.force
     for effect in structure.effects:
         force, _ = effect.cable(theta.of(effect.name), memory[effect.name], replace(terms, force=force), dt)

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from r2s2r_cli.engine.body import Bodies, angular_change, bodies, gyroscopic, moved
-from r2s2r_cli.engine.cable import cable_rows, drawn, pulled, rest_lengths, spring_force, tension_impulse
+from r2s2r_cli.engine.cable import cable_rows, pulled, rest_lengths, spring_force, tension_impulse
 from r2s2r_cli.engine.centred import centred, returned
 from r2s2r_cli.engine.contact import contact_rows, pose_velocity
 from r2s2r_cli.engine.friction_solve import solve
@@ -39,8 +39,7 @@ def step(structure: Structure, theta: Parameters, state: State, u: Tensor, h: Te
         u, memory[effect.name] = effect.command(theta.of(effect.name), memory[effect.name], u, h)
 
     rows = cable_rows(structure, theta, rods)
-    winding_in = drawn(structure, theta, state) if structure.effects else None
-    terms = spring_force(structure, theta, rows, rest_lengths(structure, theta, state.rest), winding_in)
+    terms = spring_force(structure, theta, rows, rest_lengths(structure, theta, state.rest))
     force = terms.force
     for effect in structure.effects:
         force, memory[effect.name] = effect.cable(

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 NONE, UNKNOWN = "none", "unknown"
-NO_REPLAY = ("dropout",)
-"""Effects that change no prediction, only what is missing (a test holds it to that of `diagnose`)."""
+NO_REPLAY = ("camera_pose", "dropout")
+"""Effects that change no prediction, only what is seen or missing (a test holds it to that of `diagnose`)."""
 WEAK, CLEAR = 3.0, 8.0
 """Bounds of d between what lies under the floor, weak, and clear."""
 

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from schemas.robot import Robot
+
+if TYPE_CHECKING:
+    from r2s2r_cli.stages.diagnose.parity.knocks import Knock
 
 KINDS = ("cable", "cap", "rod", "motor", "sensor", "place", "world", "camera")
 """Kinds of elements, as `diagnose --json` has them."""
@@ -90,13 +94,14 @@ class Mismatch:
 class Parity:
     """findings: every quantity that could be measured, strongest first. mismatches: settings; with one, nothing else
     is to be believed. missing: what could not be looked at, and why. differential: whether healthy runs were there.
-    level: false discovery rate at which findings count as `significant`."""
+    level: false discovery rate at which findings count as `significant`. knock: of the camera, the largest."""
 
     findings: tuple[Finding, ...]
     mismatches: tuple[Mismatch, ...] = ()
     missing: tuple[str, ...] = ()
     differential: bool = False
     level: float = 0.05
+    knock: Knock | None = None
 
     @property
     def significant(self) -> tuple[Finding, ...]:

@@ -51,7 +51,7 @@ def parity(evidence: Evidence, *, level: float = 0.05) -> Parity:
         missing += [f"in healthy runs, {what}" for what in base.missing]
     findings = [one for key, value in first.of.items() if (one := finding_of(key, value, base, first)) is not None]
     findings.sort(key=lambda one: -abs(one.z))
-    return Parity(tuple(findings), (), tuple(missing), base is not None, level)
+    return Parity(tuple(findings), (), tuple(missing), base is not None, level, first.knock)
 
 
 def _scale(found: Quantities, base: Quantities | None) -> float:
@@ -102,6 +102,8 @@ def finding_of(key: Key, value: Measured, base: Quantities | None, found: Quanti
     against = "in healthy runs" if differential else "as built"
     what = f"{scale.words.format(element=element.words())} is {value.value:.4g} {scale.unit}".removesuffix(" 1")
     what += f", {expected.value:.4g} {against}"
+    if check == "knock" and found.knock is not None:
+        what += f"; at {found.knock.t:.2f} s of {found.knock.run} they move by {1e3 * found.knock.whole:.0f} mm"
     return Finding(
         check, element, float(value.value), float(value.sd), scale.unit, float(expected.value), float(expected.sd),
         differential, z, math.erfc(abs(z) / math.sqrt(2)), what, suspected,

@@ -9,6 +9,7 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Run
 from r2s2r_cli.stages.diagnose.parity.heights import heights
+from r2s2r_cli.stages.diagnose.parity.knocks import Knock, knock
 from r2s2r_cli.stages.diagnose.parity.lengths import sensor_parity
 from r2s2r_cli.stages.diagnose.parity.rods import lost, rod_scales
 from r2s2r_cli.stages.diagnose.parity.series import Measured, Series, combined, series
@@ -25,13 +26,14 @@ Key = tuple[str, str, int | None]
 class Quantities:
     """of: measured numbers. gain: of every winch law, in nats, over winches that have the
     lag they were said to have. lag: that they have [s]. missing: what could not be looked at. about: length at
-    which every sensor's bias was taken [m], (cable,)."""
+    which every sensor's bias was taken [m], (cable,). knock: of the camera."""
 
     of: dict[Key, Measured]
     gain: dict[str, float]
     lag: float
     missing: tuple[str, ...]
     about: np.ndarray
+    knock: Knock | None = None
 
 
 def quantities(
@@ -49,6 +51,9 @@ def quantities(
     found["camera_scale", "camera", None] = shown
     found["dropout", "camera", None] = lost(plain)
     all_of = plain if scale == 1.0 else tuple(series(run, robot, scale) for run in runs)
+    knocked = knock(all_of)
+    if knocked is not None:
+        found["knock", "camera", None] = knocked.size
     sensors = sensor_parity(all_of)
     about = np.full(len(robot.cables), np.nan)
     if sensors is None:
@@ -78,11 +83,12 @@ def quantities(
         fitted = fit_winches(data, len(robot.actuated), speed, given={"lag": own})
     if fitted is None:
         missing.append("winches: no cable was seen to wind long enough while it was taut")
-        return Quantities(found, {}, own, tuple(missing), about)
+        return Quantities(found, {}, own, tuple(missing), about, knocked)
     found.update(_rates(fitted, speed))
     for name, law in fitted.laws.items():
         found[name, "motor", None] = Measured(law.size, law.sd)
-    return Quantities(found, {name: law.gain for name, law in fitted.laws.items()}, own, tuple(missing), about)
+    return Quantities(found, {name: law.gain for name, law in fitted.laws.items()}, own, tuple(missing), about,
+                      knocked)  # fmt: skip
 
 
 def _ramps(runs: tuple[Series, ...], robot: Robot, speed: float) -> Ramps | None:

@@ -9,6 +9,9 @@ from r2s2r_cli.stages.diagnose.parity.finding import Suspicion
 
 USUAL_N = 5.0
 """[N] of an actuated cable at the robot's usual tension: what turns a loss at that tension into a loss per newton."""
+TILT = 0.25
+"""Share of a tilt that speaks for the camera: what a robot does on a slope the replay can tell, and what it does before
+a camera that leans it cannot, so that the camera is left with what the slope does not gain. By hand."""
 
 Sizes = Callable[[float, int | None], tuple[Suspicion, ...]]
 
@@ -33,8 +36,9 @@ _OF: dict[str, Sizes] = {
     "sensor_gain": lambda d, k: (Suspicion("sensor_gain", _indexed("gain", k, 1 + d)),
                                  Suspicion("sensor_bias", {}, 0.3)),
     "sensor_drift": lambda d, k: (Suspicion("sensor_bias", {}, 0.8),),
-    "slope_x": lambda d, k: (Suspicion("ground_slope", {"angle_x_rad": d}), Suspicion("camera_pose", {}, 0.7)),
-    "slope_y": lambda d, k: (Suspicion("ground_slope", {"angle_y_rad": d}), Suspicion("camera_pose", {}, 0.7)),
+    "slope_x": lambda d, k: (Suspicion("ground_slope", {"angle_x_rad": d}), Suspicion("camera_pose", {}, TILT)),
+    "slope_y": lambda d, k: (Suspicion("ground_slope", {"angle_y_rad": d}), Suspicion("camera_pose", {}, TILT)),
+    "knock": lambda d, k: (Suspicion("camera_pose", {}),),
     "slope_change": lambda d, k: (Suspicion("camera_pose", {}), Suspicion("ground_slope", {}, 0.3)),
     "cap_height": lambda d, k: (Suspicion("cap_radius", _indexed("change_m", k, 1.5 * d)),),
     "winch_speed": lambda d, k: (

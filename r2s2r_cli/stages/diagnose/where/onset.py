@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Run
+from r2s2r_cli.stages.diagnose.parity.knocks import Knock
 from r2s2r_cli.stages.diagnose.where.found import Onset, SegmentGap
 from r2s2r_cli.stages.diagnose.where.place import TOUCHES_M
 
@@ -81,6 +82,18 @@ def reached(
             interval = int(np.searchsorted(caps.intervals.first, frames[0], side="right"))
             return Onset(before + interval - 1, caps.name, interval, gain, 0.0)
         before += len(caps.intervals)
+    return None
+
+
+def knocked(runs: Sequence[Run], knock: Knock, gain: float) -> Onset | None:
+    """The target interval in which the camera was knocked. gain: what speaks for it [nats]. None: before the first."""
+    before = 0
+    for run in runs:
+        if run.caps.name == knock.run:
+            frame = int(np.searchsorted(run.caps.t, knock.t))
+            interval = int(np.searchsorted(run.caps.intervals.first, frame, side="right"))
+            return Onset(before + interval - 1, knock.run, interval, gain, 0.0) if interval else None
+        before += len(run.caps.intervals)
     return None
 
 

@@ -13,7 +13,7 @@ from r2s2r_cli.stages.diagnose.parity.finding import Element, Parity, discoverie
 from r2s2r_cli.stages.diagnose.where.channels import ENOUGH_NATS, explained, fitted, gains, held_out, sizes
 from r2s2r_cli.stages.diagnose.where.columns import Design, design
 from r2s2r_cli.stages.diagnose.where.found import Onset, PlaceMap, ProbeGain, SegmentGap, Where
-from r2s2r_cli.stages.diagnose.where.onset import onset, reached
+from r2s2r_cli.stages.diagnose.where.onset import knocked, onset, reached
 from r2s2r_cli.stages.diagnose.where.place import place_map
 from r2s2r_cli.stages.diagnose.where.readings import readings
 from r2s2r_cli.stages.diagnose.which.arena import Arena
@@ -81,7 +81,7 @@ def where(
     told("where", 3, 3)
     return Where(
         segments=segments,
-        onset=_onset(evidence, segments, None if best is None else by_channel[best.probe], compared, seed),
+        onset=_onset(evidence, segments, None if best is None else by_channel[best.probe], compared, seed, found),
         readings=readings(arena, made, seed),
         probes=tuple(probes),
         channel=None if best is None else best.channel,
@@ -95,8 +95,9 @@ def where(
 
 
 def _onset(
-    evidence: Evidence, segments: tuple[SegmentGap, ...], gain: np.ndarray | None, compared: Compared | None, seed: int
-) -> Onset | None:
+    evidence: Evidence, segments: tuple[SegmentGap, ...], gain: np.ndarray | None, compared: Compared | None, seed: int,
+    found: Parity | None,
+) -> Onset | None:  # fmt: skip
     """gain: of the best probe, (segment,) [nats]; None: no probe explains anything."""
     which = None if compared is None else compared.which
     best = None if which is None else which.best
@@ -105,6 +106,8 @@ def _onset(
     if which.verdict == "no_gap":
         return None
     mine = next((k for k, fit in enumerate(compared.fits) if fit.hypothesis.effects == (best.effect,)), None)
+    if best.effect == "camera_pose" and found is not None and found.knock is not None:
+        return knocked(evidence.runs, found.knock, found.nats()[best.effect].get(None, 0.0))
     if mine is None:
         return None  # what the logs alone show is there throughout
     by_name = compared.scores[mine].elpd - compared.refit.elpd

@@ -22,8 +22,9 @@ SAME_AS_NUISANCE = ("motor_speed_mismatch", "cap_friction", "tendon_stiffness", 
 """Effects that are a nuisance where all elements have them alike."""
 PASSIVE_ONLY = ("tendon_set",)
 """Effects that a winch makes up for: nobody sees what the rest length of a winched cable is off by."""
-NO_REPLAY = ("dropout",)
-"""Effects that change no prediction, only what is missing: the parity stage sees them."""
+NO_REPLAY = ("camera_pose", "dropout")
+"""Effects that change no prediction, only what is seen or missing: intervals begin where the camera saw the robot, so
+that one which was moved is seen where it was. The parity stage sees both."""
 PARTS = {
     "friction_field": (("gradient_x_per_m", "gradient_y_per_m"),
                        ("patch_factor", "patch_x_m", "patch_y_m", "patch_radius_m")),

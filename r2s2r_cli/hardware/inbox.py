@@ -6,7 +6,7 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.devices.link import LinkError, LinkState, Sample
-from r2s2r_cli.hardware.codec.base import Ack, Beat, Corrupt, DeviceState, Event, Greeting, Reading, Status
+from r2s2r_cli.hardware.codec.base import Ack, Beat, Corrupt, DeviceState, Event, Greeting, LockStep, Reading, Status
 from r2s2r_cli.hardware.handshake import CODES
 from r2s2r_cli.hardware.transport import Message
 from r2s2r_cli.hardware.wiring import Picture, Wiring
@@ -59,6 +59,8 @@ class Inbox:
                 numbers.greeted(event.seq)
             elif not numbers.new(event.seq, event.board if isinstance(event, Reading) else None):
                 return None
+        if isinstance(event, LockStep):  # how often it is said the wall's clock decides
+            return event
         tally.received += 1
         match event:
             case Reading():

@@ -19,6 +19,8 @@ STEP_S = 0.002
 SUBSTEPS = 5
 """Parts of a tick in lock-step: how finely watchdog and wire see it."""
 _ANNOUNCE_S = 0.2
+_SILENT_S = 1.0
+"""[s] of the wall's clock in which nothing is heard: another host may have come, unseen, as the last one went."""
 
 
 class Machine(Motors, Protocol):
@@ -40,8 +42,7 @@ class Server:
         self._gone = [fault for fault in world.faults if isinstance(fault, LinkGone)]
         self._stalled = [fault for fault in world.faults if isinstance(fault, LinkStalled)]
         self._torn = False
-        self._announced = -np.inf
-        self._last_tick = 0
+        self._announced = self._heard = -np.inf
         self.latest_s = 0.0
         """The longest that the loop was behind the wall's clock [s]."""
 
@@ -82,9 +83,13 @@ class Server:
                 if k is not None:
                     self._tick(clock, k, arrival.board or 0)
         now = time.monotonic()
-        if self._port.transport.connected and not clock.started and now - self._announced >= _ANNOUNCE_S:
+        if arrivals:
+            self._heard = now
+        stream = self._port.transport.stream
+        waited_for = not clock.started or (stream and now - self._heard >= _SILENT_S)
+        if self._port.transport.connected and waited_for and now - self._announced >= _ANNOUNCE_S:
             self._announced = now
-            lines = self._codec.announce(clock.us, clock.t, first=not self._port.transport.stream)
+            lines = self._codec.announce(clock.us, clock.t, first=not stream)
             self._port.send(lines, clock.t)
 
     def _in_order(self, t: float) -> list[Arrival]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import re
 import threading
@@ -166,6 +167,22 @@ def test_unpluggings_at_random_moments(protocol: str) -> None:
             error = caught.value
             assert address in error.where and error.exit_code == 5 and error.hint
             assert isinstance(error, SafetyStop) or "stop" in error.received.lower() or "handshake" in error.where
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS[:2])
+def test_a_host_that_follows_another_unseen_is_answered(protocol: str) -> None:
+    """The port is closed and opened again between two looks at it: as if somebody had held it open meanwhile. A rig in
+    lock-step that waits for the first host's next tick would wait for ever."""
+    robot = calibrated()
+    with running_rig(robot, protocol=protocol) as rig:
+        with open_link(rig.address, robot, protocol=protocol) as link:
+            follow(link, robot, TARGET, 0.1)
+            held = os.open(rig.address, os.O_RDWR | os.O_NOCTTY)
+        try:
+            with open_link(rig.address, robot, protocol=protocol) as link:
+                assert len(follow(link, robot, TARGET, 0.1)) > 0
+        finally:
+            os.close(held)
 
 
 def _guide(name: str) -> dict[str, Any]:

@@ -159,6 +159,17 @@ class RunConfig(Frozen):
     diagnose: DiagnoseSettings = DiagnoseSettings()
 
 
+class LinkSettings(Frozen):
+    """Where the robot is, for the commands that move it: what `--port` and `--protocol` say goes before it."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
+    port: str = ""
+    """The robot's /dev/ttyUSB0, socket://HOST:PORT or udp://HOST:PORT; empty: --port names it every time."""
+    protocol: Literal["checked", "boards", "legacy"] = "checked"
+    """How it talks: checked is that of the virtual robot, legacy and boards are those of the authors' robots."""
+
+
 class ProjectFile(RunConfig):
     """`project.toml`."""
 
@@ -166,3 +177,4 @@ class ProjectFile(RunConfig):
     name: Annotated[str, Field(min_length=1)]
     robot: str = "robot.toml"
     """Path of the robot description, relative to the project."""
+    link: LinkSettings = LinkSettings()

@@ -31,8 +31,9 @@ def ports(
         str | None, typer.Argument(metavar="[PORT]", help="Device, socket://HOST:PORT or udp://HOST:PORT of a robot.")
     ] = None,
     protocol: Annotated[
-        str, typer.Option("--protocol", help="checked (ours), boards or legacy (the authors').")
-    ] = "checked",
+        str | None,
+        typer.Option("--protocol", help="checked (ours), boards or legacy (the authors'). Default: project.toml."),
+    ] = None,
     seconds: Annotated[
         float, typer.Option("--seconds", min=0.1, max=600, help="How long to listen to the robot; motors are off.")
     ] = 3.0,
@@ -51,10 +52,12 @@ def ports(
     if port is None:
         probes = list(machine())
     else:
+        from r2s2r_cli.commands.robot_link import link_of
         from r2s2r_cli.store.project import Project
 
-        robot = Project.find(project).robot()
-        probes = list(_robot(robot, _listen(robot, port, protocol, seconds, reset)))
+        here = Project.find(project)
+        link, robot = link_of(here, port, protocol), here.robot()
+        probes = list(_robot(robot, _listen(robot, port, link.protocol, seconds, reset)))
     console.document(DoctorResult(probes=tuple(probes)))
     console.table("", ["what", "state", "found"], [[p.name, p.state, p.found] for p in probes])
     for hint in dict.fromkeys(probe.hint for probe in probes if probe.hint):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from r2s2r_cli.commands.record import Protocol
+from r2s2r_cli.commands.robot_link import PortOption, ProtocolOption, link_of
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.options import (
@@ -37,13 +37,8 @@ def execute(
             show_default=False,
         ),
     ] = None,
-    port: Annotated[
-        str | None,
-        typer.Option("--port", metavar="PORT", help="The robot: /dev/ttyUSB0, socket://HOST:PORT or udp://HOST:PORT."),
-    ] = None,
-    protocol: Annotated[
-        Protocol, typer.Option("--protocol", help="How it talks; only `checked` stops by itself.")
-    ] = Protocol.CHECKED,
+    port: PortOption = None,
+    protocol: ProtocolOption = None,
     camera: Annotated[
         str | None,
         typer.Option(
@@ -93,7 +88,7 @@ def execute(
     here = Project.find(project)
     place = here.iteration(iteration)
     overrides = parse_overrides(set_, "record")
-    robot = here.robot()
+    robot, link = here.robot(), link_of(here, port, protocol)
     chosen, inputs = _chosen(here, place, policies or [])
     settings = here.config(place, overrides).record
     runs = plans(chosen, repeats=repeats, rest=settings.rest_s)
@@ -103,10 +98,10 @@ def execute(
         require_input(numbers, "r2s2r identify")
         inputs = [*inputs, artifact_ref(here, numbers, whole_header(numbers))]
     wish = Wish(
-        project=here, iteration=place, robot=robot, runs=runs, settings=settings, port=port or "",
-        protocol=protocol.value, camera=camera, simulated=simulated, overrides=overrides,
+        project=here, iteration=place, robot=robot, runs=runs, settings=settings, port=link.port or "",
+        protocol=link.protocol, camera=camera, simulated=simulated, overrides=overrides,
         flags={
-            "policies": _stored(here, policies or ()), "port": port, "protocol": protocol.value,
+            "policies": _stored(here, policies or ()), "port": link.port, "protocol": link.protocol,
             "camera": stored_camera(here, camera), "repeats": repeats, "simulated": simulated,
             "model": None if numbers is None else here.relative(numbers),
         },
@@ -118,9 +113,10 @@ def execute(
     if dry_run:
         look(wish, console)
         return
-    if port is None:
+    if link.port is None:
         raise UsageError("no robot is named", where="--port", expected="a device, socket://HOST:PORT or udp://HOST:PORT",
-                         received="nothing", hint="r2s2r doctor")  # fmt: skip
+                         received="nothing",
+                         hint="r2s2r doctor ports   # then --port, or link.port in project.toml")  # fmt: skip
     if not yes:
         _ask(console)
     carry_out(wish, console)

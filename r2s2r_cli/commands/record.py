@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from r2s2r_cli.commands.robot_link import PortOption, ProtocolOption, link_of
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.options import (
@@ -27,14 +28,6 @@ if TYPE_CHECKING:
     from schemas.robot import Robot
 
 
-class Protocol(StrEnum):
-    """What `--protocol` takes."""
-
-    CHECKED = "checked"
-    BOARDS = "boards"
-    LEGACY = "legacy"
-
-
 class Excitation(StrEnum):
     """What `--excite` takes."""
 
@@ -50,13 +43,8 @@ def record(
         list[str] | None,
         typer.Argument(help="Policies: a TOML file, an artifact, or ARTIFACT.h5:NAME.", show_default=False),
     ] = None,
-    port: Annotated[
-        str | None,
-        typer.Option("--port", metavar="PORT", help="The robot: /dev/ttyUSB0, socket://HOST:PORT or udp://HOST:PORT."),
-    ] = None,
-    protocol: Annotated[
-        Protocol, typer.Option("--protocol", help="How it talks; only `checked` stops by itself.")
-    ] = Protocol.CHECKED,
+    port: PortOption = None,
+    protocol: ProtocolOption = None,
     camera: Annotated[
         str | None,
         typer.Option(
@@ -111,27 +99,28 @@ def record(
     if show_config:
         print_config("record", wanted(here, place, "record", overrides, {}).settings, console)
         return
-    robot = here.robot()
+    robot, link = here.robot(), link_of(here, port, protocol)
     sets = tuple(one.value for one in excite or ())
     chosen = _policies(robot, policies or [], random, levels, seed, sets)
     settings = here.config(place, overrides).record
     runs = plans(chosen, repeats=repeats, rest=settings.rest_s)
     flags = {
-        "policies": stored_names(here, policies or ()), "port": port, "protocol": protocol.value,
+        "policies": stored_names(here, policies or ()), "port": link.port, "protocol": link.protocol,
         "camera": stored_camera(here, camera), "random": random, "levels": levels,
         "excite": list(sets), "repeats": repeats, "simulated": simulated,
     }  # fmt: skip
     wish = Wish(
-        project=here, iteration=place, robot=robot, runs=runs, settings=settings, port=port or "",
-        protocol=protocol.value, camera=camera, simulated=simulated, overrides=overrides, flags=flags,
+        project=here, iteration=place, robot=robot, runs=runs, settings=settings, port=link.port or "",
+        protocol=link.protocol, camera=camera, simulated=simulated, overrides=overrides, flags=flags,
         seed=None if random is None else seed, draw=draw, force=force,
     )  # fmt: skip
     if dry_run:
         look(wish, console)
         return
-    if port is None:
+    if link.port is None:
         raise UsageError("no robot is named", where="--port", expected="a device, socket://HOST:PORT or udp://HOST:PORT",
-                         received="nothing", hint="r2s2r doctor ports")  # fmt: skip
+                         received="nothing",
+                         hint="r2s2r doctor ports   # then --port, or link.port in project.toml")  # fmt: skip
     carry_out(wish, console)
 
 

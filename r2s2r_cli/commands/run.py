@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from r2s2r_cli.commands.record import Protocol
+from r2s2r_cli.commands.robot_link import PortOption, ProtocolOption, link_of
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ExitCode, Interrupted, R2S2RError, UsageError
 from r2s2r_cli.options import DrawOption, DryRunOption, IterationOption, ProjectOption, QuietOption
@@ -43,11 +43,8 @@ def run(
         list[Path] | None,
         typer.Argument(help="Logs to import instead of recording.", show_default=False),
     ] = None,
-    port: Annotated[
-        str | None,
-        typer.Option("--port", metavar="PORT", help="The robot: /dev/ttyUSB0, socket://HOST:PORT or udp://HOST:PORT."),
-    ] = None,
-    protocol: Annotated[Protocol, typer.Option("--protocol", help="How it talks.")] = Protocol.CHECKED,
+    port: PortOption = None,
+    protocol: ProtocolOption = None,
     camera: Annotated[
         str | None, typer.Option("--camera", metavar="CAMERA", help="realsense[:SERIAL], open3d or rig://HOST:PORT.")
     ] = None,
@@ -84,7 +81,10 @@ def run(
     if until not in STAGES:
         raise UsageError("there is no such stage", where="--until", expected=" | ".join(STAGES), received=until,
                          hint=f"r2s2r run --until {STAGES[-1]}")  # fmt: skip
-    robot: tuple[str, ...] = () if port is None else ("--port", port, "--protocol", protocol.value)
+    # Whoever imports a log named no robot, and none is to move by surprise.
+    link = link_of(here, port, protocol)
+    asked = port or (None if source else link.port)
+    robot: tuple[str, ...] = () if asked is None else ("--port", asked, "--protocol", link.protocol)
     robot += () if camera is None else ("--camera", camera)
     names = tuple(policy or ())
     steps = list(_steps(here, place, tuple(source or ()), robot, (random, seed), names, repeats, yes=yes))

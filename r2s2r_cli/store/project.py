@@ -22,7 +22,7 @@ MAX_ITERATION = 9999
 """A larger number is a slip of the finger that would become "the latest"."""
 ITERATIONS = "iterations"
 JOURNAL_SUFFIX = ".journal"
-_HEAD_KEYS = ("schema_version", "name", "robot")
+_HEAD_KEYS = ("schema_version", "name", "robot", "link")
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import textwrap
 
 from pydantic import BaseModel
 
-from schemas.config import ProjectFile, RunConfig
+from schemas.config import LinkSettings, ProjectFile, RunConfig
 
 _HEAD = """\
 # Project settings of r2s2r. An iteration may override them in iterations/NNN/config.toml,
@@ -22,13 +22,14 @@ def project_toml(name: str) -> str:
     document["schema_version"] = 1
     document["name"] = name
     document["robot"] = "robot.toml"
-    for key, field in RunConfig.model_fields.items():
-        default = field.get_default(call_default_factory=True)
+    sections = {field.alias or key: field.get_default(call_default_factory=True)
+                for key, field in RunConfig.model_fields.items()}  # fmt: skip
+    for key, default in {"link": LinkSettings(), **sections}.items():
         section = tomlkit.table()
         _fill(section, default)
         if section:
             document.add(tomlkit.nl())
-            document[field.alias or key] = section
+            document[key] = section
     text = tomlkit.dumps(document)
     ProjectFile.model_validate(document.unwrap())
     return text

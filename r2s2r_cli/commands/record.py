@@ -120,7 +120,7 @@ def record(
     if link.port is None:
         raise UsageError("no robot is named", where="--port", expected="a device, socket://HOST:PORT or udp://HOST:PORT",
                          received="nothing",
-                         hint="r2s2r doctor ports   # what to name, each time or as link.port in project.toml")  # fmt: skip
+                         hint="r2s2r doctor ports   # what to name, or set as link.port in project.toml")  # fmt: skip
     carry_out(wish, console)
 
 

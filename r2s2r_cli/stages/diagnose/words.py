@@ -12,6 +12,13 @@ if TYPE_CHECKING:
 SPELLED = 4
 """Names that a sentence holds; of more it says how many there are."""
 
+_SEEN = "That changes what is seen, not what the robot does, so there is nothing to simulate"
+ADVICE = {
+    "camera_pose": f"{_SEEN}: set the camera up anew, and leave out what was recorded since.",
+    "dropout": f"{_SEEN}: look for what hides the caps or loses frames.",
+}
+"""Of effects that change no prediction: what to do."""
+
 
 def sentence(found: Diagnosis) -> str:
     """`The gap is caused by payload at rod 1 (p = 0.93): with it ...`."""
@@ -52,7 +59,10 @@ def _verdict(found: Diagnosis) -> str:
         return f"The gap has two causes, {' and '.join(which.effects)} (p = {which.probability:.2f})."
     anywhere = best.element is None or best.element.kind in ("world", "camera")
     element = "" if anywhere or best.element is None else f" at {best.element.words()}"
-    return f"The gap is caused by {best.effect}{element} (p = {which.probability:.2f})."
+    onset = None if found.where is None else found.where.onset
+    begins = "" if onset is None or onset.order == 0 else f", from interval {onset.interval} of {onset.run} on"
+    advice = f" {ADVICE[best.effect]}" if best.effect in ADVICE else ""
+    return f"The gap is caused by {best.effect}{element}{begins} (p = {which.probability:.2f}).{advice}"
 
 
 def _shrunk(found: Diagnosis) -> str:

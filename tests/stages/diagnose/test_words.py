@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from r2s2r_cli.stages.diagnose.parity.finding import Element
-from r2s2r_cli.stages.diagnose.words import sentence
+from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
+from r2s2r_cli.stages.diagnose.words import ADVICE, sentence
 
 
 def found(verdict: str, **changes: object) -> SimpleNamespace:
@@ -22,9 +23,11 @@ def found(verdict: str, **changes: object) -> SimpleNamespace:
               "no_gap": SimpleNamespace(rmse=0.012, upper=0.014)}  # fmt: skip
     if changes.pop("first", False):
         values["ranking"] = (best, SimpleNamespace(effect="none"))
+    where = SimpleNamespace(onset=changes.pop("onset", None))
     return SimpleNamespace(
-        which=SimpleNamespace(**{**values, **changes}), much=much, channel="mass", floor=SimpleNamespace(rmse=0.005)
-    )
+        which=SimpleNamespace(**{**values, **changes}), much=much, channel="mass", floor=SimpleNamespace(rmse=0.005),
+        where=where,
+    )  # fmt: skip
 
 
 SHRUNK = "key-frame error from 12.0 to 6.0 mm (floor 5.0), which closes 70 % (0 .. 90) of the gap above the floor"
@@ -83,3 +86,21 @@ def test_what_shrinks_nothing_is_not_praised(nominal: float, ends: str) -> None:
     said = sentence(one)  # type: ignore[arg-type]
     assert "the first of them, payload, takes the key-frame error from 12.0 to 12.5 mm" in said
     assert "best of them" not in said and said.endswith(ends)
+
+
+def test_when_it_began_is_said() -> None:
+    """Of what was not there from the first interval on."""
+    late = SimpleNamespace(order=7, run="g2", interval=2)
+    assert "payload at rod 1, from interval 2 of g2 on (p = 0.90)." in sentence(found("effect", onset=late))  # type: ignore[arg-type]
+    first = SimpleNamespace(order=0, run="g1", interval=1)
+    assert "payload at rod 1 (p = 0.90)." in sentence(found("effect", onset=first))  # type: ignore[arg-type]
+
+
+def test_every_effect_that_no_replay_tells_has_advice() -> None:
+    """There are no intervals to say how much it shrinks."""
+    assert set(ADVICE) == set(NO_REPLAY)
+    knocked = found("effect", effects=("camera_pose",), element=Element("camera"))
+    knocked.which.best.effect, knocked.much = "camera_pose", None
+    said = sentence(knocked)  # type: ignore[arg-type]
+    assert said.startswith("The gap is caused by camera_pose (p = 0.90). That changes what is seen")
+    assert said.endswith("set the camera up anew, and leave out what was recorded since.")

@@ -35,7 +35,7 @@ EXPECTED: dict[str, Expected] = {
     "slope_x": Expected("rad", 0.0, 0.005, 0.002, "the tilt about x of the plane on which the caps stand"),
     "slope_y": Expected("rad", 0.0, 0.005, 0.002, "the tilt about y of the plane on which the caps stand"),
     # Within a run nothing is compared with another day.
-    "knock": Expected("m", 0.0, 5e-4, 5e-4, "how far all caps are seen displaced at once, beyond the usual"),
+    "knock": Expected("m", 0.0, 5e-4, 5e-4, "how far the largest jump of all caps at once stands out from the next"),
     "slope_change": Expected("rad", 0.0, 0.01, 0.01, "the change of that tilt from run to run"),
     # A cap that is 3 mm off on a healthy robot does not stand: it hangs by its cables, hardly over the ground.
     "cap_height": Expected("m", 0.0, 0.001, 0.0002, "how much higher than the others {element} stands", 0.003),

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from r2s2r_cli.blind.score.facts import NO_REPLAY, NONE, UNKNOWN, Truth
+from r2s2r_cli.blind.score.facts import NO_GAP_FACTOR, NO_REPLAY, NONE, UNKNOWN, Truth
 from r2s2r_cli.errors import InputError
 
 LEAST_SETS = 12
@@ -80,7 +80,7 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
     chance = float(document["chance_nats"])
     score = [chance if row["effect"] == NONE else float(row["elpd_gain"]) for row in rows]
     upper, floor = document.get("refit_upper_m"), document["floor_m"]
-    equivalent = upper is not None and float(upper) < 1.25 * float(floor)
+    equivalent = upper is not None and float(upper) < NO_GAP_FACTOR * float(floor)
     parity = np.array([
         min(max(float(row.get("parity_nats", 0.0)) - BY_CHANCE, 0.0), np.inf if row["effect"] in NO_REPLAY else MOST)
         for row in rows

@@ -112,7 +112,7 @@ class Sweep:
                      self._known, self._known_sd, first, self._searched)  # fmt: skip
 
     def _backwards(self, first: int, start: np.ndarray) -> None:
-        back = self._started(float(self._source.t[first]), start, backwards=True)
+        back = self._started(float(self._source.t[first]), start)
         for frame in _between(self._source, first, 0):
             if self._look(back, frame):
                 self._again(back, frame.index, first)
@@ -120,7 +120,7 @@ class Sweep:
     def _again(self, forward: Forward, k: int, begun: int) -> None:
         """From frame k, in which caps were found again, back to frame `begun`: until nothing new is seen."""
         back = copy.deepcopy(forward)
-        back.start(float(self._source.t[k]), forward.p_WE, forward.cov_p, backwards=k > begun)
+        back.start(float(self._source.t[k]), forward.p_WE, forward.cov_p)
         for frame in _between(self._source, k, begun):
             back.predict(frame.t)
             look = self._see(back, frame)
@@ -129,9 +129,9 @@ class Sweep:
             if self._rows.better(frame.index, look):
                 self._rows.keep(frame.index, look, look.used)
 
-    def _started(self, t: float, p_WE: np.ndarray, *, backwards: bool = False) -> Forward:
+    def _started(self, t: float, p_WE: np.ndarray) -> Forward:
         forward = Forward(self._robot, self._settings, self._cable)
-        forward.start(t, p_WE, backwards=backwards)
+        forward.start(t, p_WE)
         return forward
 
     def _begin(self, frame: ImageFrame) -> np.ndarray | None:

@@ -16,6 +16,7 @@ from r2s2r_cli.stages.diagnose.which.pair_share import LEAST, TwoCauses, with_pa
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.verdict import verdict_of
+from r2s2r_cli.stages.measures.gap import NO_GAP_FACTOR
 
 BY = Calibration(commit=0.6, commit_unknown=0.7)
 CHANCE = 5.0
@@ -120,7 +121,7 @@ def test_between_look_alikes_that_both_stand_out_the_replay_decides() -> None:
     assert lag - late == pytest.approx(36.0)
     assert learned.score("motor_lag", 0.0, parity=4.0) == learned.score("motor_lag", 0.0)
     assert learned.score("dropout", 0.0, parity=36.0) == pytest.approx(learned.score("dropout", 0.0) + 4.5 * 32.0)
-    assert facts.NO_REPLAY == NO_REPLAY
+    assert (facts.NO_REPLAY, facts.NO_GAP_FACTOR) == (NO_REPLAY, NO_GAP_FACTOR)
     assert learned.score("motor_lag", 0.0, parity=9.0) - learned.score("motor_lag", 0.0) == pytest.approx(4.5 * 5.0)
 
 

@@ -73,10 +73,9 @@ class Forward:
         """Their covariances [m^2], (cap, 3, 3)."""
         return self.states.cov_p
 
-    def start(self, t: float, p_WE: np.ndarray, cov: np.ndarray | None = None, *, backwards: bool = False) -> None:
+    def start(self, t: float, p_WE: np.ndarray, cov: np.ndarray | None = None) -> None:
         """Begin (again) at labelled caps at rest or in slow motion, (cap, 3); cov (cap, 3, 3) [m^2], default 5 mm an
-        axis. backwards: time will run down. Offsets of sensors that are known already are kept."""
-        del backwards  # nothing depends on it: `States.go` goes either way
+        axis. Time may go either way from there. Offsets of sensors that are known already are kept."""
         body = self.body
         spread = np.tile(START_SD_M**2 * np.eye(3), (body.caps, 1, 1)) if cov is None else cov
         self.states.place(t, p_WE, spread)

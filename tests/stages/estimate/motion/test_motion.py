@@ -144,7 +144,7 @@ def test_filter_runs_backwards() -> None:
     truth, rng = moving(), np.random.default_rng(3)
     seen = sighted(truth, rng)
     forward = Forward(truth.robot)
-    forward.start(float(seen.t[-1]), truth.at(seen.t[-1]), backwards=True)
+    forward.start(float(seen.t[-1]), truth.at(seen.t[-1]))
     for k in range(len(seen.t) - 2, 40, -1):
         forward.predict(float(seen.t[k]))
         forward.update(float(seen.t[k]), seen.p_WE[k], seen.cov[k])

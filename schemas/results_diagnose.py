@@ -86,6 +86,8 @@ class ShrinkageFound(Frozen):
     predicted: float | None
     """The same from intervals that were left out of the fit, before the judged ones were looked at."""
     judged_on: tuple[str, ...]
+    set_aside: tuple[str, ...] = ()
+    """Of them, those that do not count: the floor was measured without the worst intervals, too."""
     within_run: bool
     """Judged intervals share a run with fitted ones."""
 

@@ -46,13 +46,16 @@ class Profile:
     settings: of project.toml, by stage; draw: pictures and pages of every stage."""
 
     targets: int = 10
-    policies: tuple[tuple[str, ...], tuple[str, ...]] = (("straight",), ("turn-clockwise",))
+    policies: tuple[tuple[str, ...], tuple[str, ...]] = (
+        ("straight",),
+        ("turn-clockwise", "turn-counterclockwise", "arching"),
+    )
     repeats: int = 3
     settings: Mapping[str, Mapping[str, int]] = field(default_factory=lambda: MANY_DRAWS)
     draw: bool = False
 
 
-DEMO = Profile(targets=8, settings=SHORT, draw=True)
+DEMO = Profile(targets=8, policies=(("straight",), ("turn-clockwise",)), settings=SHORT, draw=True)
 """Minutes instead of a quarter of an hour: `make demo`."""
 
 

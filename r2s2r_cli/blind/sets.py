@@ -13,12 +13,11 @@ from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.blind.recorded import SUFFIX, read_recording
 from r2s2r_cli.blind.split import FOLLOW
 from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.diagnose.evidence import Evidence, Run
+from r2s2r_cli.stages.diagnose.evidence import Evidence, Run, whole
 from r2s2r_cli.stages.estimate import estimate
 from r2s2r_cli.stages.estimate.camera_input import Pictures
 from r2s2r_cli.stages.floor.runs import sensed_run
 from r2s2r_cli.stages.identified import nominal
-from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.identify.load import run_data
 from r2s2r_cli.stages.import_ import import_source, merge_runs
 from schemas.estimate import EstimateSettings
@@ -61,8 +60,8 @@ def read_set(folder: Path, *, shuffled: int | None = None) -> Evidence:
     later = _runs(folder / FOLLOW, robot) if (folder / FOLLOW).is_dir() else ()
     judged = max(1, round(len(runs) / JUDGED))
     evidence = Evidence(
-        robot=robot, model=nominal(robot), runs=(*runs, *later), fit=_complete((*runs[:-judged], *later)),
-        judge=_complete(runs[-judged:]), healthy=healthy,
+        robot=robot, model=nominal(robot), runs=(*runs, *later), fit=whole((*runs[:-judged], *later)),
+        judge=whole(runs[-judged:]), healthy=healthy,
     )  # fmt: skip
     return evidence if shuffled is None else evidence.shuffled(shuffled)
 
@@ -97,10 +96,3 @@ def _recording(path: Path, robot: Robot) -> tuple[ArtifactData, Pictures | None]
         return recorded.data, recorded.pictures
     imported = import_source(path, robot=robot, format="trajectory_csv", rod_length_tolerance=ROD_TOLERANCE)
     return merge_runs([imported]), None
-
-
-def _complete(runs: tuple[Run, ...]) -> tuple[Selection, ...]:
-    return tuple(
-        Selection(run.name, tuple(i + 1 for i, whole in enumerate(run.caps.intervals.complete.tolist()) if whole))
-        for run in runs
-    )

@@ -3,7 +3,8 @@
 What it is: after a reversal a winch turns through the play of its gearbox, or takes up loose turns, before its cable
 moves.
 Where it acts: channel cable; the winding rate is 0 until the motor has travelled the play since its last reversal. A
-motor that has never turned is taken as engaged.
+motor that has never turned is taken to have let its cable out last, as robots are put down with long cables: winding in
+it has all of the play before it.
 Parameters: play_m, one a winch.
 What it looks like in data: motion of a cable is missing right after its reversals, and only there.
 What it is confused with: load_droop, camera_delay, command_latency.
@@ -22,7 +23,7 @@ from r2s2r_cli.engine.hooks import Channel, MotorTerms, Values
 from r2s2r_cli.engine.structure import Structure
 
 FAR = 1.0
-"""[m] travel of a motor that has never turned: no play is left."""
+"""[m] travel of a motor that goes on letting its cable out: no play is left."""
 
 
 class Backlash(Effect):
@@ -51,7 +52,8 @@ class Backlash(Effect):
         way = torch.where(rate > 0, zero + 1.0, torch.where(rate < 0, zero - 1.0, z["way"]))
         # What is left of the play after a short way back is only what was taken up of it.
         reversed_now = torch.relu(play - z["travel"])
-        before = torch.where(z["way"] * way < 0, reversed_now, torch.where(z["way"] == 0, zero + FAR, z["travel"]))
+        first = torch.where(way > 0, zero, zero + FAR)  # of a motor that has never turned
+        before = torch.where(z["way"] * way < 0, reversed_now, torch.where(z["way"] == 0, first, z["travel"]))
         travel = before + h * torch.abs(rate)
         rest = way * torch.relu(travel - play) / h
         moved = torch.where(before >= play, rate, rest)

@@ -28,7 +28,7 @@ class BatterySag(Effect):
     channel = Channel.MOTOR
     title = "battery sag"
     own = (
-        EffectParameter("fade_per_s", "1/s", 0.0, 0.01, off=0.0, scale=0.002,
+        EffectParameter("fade_per_s", "1/s", 0.0, 0.03, off=0.0, scale=0.004,
                         what="loss of speed per second of one winch at full command"),
         EffectParameter("drop", "1", 0.0, 0.1, off=0.0, scale=0.03, what="loss of speed per winch that pulls"),
     )  # fmt: skip

@@ -22,7 +22,7 @@ class CapFriction(Effect):
     name = "cap_friction"
     channel = Channel.CONTACT
     title = "worn or dirty cap"
-    own = (EffectParameter("factor", "1", 0.3, 1.5, off=1.0, scale=0.3, what="of the cap's friction", per="cap"),)
+    own = (EffectParameter("factor", "1", 0.05, 3.0, off=1.0, scale=0.3, what="of the cap's friction", per="cap"),)
     look_alikes = ("friction_field",)
 
     @classmethod

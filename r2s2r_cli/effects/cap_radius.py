@@ -23,7 +23,7 @@ class CapRadius(Effect):
     name = "cap_radius"
     channel = Channel.CONTACT
     title = "worn caps"
-    own = (EffectParameter("change_m", "m", -0.003, 0.003, off=0.0, scale=0.001, what="of the radius", per="cap"),)
+    own = (EffectParameter("change_m", "m", -0.006, 0.006, off=0.0, scale=0.001, what="of the radius", per="cap"),)
     look_alikes = ("soft_ground", "camera_pose")
 
     @classmethod

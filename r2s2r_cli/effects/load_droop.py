@@ -25,7 +25,7 @@ class LoadDroop(Effect):
     channel = Channel.MOTOR
     title = "load droop of the motors"
     own = (
-        EffectParameter("per_newton", "1/N", 0.0, 0.03, off=0.0, scale=0.008, what="loss of speed per tension"),
+        EffectParameter("per_newton", "1/N", 0.0, 0.05, off=0.0, scale=0.008, what="loss of speed per tension"),
     )  # fmt: skip
     look_alikes = ("backlash", "battery_sag", "camera_delay")
 

@@ -23,7 +23,7 @@ class SensorGain(Effect):
     name = "sensor_gain"
     channel = Channel.SENSING
     title = "gain of the cable sensors"
-    own = (EffectParameter("gain", "1", 0.9, 1.1, off=1.0, scale=0.03, what="of the reading", per="sensor"),)
+    own = (EffectParameter("gain", "1", 0.8, 1.25, off=1.0, scale=0.03, what="of the reading", per="sensor"),)
     look_alikes = ("tendon_stiffness", "camera_scale", "motor_dead_zone")
 
     @classmethod

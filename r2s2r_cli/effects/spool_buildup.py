@@ -23,7 +23,7 @@ class SpoolBuildup(Effect):
     channel = Channel.MOTOR
     title = "build-up of cable on the spool"
     own = (
-        EffectParameter("per_metre", "1/m", 0.0, 3.0, off=0.0, scale=1.0, what="gain of radius per wound length"),
+        EffectParameter("per_metre", "1/m", 0.0, 6.0, off=0.0, scale=1.0, what="gain of radius per wound length"),
     )  # fmt: skip
     look_alikes = ("motor_speed_mismatch",)
 

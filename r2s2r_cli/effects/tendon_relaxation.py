@@ -1,10 +1,10 @@
 """Viscoelastic relaxation of the tendons.
 
-What it is: a stretched elastic tendon is stiffer at first and relaxes while it is held. Winched cables are cords, which
-do not creep.
-Where it acts: channel cable; a spring of `share` times the stiffness in series with a dashpot, beside every passive
-cable: a standard linear solid. A robot starts relaxed.
-Parameters: share, of the stiffness; tau_s, time constant of the branch.
+What it is: a stretched elastic tendon loses tension while it is held. Winched cables are cords, which do not creep.
+Where it acts: channel cable; `share` of the stiffness of every passive cable is a spring in series with a dashpot, the
+rest a spring beside it: a standard linear solid, as stiff as `robot.toml` says against what is quick. A robot starts
+relaxed.
+Parameters: share, of the stiffness; tau_s, time constant with which it is lost.
 What it looks like in data: the shape drifts during holds; forces depend on how fast a tendon was stretched.
 What it is confused with: tendon_stiffness (no drift), battery_sag (drifts while winches turn, not while they hold).
 Source: Maxwell branch (standard linear solid, Zener); diagnosis.md catalogue C3.
@@ -23,7 +23,7 @@ from r2s2r_cli.engine.structure import Structure
 
 
 class TendonRelaxation(Effect):
-    """A Maxwell branch beside every passive cable."""
+    """A part of every passive cable is a Maxwell branch."""
 
     name = "tendon_relaxation"
     channel = Channel.CABLE
@@ -44,8 +44,9 @@ class TendonRelaxation(Effect):
         return {"stretch": structure.n_cables}
 
     def cable(self, x: Values, z: Values, terms: CableTerms, h: Tensor) -> tuple[Tensor, Values]:
-        """The spring force with the branch's, implicit in the step; never pushing."""
+        """The spring force less what the branch has let go, implicit in the step; never pushing."""
         growing = torch.where(terms.stretch > 0, terms.rate, torch.zeros_like(terms.rate))
         stretch = (z["stretch"] + h * growing) / (1.0 + h / x["tau_s"])
-        branch = x["share"] * terms.passive * terms.stiffness * stretch
-        return torch.relu(terms.force + branch), {"stretch": stretch}
+        missing = torch.relu(terms.stretch) - stretch
+        branch = x["share"] * terms.passive * terms.stiffness * missing
+        return torch.relu(terms.force - branch), {"stretch": stretch}

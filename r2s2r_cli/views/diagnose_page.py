@@ -122,6 +122,8 @@ def _shrinkage(report: DiagnoseReport) -> PageTable:
         ["predicted before it was looked at", "", _share(s.predicted, None)],
     ]
     where = "; within the run that was fitted" if s.within_run else ""
+    if s.set_aside:
+        where += f"; without {', '.join(s.set_aside)}, as the floor was measured without the worst intervals"
     return PageTable(
         f"how far the gap shrinks, {len(s.judged_on)} held-out intervals{where}",
         ["model", "key-frame error [mm]", "own share of the refit gap above the floor"], rows,

@@ -13,20 +13,22 @@ from tests.support import blind_bank
 
 EFFECTS = ("backlash", "payload", "motor_lag", "soft_ground")
 TRUE = Calibration(
-    temperature=20.0, parity=14.0, none=9.0, equivalent=16.0, gap=0.4, unknown=20.0, unknown_share=0.7,
-    left=0.5, lapse=0.05, bias={"soft_ground": -27.0},
+    temperature=20.0, parity=14.0, none=9.0, equivalent=16.0, gap=0.4, unknown=110.0, unknown_share=0.7,
+    left=0.5, beside=0.6, lapse=0.05, bias={"soft_ground": -27.0},
 )  # fmt: skip
 
 
 def scores(by: Calibration, one: Case) -> dict[str, float]:
     """What a diagnosis makes of the evidence of a set; the parity stage has said what it says by chance too."""
     beyond = {"none": one.gap, "unknown": one.left}
-    return {
+    found = {
         name: by.score(
             name, float(a), parity=float(b) + by.by_chance, equivalent=one.equivalent, beyond=beyond.get(name, 0.0)
         )
         for name, a, b in zip(one.names, one.score, one.parity, strict=True)
     }
+    found["unknown"] += by.beside * max(0.0, *(found[name] for name in EFFECTS))
+    return found
 
 
 def planted(
@@ -52,8 +54,13 @@ def test_planted_numbers_come_back() -> None:
     assert found["temperature"] == pytest.approx(TRUE.temperature, rel=0.15)
     assert found["parity"] == pytest.approx(TRUE.parity, rel=0.15)
     assert found["unknown_share"] == pytest.approx(TRUE.unknown_share, abs=0.15)
-    middle = found["unknown_share"] * 150.0 + found["left"] * 30.0 - found["unknown"]  # where `unknown` has a chance
-    assert middle == pytest.approx(TRUE.unknown_share * 150.0 + TRUE.left * 30.0 - TRUE.unknown, abs=10.0)
+    assert found["beside"] == pytest.approx(TRUE.beside, abs=0.15)
+
+    def middle(of: dict[str, float]) -> float:
+        """Where `unknown` has a chance."""
+        return of["beside"] * 140.0 + of["unknown_share"] * 150.0 + of["left"] * 30.0 - of["unknown"]
+
+    assert middle(found) == pytest.approx(middle(vars(TRUE)), abs=10.0)
     assert found["none"] == pytest.approx(TRUE.none, abs=10.0)
     assert found["gap"] == pytest.approx(TRUE.gap, abs=0.15)
     assert found["left"] == pytest.approx(TRUE.left, abs=0.2)
@@ -65,7 +72,7 @@ def test_planted_numbers_come_back() -> None:
 def test_what_chance_gives_counts_a_share(share: float) -> None:
     """It is learned whether nats below the usual gain say as much as those above: here a tenth, and all."""
     by = replace(
-        TRUE, temperature=4.0, parity=4.0, none=-85.0, unknown=110.0, usual=8.0, usual_share=share, bias={}
+        TRUE, temperature=4.0, parity=4.0, none=-85.0, unknown=128.0, usual=8.0, usual_share=share, bias={}
     )  # fmt: skip
     found = calibrated(planted(2000, by=by, gains=(8.0, 12.0)), words="test")
     assert found["usual"] == by.usual and found["usual_share"] == pytest.approx(share, abs=0.15)

@@ -174,7 +174,7 @@ def test_short_text_says_the_same(value: object) -> None:
 LEFT_OUT = {
     ("PublishedRank", "RankedName"): {"ci90", "units", "on_bound"},
     ("PublishedWhere", "WhereFound"): {"segments", "onset"},
-    ("PublishedShrinkage", "ShrinkageFound"): {"metric", "judged_on", "within_run"},
+    ("PublishedShrinkage", "ShrinkageFound"): {"metric", "judged_on", "set_aside", "within_run"},
     ("PublishedNext", "NextGaitFound"): {"file", "targets"},
     ("PublishedDiagnosis", "DiagnoseReport"): {
         "robot", "floor_from", "floor_given", "left_out", "segments", "hidden", "missing", "refit", "refit_units",

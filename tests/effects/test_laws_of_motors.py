@@ -160,18 +160,22 @@ def test_spool_buildup() -> None:
 
 
 def test_backlash() -> None:
-    """Missing after a reversal is the play, whatever the step; after a short way back only what was taken up of it."""
+    """Missing after a reversal is the play, whatever the step; after a short way back only what was taken up of it. A
+    cable was let out before the first motion: that loses the play too, if it winds in."""
     effect, play, h = Backlash(), 0.0041, column(H)
     z = {"way": column(0.0), "travel": column(0.0)}
     moved, at = [], 0.0
-    for rate, steps in ((0.05, 100), (-0.05, 100), (0.05, 40), (-0.05, 300), (0.05, 20)):
+    for rate, steps in ((0.05, 182), (-0.05, 100), (0.05, 40), (-0.05, 300), (0.05, 20)):
         for _ in range(steps):
             found, z = effect.motor({"play_m": column(play)}, z, column(rate), TERMS, h)  # type: ignore[assignment]
             at += H * float(found)
         moved.append(at)
-    # engaged at the start; 5 mm back, 4.1 of them play; 2 mm of play taken up; given back; less than the play.
+    # 9.1 mm in, 4.1 of them play; 5 mm back, 4.1 of them play; 2 mm of play taken up; given back; less than the play.
     expected = [0.005, 0.005 - 0.0009, 0.0041, 0.0041 - (0.015 - 0.002), 0.0041 - 0.013]
     assert moved == pytest.approx(expected, abs=1e-12)
+    z = {"way": column(0.0), "travel": column(0.0)}
+    out, _ = effect.motor({"play_m": column(play)}, z, column(-0.05), TERMS, h)
+    assert float(out) == -0.05
 
 
 NOTHING = column(0.0)
@@ -189,7 +193,8 @@ def test_tendon_stiffness() -> None:
 
 
 def test_relaxation_is_an_exponential() -> None:
-    """A stretch that appears at once is held with (1 + share exp(-t / tau)) times its force; a slack cable forgets."""
+    """A stretch that appears at once is held with its force, of which share (1 - exp(-t / tau)) is lost; a slack cable
+    does not pull."""
     effect, x = TendonRelaxation(), {"share": column(0.4), "tau_s": column(0.05)}
     stretch, k, h = 0.003, 2000.0, column(1e-4)
     still = CableTerms(column(stretch), column(0.0), column(k * stretch), column(k), column(1.0))
@@ -201,7 +206,7 @@ def test_relaxation_is_an_exponential() -> None:
         force, z = effect.cable(x, z, still, h)  # type: ignore[assignment]
         found.append(float(force))
     t = 1e-4 * torch.arange(1001, dtype=torch.float64)
-    expected = k * stretch * (1 + 0.4 * torch.exp(-t / 0.05))
+    expected = k * stretch * (1 - 0.4 * (1 - torch.exp(-t / 0.05)))
     assert torch.allclose(torch.tensor(found, dtype=torch.float64), expected, rtol=2e-3)
     slack = replace(still, stretch=column(-0.001), rate=column(-9.0), force=column(0.0))
     force, z = effect.cable(x, {"stretch": column(-0.001)}, slack, h)  # type: ignore[assignment]

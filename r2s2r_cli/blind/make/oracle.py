@@ -8,8 +8,8 @@ and start pose (x, y and heading of every interval: exact, the floor is the same
 known as well as the camera's noise allows: every interval is simulated a few times more from a start that was pushed as
 far, and what that changes, a fall that comes earlier, is no effect's; neither is a clock that is some milliseconds off.
 d is the length of what is left: with d >= 8 no test would miss it.
-No interval counts for more than MOST: one tip-over that happens in one world and not in the other is worth more than
-all the rest together, and says nothing about which effect it was.
+No interval counts for more than MOST, nor for more than the one that counts next: one tip-over that happens in one
+world and not in the other is worth more than all the rest together, and says nothing about which effect it was.
 """
 
 from __future__ import annotations
@@ -148,6 +148,7 @@ class _Told:
         last = [(b.p[-1] - a.p[-1]).ravel() for x, y in zip(self._base, other, strict=True)
                 for a, b in zip(x, y, strict=True)]  # fmt: skip
         each = np.minimum(np.add.reduceat(left[: len(r)] ** 2, begins) + of_known, MOST**2)
+        each = np.minimum(each, np.sort(each)[-2:][0])
         return float(np.sqrt(each.sum())), float(np.sqrt(3 * np.mean(np.concatenate(last) ** 2)))
 
     def _white(self, other: list[list[_Looks]]) -> list[tuple[np.ndarray, int]]:

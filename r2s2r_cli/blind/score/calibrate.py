@@ -4,10 +4,11 @@ p(name) ~ exp((score + bias) / temperature). The score of an effect is its held-
 count a share (`usual_share`), since chance gives as much to whatever is tried, and `parity` times what the parity stage
 says for it; that of `none` what the best of the catalogue gains by chance, and `none`, and `equivalent`
 more where the equivalence test finds no gap, less `gap` for every nat that today's pieces cost beyond those of healthy
-runs; that of `unknown` a share (`unknown_share`) of what a wider floor gains, and `left` for every nat that the best
-effect leaves, less `unknown`. Linear in 1 / temperature and the products with it: a multinomial regression, biases
-drawn to 0, in which any name is the truth once in 20 sets (LAPSE). Thresholds come from probabilities of sets left out
-of the fit. To commit to a name and to `unknown` are claims of different weight: each has its own. That of
+runs; that of `unknown` a share (`beside`) of the best effect's score, since a stranger often looks a little like one, a
+share (`unknown_share`) of what a wider floor gains beside it, and `left` for every nat that the best effect leaves,
+less `unknown`. Linear in 1 / temperature and the products with it, but for which effect is the best, which is found in
+turns with them (TURNS): a multinomial regression, biases drawn to 0, in which any name is the truth once in 20 sets
+(LAPSE). Thresholds come from probabilities of sets left out of the fit. To commit to a name and to `unknown` are claims of different weight: each has its own. That of
 names is for sets in which the catalogue has the cause; how often strangers are taken for one of them is another figure.
 """
 
@@ -23,12 +24,14 @@ from r2s2r_cli.blind.score.facts import NO_GAP_FACTOR, NO_REPLAY, NONE, UNKNOWN,
 from r2s2r_cli.errors import InputError
 
 LEAST_SETS = 12
-LEARNED = ("sharpness", "parity", "none", "equivalent", "gap", "unknown", "unknown_share", "left", "usual")
+LEARNED = ("sharpness", "parity", "none", "equivalent", "gap", "unknown", "unknown_share", "left", "usual", "beside")
 """Numbers beside the biases, in the order of the columns; all of them in the exponent."""
-BEFORE = (1.0, 0.7, 0.0, 0.0, 0.05, -1.0, 0.3, 0.05, 0.5)
+BEFORE = (1.0, 0.7, 0.0, 0.0, 0.05, -1.0, 0.3, 0.05, 0.5, 0.8)
 """What they are before anything is learned, gains in the unit of SHARPNESS."""
-BEFORE_SD = (2.0, 0.3, 2.0, 1.0, 0.1, 2.0, 0.3, 0.1, 0.5)
-POSITIVE = ("sharpness", "parity", "gap", "unknown_share", "left", "usual")
+BEFORE_SD = (2.0, 0.3, 2.0, 1.0, 0.1, 2.0, 0.3, 0.1, 0.5, 0.3)
+POSITIVE = ("sharpness", "parity", "gap", "unknown_share", "left", "usual", "beside")
+TURNS = 4
+"""In which the numbers and the best effect of every set are found."""
 FOLDS = 10
 COVER = 0.90
 PRECISION = {"commit": 0.90, "commit_unknown": 0.75}
@@ -126,6 +129,7 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
         "unknown": -learned["unknown"] / sharp,
         "unknown_share": learned["unknown_share"] * SHARPNESS / sharp,
         "left": learned["left"] * SHARPNESS / sharp,
+        "beside": learned["beside"],
         "bias": {name: float(b) / sharp for name, b in zip(effects, whole[len(LEARNED) :], strict=True)},
         **{
             key: _commit(sure[of], right[of], wanted)
@@ -142,8 +146,9 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
     }
 
 
-def _design(one: Case, effects: Sequence[str]) -> np.ndarray:
-    """What multiplies LEARNED and the biases in the exponent of every name, (name, LEARNED + effect)."""
+def _design(one: Case, effects: Sequence[str], known: np.ndarray) -> np.ndarray:
+    """What multiplies LEARNED and the biases in the exponent of every name, (name, LEARNED + effect). known: LEARNED as
+    far as they are, by which the best effect is found."""
     X = np.zeros((len(one.names), len(LEARNED) + len(effects)))
     for row, name, score, parity in zip(X, one.names, one.score, one.parity, strict=True):
         if name == UNKNOWN:
@@ -155,18 +160,30 @@ def _design(one: Case, effects: Sequence[str]) -> np.ndarray:
         else:
             row[1] = parity
             row[len(LEARNED) + effects.index(name)] = 1.0
+    worth = X[:, : len(LEARNED)] @ known[: len(LEARNED)]
+    replayed = [w for w, name in zip(worth, one.names, strict=True) if name not in (NONE, UNKNOWN, *NO_REPLAY)]
+    if UNKNOWN in one.names:
+        X[one.names.index(UNKNOWN), 9] = max(replayed, default=0.0)
     return X
 
 
 def _fit(cases: Sequence[Case], effects: Sequence[str]) -> np.ndarray:
     """Most probable numbers (LEARNED + effect,) after BEFORE and the biases' BIAS_SD."""
+    found = np.r_[BEFORE, np.zeros(len(effects))]
+    for _ in range(TURNS):
+        found = _fit_with(cases, effects, found)
+    return found
+
+
+def _fit_with(cases: Sequence[Case], effects: Sequence[str], so_far: np.ndarray) -> np.ndarray:
+    """The same with the best effects that the numbers so far say."""
     from scipy.optimize import minimize
 
     known = [one for one in cases if one.truth in one.names]
     most = max((len(one.names) for one in known), default=1)
     X, there = np.zeros((len(known), most, len(LEARNED) + len(effects))), np.zeros((len(known), most), dtype=bool)
     for k, one in enumerate(known):
-        X[k, : len(one.names)], there[k, : len(one.names)] = _design(one, effects), True
+        X[k, : len(one.names)], there[k, : len(one.names)] = _design(one, effects, so_far), True
     truth = np.array([one.names.index(one.truth) for one in known], dtype=int)
     right = X[np.arange(len(known)), truth]
     mean = np.r_[BEFORE, np.zeros(len(effects))]
@@ -193,7 +210,7 @@ def _left_out(cases: Sequence[Case], effects: Sequence[str], fold: int) -> list[
     held = [one for i, one in enumerate(cases) if i % FOLDS == fold]
     w = _fit([one for i, one in enumerate(cases) if i % FOLDS != fold], effects)
     return [
-        (one, dict(zip(one.names, _softmax(_design(one, effects) @ w).tolist(), strict=True))) for one in held
+        (one, dict(zip(one.names, _softmax(_design(one, effects, w) @ w).tolist(), strict=True))) for one in held
     ]  # fmt: skip
 
 

@@ -111,7 +111,10 @@ def diagnose(
         )
     shrunk = None
     if settings.with_much and evidence.judge:
-        shrunk = much(evidence, compared, floor_m=fitted.floor.rmse, starts=starts, seed=settings.seed, told=progress)
+        shrunk = much(
+            evidence, compared, floor=fitted.floor, healthy=fitted.healthy, starts=starts, seed=settings.seed,
+            told=progress,
+        )  # fmt: skip
     after = next_gait(evidence, compared, settings.library, told=progress)
     sd = compared.refit.sd
     return Diagnosis(

@@ -113,6 +113,11 @@ class Evidence:
         return replace(self, runs=tuple(runs))
 
 
+def whole(runs: Sequence[Run]) -> tuple[Selection, ...]:
+    """All complete target intervals of runs."""
+    return tuple(Selection(run.name, complete(run.caps)) for run in runs)
+
+
 def require_enough(evidence: Evidence) -> None:
     """Raises InputError where there is nothing to diagnose: no run, fewer than two intervals to fit, or runs of
     different numbers of caps."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run
+from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run, whole
 from r2s2r_cli.stages.diagnose.starts import Starts, as_known
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.before import Healthy
@@ -87,12 +87,9 @@ def refit(
     noise, lasts = 1.0, 0.0
     if evidence.healthy:
         told("healthy runs", 0, 1)
-        part = tuple(
-            Selection(run.name, tuple(i + 1 for i, whole in enumerate(run.caps.intervals.complete.tolist()) if whole))
-            for run in evidence.healthy
-        )
         arena, base = _fitted(
-            evidence.healthy, part, replayer, simulator, (1.0, 0.0), None, starts, None, calibrate=with_floor
+            evidence.healthy, whole(evidence.healthy), replayer, simulator, (1.0, 0.0), None, starts, None,
+            calibrate=with_floor,
         )  # fmt: skip
         simulator, noise, lasts = arena.floor_m, arena.noise, arena.lasts
         prior = _posterior(arena, base)
@@ -167,15 +164,15 @@ def _fitted(
             values[list(model.nuisances)] = z[: len(model.nuisances)]
         states = starts.at([named[name] for name in last], replayer, values, last)
         states = as_known(states, runs, replayer, values)
-        whole = stretches(runs, part, states)
+        intervals = stretches(runs, part, states)
         many = pieces(runs, part, states, replayer, values)
-        if not whole:
+        if not intervals:
             raise InputError(
                 "the robot tips over in every interval: nothing can be fitted", where="--train",
                 expected="an interval without a tip-over", received="none",
                 hint="r2s2r record --random 15 --port /dev/ttyUSB0   # other shapes",
             )  # fmt: skip
-        arena = Arena(replayer, many, floor_m=simulator, noise=noise, lasts=lasts, prior=prior, whole=whole)
+        arena = Arena(replayer, many, floor_m=simulator, noise=noise, lasts=lasts, prior=prior, whole=intervals)
         z = _begun(arena, z)
         for again in range(JACOBIANS if number == rounds - 1 else 1):
             if again:

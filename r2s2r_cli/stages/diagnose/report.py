@@ -86,7 +86,8 @@ def _shrinkage(found: Diagnosis) -> ShrinkageFound | None:
     return ShrinkageFound(
         effects=much.effects, nominal=much.rmse("nominal"), refit=much.rmse("refit"),
         refit_plus_effect=much.rmse("effect"), ceiling=much.rmse("ceiling"), floor=much.floor, own_share=much.share,
-        ci90=much.ci90, predicted=much.predicted, judged_on=much.names, within_run=much.within_run,
+        ci90=much.ci90, predicted=much.predicted, judged_on=much.names, set_aside=much.set_aside,
+        within_run=much.within_run,
     )  # fmt: skip
 
 

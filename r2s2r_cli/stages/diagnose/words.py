@@ -75,7 +75,8 @@ def _shrunk(found: Diagnosis) -> str:
     if found.which.verdict in ("ambiguous", "unknown"):
         names = f"the {'best' if shrinks else 'first'} of them, {names},"
     count = len(much.names)
-    held = f" On {count} held-out interval{'s' * (count != 1)}{' of the same run' if much.within_run else ''}"
+    some = f"{count - len(much.set_aside)} of " if much.set_aside else ""
+    held = f" On {some}{count} held-out interval{'s' * (count != 1)}{' of the same run' if much.within_run else ''}"
     text = (
         f"{held} {names} takes the key-frame error from {before:.1f} to {after:.1f} mm (floor {1e3 * much.floor:.1f})"
     )

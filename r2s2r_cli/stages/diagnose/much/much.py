@@ -7,11 +7,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from r2s2r_cli.errors import NumericalError
-from r2s2r_cli.stages.diagnose.evidence import Evidence
+from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run, whole
 from r2s2r_cli.stages.diagnose.much.blackbox import corrected
-from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, foretold, share_with_interval
+from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, counting, foretold, share_with_interval
+from r2s2r_cli.stages.diagnose.prepare import KEPT
 from r2s2r_cli.stages.diagnose.starts import Starts
 from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.before import Healthy
 from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.score import Score, groups_of
@@ -23,13 +25,15 @@ Told = Callable[[str, int, int], None]
 
 
 def much(
-    evidence: Evidence, compared: Compared, *, floor_m: float, starts: Starts, seed: int = 0, told: Told
-) -> Shrinkage | None:
+    evidence: Evidence, compared: Compared, *, floor: FloorGiven, healthy: Healthy | None = None, starts: Starts,
+    seed: int = 0, told: Told,
+) -> Shrinkage | None:  # fmt: skip
     """Of the effect that was named, else, where names remain, of the best one; without a gap, or a name for it, of the
     refit model and the black box alone. None where no effect was fitted.
 
-    Start states of the judged intervals are causal and each model's own: a filter over the run with its numbers.
-    Raises NumericalError where the refit model cannot be simulated.
+    Start states of the judged intervals are causal and each model's own: a filter over the run with its numbers. With
+    healthy runs their refit is measured in the same way, falls included, and is the floor here; `floor`, of intervals
+    up to their first fall, is where there are none. Raises NumericalError where the refit model cannot be simulated.
     """
     fit, score = _chosen(compared)
     refit = compared.refit
@@ -39,9 +43,12 @@ def much(
     arena = compared.arena
     solver = Fits(arena)
     predicted, spread = (None, None)
+    floor_m, kept = (floor.rmse, floor.kept) if healthy is None else _alike(evidence.healthy, healthy, floor, starts)
     if named:
         told("left out", 0, 1)
-        predicted, spread = _predicted(evidence, compared, fit, score, floor_m=floor_m, starts=starts, seed=seed)
+        predicted, spread = _predicted(
+            evidence, compared, fit, score, floor_m=floor_m, kept=kept, starts=starts, seed=seed
+        )
         told("left out", 1, 1)
     none = np.concatenate([arena.model.values0[arena.engine], np.zeros(len(arena.names) - len(arena.engine))])
     models = {
@@ -56,24 +63,26 @@ def much(
     for done, (name, (values, z)) in enumerate(models.items()):
         told("judged", done, len(models))
         try:
-            errors, judged = _errors(evidence, evidence.judge, arena, values[0], z, starts)
+            errors, judged = _errors(evidence.runs, evidence.judge, arena, values[0], z, starts)
         except NumericalError as error:
             missing.append(f"{name}: {error.what}")
             continue
-        squared[name] = np.sum(errors**2, axis=-1).mean(axis=-1)
+        squared[name] = _squared(errors)
         names = tuple(one.name for one in judged)
         if name == "refit":
             left = corrected(arena.whole, refit.key, judged, errors)
-            squared["ceiling"] = np.sum(left**2, axis=-1).mean(axis=-1)
+            squared["ceiling"] = _squared(left)
     told("judged", len(models), len(models))
     share, ci90 = (None, None)
     if "refit" in squared and "effect" in squared:
         share, ci90 = share_with_interval(
-            squared["refit"], squared["effect"], floor_m, groups=[name.rpartition(":")[0] for name in names], seed=seed
-        )
+            squared["refit"], squared["effect"], floor_m, kept=kept, groups=[name.rpartition(":")[0] for name in names],
+            seed=seed,
+        )  # fmt: skip
     return Shrinkage(
         effects=fit.hypothesis.effects if named else (), names=names, squared=squared, floor=floor_m, share=share,
         ci90=ci90, predicted=predicted, predicted_ci90=spread, within_run=evidence.within_run, missing=tuple(missing),
+        kept=kept,
     )  # fmt: skip
 
 
@@ -89,7 +98,15 @@ def _chosen(compared: Compared) -> tuple[Fit | None, Score | None]:
 
 
 def _predicted(
-    evidence: Evidence, compared: Compared, fit: Fit, score: Score, *, floor_m: float, starts: Starts, seed: int
+    evidence: Evidence,
+    compared: Compared,
+    fit: Fit,
+    score: Score,
+    *,
+    floor_m: float,
+    kept: float,
+    starts: Starts,
+    seed: int,
 ) -> tuple[float | None, tuple[float, float] | None]:
     """Own share that the judged intervals will have, and its interval: fitted ones are measured as those will be, from
     causal starts, with numbers that were fitted without their gait."""
@@ -111,25 +128,45 @@ def _predicted(
             for model, scored in models:
                 at = scored.without[number]
                 values = solver.values(model.hypothesis, at[None, :p], at[None, p:])[0]
-                found.append(_errors(evidence, part, arena, values, at[:p], starts))
+                found.append(_errors(evidence.runs, part, arena, values, at[:p], starts))
         except NumericalError:
             continue  # one model fell to pieces there: nothing to compare
-        for kept, (errors, _) in zip(squared, found, strict=True):
-            kept.append(np.sum(errors**2, axis=-1).mean(axis=-1))
+        for own_squared, (errors, _) in zip(squared, found, strict=True):
+            own_squared.append(_squared(errors))
         runs += [one.run for one in found[0][1]]
     if not runs:
         return None, None
     count = sum(len(one.intervals) for one in evidence.judge)
     before, after = (np.concatenate(own) for own in squared)
-    return foretold(before, after, floor_m, groups=runs, count=count, seed=seed)
+    return foretold(before, after, floor_m, groups=runs, count=count, kept=kept, seed=seed)
+
+
+def _alike(runs: Sequence[Run], healthy: Healthy, floor: FloorGiven, starts: Starts) -> tuple[float, float]:
+    """What the healthy runs' own refit leaves at the ends of whole intervals, falls included, from starts as the judged
+    ones have: key-frame RMSE [m] of the share KEPT of the best, and that share; the given floor where they cannot be
+    simulated."""
+    arena, base = healthy.arena, healthy.base
+    values = Fits(arena).values(base.hypothesis, base.z[None], np.zeros((1, 0)))[0]
+    try:
+        errors, _ = _errors(runs, whole(runs), arena, values, base.z, starts)
+    except NumericalError:
+        return floor.rmse, floor.kept
+    squared = _squared(errors)
+    return float(np.sqrt(np.mean(squared[counting(squared, KEPT)]))), KEPT
+
+
+def _squared(errors: np.ndarray) -> np.ndarray:
+    """Mean squared distance of the caps (segment,) [m^2] of errors (segment, cap, 3) [m]."""
+    return np.asarray(np.sum(errors**2, axis=-1).mean(axis=-1))
 
 
 def _errors(
-    evidence: Evidence, part: Sequence[Selection], arena: Arena, values: np.ndarray, z: np.ndarray, starts: Starts
+    runs: Sequence[Run], part: Sequence[Selection], arena: Arena, values: np.ndarray, z: np.ndarray, starts: Starts
 ) -> tuple[np.ndarray, tuple[Stretch, ...]]:
     """Errors (segment, cap, 3) [m] at the key frames of the intervals of a part of the split, from causal starts, and
     the intervals. Raises NumericalError where none can be simulated."""
-    runs = evidence.only(tuple(part))
+    named = {one.run for one in part}
+    runs = tuple(run for run in runs if run.name in named)
     last = {one.run: max(one.intervals) for one in part}
     states = starts.at(runs, arena.replayer, values, last)
     many = stretches(runs, part, states, whole=True)

@@ -1,4 +1,9 @@
-"""Shrinkage on judged intervals: stale nominal, refit, refit + effect, and a black box that may do anything."""
+"""Shrinkage on judged intervals: stale nominal, refit, refit + effect, and a black box that may do anything.
+
+A robot that tips over at another instant than its simulator ends decimetres away, and one such interval outweighs all
+others in a mean of squares. A floor that was measured without the worst intervals of the healthy robot is compared with
+errors without the worst ones as well: the same share of them, by the larger error of both models (ADR 14).
+"""
 
 from __future__ import annotations
 
@@ -11,6 +16,8 @@ from r2s2r_cli.stages.measures.bootstrap import DRAWS
 from r2s2r_cli.stages.measures.gap import corrected_gap, own_share
 
 LEVEL = 0.90
+TINY = 1e-9
+"""Of a number of segments: shares are not exact."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +29,7 @@ class Shrinkage:
     share: own share of the effect, None at the floor; ci90 by bootstrap over segments; predicted: what it will be, from
     the same measure on fitted intervals, each with numbers fitted without its gait, before the judged ones were looked
     at; predicted_ci90: where as many intervals as are judged will have it. within_run: judged segments share their run
-    with fitted ones.
+    with fitted ones. kept: share of the segments that count, the best ones, as in the floor.
     """
 
     effects: tuple[str, ...]
@@ -35,38 +42,72 @@ class Shrinkage:
     predicted_ci90: tuple[float, float] | None
     within_run: bool
     missing: tuple[str, ...] = ()
+    kept: float = 1.0
+
+    @property
+    def counts(self) -> np.ndarray:
+        """Which segments count, (segment,)."""
+        models = [self.squared[name] for name in ("refit", "effect") if name in self.squared]
+        return counting(np.max(models, axis=0), self.kept) if models else np.ones(len(self.names), dtype=bool)
+
+    @property
+    def set_aside(self) -> tuple[str, ...]:
+        """Names of those that do not."""
+        return tuple(name for name, counted in zip(self.names, self.counts.tolist(), strict=True) if not counted)
+
+    def of(self, model: str) -> np.ndarray | None:
+        """Squared errors of one of the models on the segments that count [m^2]; None where it was not judged."""
+        known = self.squared.get(model)
+        return None if known is None or not len(known) else known[self.counts]
 
     def rmse(self, model: str) -> float | None:
         """Of one of the models [m]; None where it was not judged."""
-        known = self.squared.get(model)
-        return None if known is None or not len(known) else float(np.sqrt(np.mean(known)))
+        known = self.of(model)
+        return None if known is None else float(np.sqrt(np.mean(known)))
 
     def gap(self, model: str) -> float | None:
         """Its floor-corrected gap [m]."""
-        known = self.squared.get(model)
-        return None if known is None or not len(known) else corrected_gap(float(np.mean(known)), self.floor)
+        known = self.of(model)
+        return None if known is None else corrected_gap(float(np.mean(known)), self.floor)
 
     @property
     def refit_share(self) -> float | None:
         """What refitting alone took off the stale nominal's gap."""
-        nominal, refit = self.squared.get("nominal"), self.squared.get("refit")
+        nominal, refit = self.of("nominal"), self.of("refit")
         return None if nominal is None or refit is None else own_share(nominal, refit, self.floor)
 
     @property
     def closable(self) -> float | None:
         """Own share of the black box: what could have been closed."""
-        refit, ceiling = self.squared.get("refit"), self.squared.get("ceiling")
+        refit, ceiling = self.of("refit"), self.of("ceiling")
         return None if refit is None or ceiling is None else own_share(refit, ceiling, self.floor)
 
 
+def counting(worst: np.ndarray, kept: float) -> np.ndarray:
+    """Which of squared errors (..., segment), of several models the largest, are among the share `kept` of the best; no
+    error that is not finite is."""
+    worst = np.where(np.isfinite(worst), worst, np.inf)
+    last = int(np.floor(kept * (worst.shape[-1] - 1) + TINY))
+    return np.asarray((worst <= np.sort(worst, axis=-1)[..., last : last + 1]) & np.isfinite(worst))
+
+
+def _means(before: np.ndarray, after: np.ndarray, kept: float) -> tuple[np.ndarray, np.ndarray]:
+    """Means over the segments that count, (...,) each, of squared errors (..., segment)."""
+    count = counting(np.maximum(before, after), kept)
+    much = np.maximum(count.sum(axis=-1), 1)
+    first, second = (np.where(count, one, 0.0).sum(axis=-1) / much for one in (before, after))
+    return first, second
+
+
 def share_with_interval(
-    before: np.ndarray, after: np.ndarray, floor: float, *, groups: Sequence[str] = (), seed: int = 0
+    before: np.ndarray, after: np.ndarray, floor: float, *, kept: float = 1.0, groups: Sequence[str] = (), seed: int = 0
 ) -> tuple[float | None, tuple[float, float] | None]:
     """Own share of squared errors (segment,) and its 90 % interval by bootstrap over segments, in two levels where
-    `groups` (runs) are several: runs first, then segments within them."""
+    `groups` (runs) are several: runs first, then segments within them. kept: share of the segments that count."""
     known = np.isfinite(before) & np.isfinite(after)
     before, after = before[known], after[known]
-    value = own_share(before, after, floor) if len(before) else None
+    count = counting(np.maximum(before, after), kept) if len(before) else known
+    value = own_share(before[count], after[count], floor) if len(before) else None
     if value is None or len(before) < 2:
         return value, None
     rng = np.random.default_rng(seed)
@@ -75,7 +116,7 @@ def share_with_interval(
     drawn = []
     for _ in range(DRAWS // 4):
         rows = _rows(rng, runs, len(before))
-        G, H = (corrected_gap(float(np.mean(one[rows])), floor) for one in (before, after))
+        G, H = (corrected_gap(float(mean), floor) for mean in _means(before[rows], after[rows], kept))
         if G > 0:
             drawn.append((G - H) / G)
     if len(drawn) < DRAWS // 8:
@@ -85,11 +126,19 @@ def share_with_interval(
 
 
 def foretold(
-    before: np.ndarray, after: np.ndarray, floor: float, *, groups: Sequence[str], count: int, seed: int = 0
+    before: np.ndarray,
+    after: np.ndarray,
+    floor: float,
+    *,
+    groups: Sequence[str],
+    count: int,
+    kept: float = 1.0,
+    seed: int = 0,
 ) -> tuple[float | None, tuple[float, float] | None]:
     """Own share that `count` further segments will have, from squared errors (segment,) of others that were left out:
     median and 90 % interval over draws of so many, runs (`groups`) first. A fall makes a share of few segments whatever
-    it likes, so the ratio of all that were seen is no forecast. None where most draws are at the floor."""
+    it likes, so the ratio of all that were seen is no forecast. kept: share of the segments that count, in every draw.
+    None where most draws are at the floor."""
     known = np.isfinite(before) & np.isfinite(after)
     if not known.any() or count < 1:
         return None, None
@@ -104,7 +153,8 @@ def foretold(
     turn = rng.permuted(np.tile(np.arange(len(size)), (DRAWS // 4, 1)), axis=1)
     run = own[np.argsort(turn[:, own], axis=1, kind="stable")][:, np.arange(count) % len(own)]
     rows = first[run] + (rng.random(run.shape) * size[run]).astype(int)
-    G, H = (np.sqrt(np.maximum(one[rows].mean(axis=1) - floor**2, 0.0)) for one in (before, after))
+    means = _means(before[rows], after[rows], kept)
+    G, H = (np.sqrt(np.maximum(mean - floor**2, 0.0)) for mean in means)
     above = (floor / 2 <= G) & (G > 0)
     if above.mean() < 0.5:
         return None, None

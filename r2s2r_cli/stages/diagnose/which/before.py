@@ -48,7 +48,9 @@ def chronic(arena: Arena, healthy: Healthy | None, fits: Sequence[Fit]) -> np.nd
 
 def before(healthy: Healthy, fits: Sequence[Fit]) -> np.ndarray:
     """Log density of the healthy runs with each fit's effects at the fitted sizes over that without them, nuisances
-    following linearly, (fit,) [nats]. All of them are simulated at a few points close together (`rough`)."""
+    following linearly, (fit,) [nats]. All of them are simulated at a few points close together (`rough`). Starts and
+    nuisances that follow gain something by themselves where the healthy fit had stopped early: what no effect at all
+    gains in the same way is taken off."""
     arena, base = healthy.arena, healthy.base
     if not fits:
         return np.zeros(0)
@@ -57,7 +59,7 @@ def before(healthy: Healthy, fits: Sequence[Fit]) -> np.ndarray:
     root = root_of(solver.normal(base)[0])
     nominal = replace(base, hypothesis=Hypothesis(), x=np.zeros(0))
     own = _costs(solver, [nominal], base, root)[0]
-    now = solver.begun([(fit.hypothesis, base.z, fit.x) for fit in fits])
+    now = solver.begun([(one.hypothesis, base.z, one.x) for one in (nominal, *fits)])
     solver.settle(now)
     gain = _gain(arena, own, base.z, now, _costs(solver, now, base, root))
     for _ in range(FOLLOWED):
@@ -66,7 +68,7 @@ def before(healthy: Healthy, fits: Sequence[Fit]) -> np.ndarray:
         now = solver.begun(points, [fit.away for fit in now])
         solver.settle(now)
         gain = np.maximum(gain, _gain(arena, own, base.z, now, _costs(solver, now, base, root)))
-    return gain
+    return np.asarray(gain[1:] - max(gain[0], 0.0))
 
 
 def _costs(solver: Fits, fits: Sequence[Fit], base: Fit, root: np.ndarray) -> np.ndarray:

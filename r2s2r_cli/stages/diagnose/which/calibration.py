@@ -27,8 +27,9 @@ class Calibration:
     nothing is wrong; most [nats]: of them that count, since a finding that stands out says that something is wrong, and
     which of its look-alikes it is the replay tells better, where there is one. none, equivalent [nats]: what `none`
     gains, and more where the equivalence test finds no gap; gap: what it loses for every nat that the refit model costs
-    more than in healthy runs. unknown_share, left: what `unknown` has of what a wider floor gains and of every nat that
-    the best effect leaves; unknown [nats]: what that must exceed. bias [nats]: of a name, what its gains are short of.
+    more than in healthy runs. beside, unknown_share, left: what `unknown` has of the best effect's score, of what a
+    wider floor gains beside it, and of every nat that it leaves; unknown [nats]: what that must exceed. bias [nats]: of a
+    name, what its gains are short of.
     commit, commit_unknown: probability from which an effect or `unknown` is the verdict.
     conformal: names whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many
     it rests on, 0 for the defaults. lapse: how often the evidence says nothing of the truth, so that no name is ever
@@ -47,6 +48,7 @@ class Calibration:
     unknown: float = 25.0
     unknown_share: float = 0.3
     left: float = 0.0
+    beside: float = 0.0
     commit: float = 0.5
     commit_unknown: float = 0.5
     conformal: float = 0.05
@@ -57,13 +59,14 @@ class Calibration:
 
     def score(
         self, name: str, gain: float, *, parity: float = 0.0, equivalent: bool = False,
-        beyond: float = 0.0,
+        beyond: float = 0.0, best: float = 0.0,
     ) -> float:  # fmt: skip
         """What a name is worth without its bias [nats]. gain: held out; of `none` what chance reaches, of `unknown`
         what a wider floor gains. equivalent: the equivalence test found no gap. beyond: what pieces cost more than
-        those of healthy runs (`left.Left`): under the refit model for `none`, under the best effect for `unknown`."""
+        those of healthy runs (`left.Left`): under the refit model for `none`, under the best effect for `unknown`.
+        best: of `unknown`, the score of that effect: a stranger is told from it by what it leaves."""
         if name == UNKNOWN:
-            return self.unknown_share * gain + self.left * max(beyond, 0.0) - self.unknown
+            return self.beside * best + self.unknown_share * gain + self.left * max(beyond, 0.0) - self.unknown
         gain = self.usual_share * min(gain, self.usual) + max(gain - self.usual, 0.0)
         if name == NONE:
             return gain + self.none + (self.equivalent if equivalent else 0.0) - self.gap * max(beyond, 0.0)

@@ -8,8 +8,9 @@ runs; that of `unknown` a share (`beside`) of the best effect's score, since a s
 share (`unknown_share`) of what a wider floor gains beside it, and `left` for every nat that the best effect leaves,
 less `unknown`. Linear in 1 / temperature and the products with it, but for which effect is the best, which is found in
 turns with them (TURNS): a multinomial regression, biases drawn to 0, in which any name is the truth once in 20 sets
-(LAPSE). Thresholds come from probabilities of sets left out of the fit. To commit to a name and to `unknown` are claims of different weight: each has its own. That of
-names is for sets in which the catalogue has the cause; how often strangers are taken for one of them is another figure.
+(LAPSE). Thresholds come from probabilities of sets left out of the fit. To commit to a name and to `unknown` are claims
+of different weight: each has its own. That of names is for sets in which the catalogue has the cause; how often
+strangers are taken for one of them is another figure.
 """
 
 from __future__ import annotations

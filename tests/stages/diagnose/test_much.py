@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.much.blackbox import corrected
-from r2s2r_cli.stages.diagnose.much.shrink import foretold, share_with_interval
+from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, counting, foretold, share_with_interval
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.measures.gap import own_share
 
@@ -63,6 +63,44 @@ def test_at_the_floor_nothing_is_foretold() -> None:
     assert foretold(at, at / 2, 0.005, groups=["g"] * 8, count=4) == (None, None)
     assert foretold(np.full(8, np.nan), at, 0.005, groups=["g"] * 8, count=4) == (None, None)
     assert foretold(4 * at, at, 0.005, groups=["g"] * 8, count=0) == (None, None)
+
+
+@pytest.mark.parametrize(("count", "left"), [(1, 1), (2, 1), (5, 4), (10, 9), (11, 10), (12, 10), (21, 19)])
+def test_the_best_nine_in_ten_count(count: int, left: int) -> None:
+    """As many as in the floor of the healthy runs (their 0.9 quantile): the worst go, in whatever order they come."""
+    worst = np.random.default_rng(count).permutation(count).astype(float)
+    kept = counting(worst, 0.9)
+    assert kept.sum() == left == (worst <= np.quantile(worst, 0.9)).sum()
+    assert worst[kept].max(initial=-1.0) < worst[~kept].min(initial=np.inf)
+    assert counting(worst, 1.0).all()
+
+
+def test_what_is_not_finite_does_not_count() -> None:
+    """A segment that left the finite numbers is among the worst; of several rows each has its own."""
+    many = counting(np.array([[1.0, np.nan, 2.0, 3.0, 4.0], [5.0, 1.0, 1.0, np.inf, 1.0]]), 0.75)
+    assert many.tolist() == [[True, False, True, True, True], [True, True, True, False, True]]
+    assert not counting(np.full(3, np.nan), 1.0).any()
+
+
+def test_one_fall_decides_no_share() -> None:
+    """A model that halves the error everywhere but in one interval, where both fall: without it the share is that of
+    the others, forecast and realised, and the fall is named; with it nothing is left of the share."""
+    before, after = np.full(10, 4 * 0.006**2), np.full(10, 0.006**2)
+    before[4] = after[4] = 0.2**2
+    share, ends = share_with_interval(before, after, 0.006, kept=0.9)
+    told, _ = foretold(before, after, 0.006, groups=[f"g{k // 5}" for k in range(10)], count=10, kept=0.9)
+    plain, _ = share_with_interval(before, after, 0.006)
+    assert share == pytest.approx(1.0) and ends is not None and ends[1] == pytest.approx(1.0)
+    assert told is not None and told > 0.9
+    assert plain is not None and plain < 0.05
+    made = Shrinkage(
+        effects=("payload",), names=tuple(f"g:{k}" for k in range(10)), floor=0.006, share=share, ci90=ends,
+        squared={"refit": before, "effect": after, "nominal": 2 * before}, predicted=told, predicted_ci90=None,
+        within_run=False, kept=0.9,
+    )  # fmt: skip
+    assert made.set_aside == ("g:4",)
+    assert made.rmse("refit") == pytest.approx(0.012) and made.rmse("nominal") == pytest.approx(0.012 * np.sqrt(2))
+    assert made.gap("effect") == pytest.approx(0.0, abs=1e-9)
 
 
 def _stretches(count: int, rng: np.random.Generator) -> tuple[list[SimpleNamespace], np.ndarray]:

@@ -70,6 +70,16 @@ def test_nuisances_make_up_for_what_looks_like_them() -> None:
     assert held < free - 20
 
 
+def test_following_alone_is_no_gain() -> None:
+    """Where the healthy fit stopped early nuisances that follow gain by themselves: an effect that does nothing gains
+    nothing by that, and another one what it gains beyond."""
+    arena = LinearArena(0.3, noise=QUIET)
+    there = healthy(arena)
+    early = Healthy(arena, Fits(arena).begun([(Hypothesis(), there.base.z + 0.1, np.zeros(0))])[0])  # type: ignore[arg-type]
+    assert before(early, [fitted(0.0)]) == pytest.approx([0.0], abs=1e-9)
+    assert before(early, [fitted(0.3)]) == pytest.approx(before(there, [fitted(0.3)]), rel=1e-6)
+
+
 def test_a_nuisance_that_the_effect_sets_is_the_effects() -> None:
     """What the effect says of a nuisance holds, whatever its runs say; the other nuisances follow."""
     arena = LinearArena(0.0, noise=QUIET)

@@ -15,7 +15,7 @@ from r2s2r_cli.stages.diagnose.which.found import Ranked
 from r2s2r_cli.stages.diagnose.which.pair_share import LEAST, TwoCauses, with_pairs
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score
-from r2s2r_cli.stages.diagnose.which.verdict import verdict_of
+from r2s2r_cli.stages.diagnose.which.verdict import best_replayed, verdict_of
 from r2s2r_cli.stages.measures.gap import NO_GAP_FACTOR
 
 BY = Calibration(commit=0.6, commit_unknown=0.7)
@@ -45,6 +45,20 @@ def test_no_gap_is_a_claim_about_size() -> None:
     assert verdict_of(ranking("payload", 0.51, 30.0), BY, None, CHANCE, NO_GAP) == ("ambiguous", (), 0.51)
     assert verdict_of(ranking("payload", 0.7, 30.0), BY, None, CHANCE, NO_GAP)[0] == "effect"
     assert verdict_of(ranking("sensor_bias", 0.7, CHANCE), BY, None, CHANCE, NO_GAP)[0] == "no_gap"
+
+
+def test_a_stranger_competes_with_what_it_looks_like() -> None:
+    """An effect that gains much is the first guess where it explains all, and not where it leaves as much as it gains:
+    what looks a little like a name is none. What only the logs show is nothing that a stranger could look like."""
+    by = replace(BY, temperature=5.0, beside=0.7, unknown_share=0.5, unknown=5.0)
+    gains = {"payload": 100.0, "backlash": 10.0}
+    for left, first in ((0.0, "payload"), (100.0, "unknown")):
+        worth = {name: by.score(name, gain) for name, gain in gains.items()}
+        worth["unknown"] = by.score("unknown", left, best=best_replayed(worth))
+        p = by.probabilities(worth)
+        assert max(p, key=lambda name: p[name]) == first
+    assert best_replayed({"dropout": 300.0, "none": 200.0, "payload": 3.0}) == 3.0
+    assert best_replayed({"payload": -9.0}) == -9.0 and best_replayed({}) == 0.0
 
 
 def test_the_bound_and_its_confidence_agree() -> None:

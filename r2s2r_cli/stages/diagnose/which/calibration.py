@@ -28,8 +28,8 @@ class Calibration:
     which of its look-alikes it is the replay tells better, where there is one. none, equivalent [nats]: what `none`
     gains, and more where the equivalence test finds no gap; gap: what it loses for every nat that the refit model costs
     more than in healthy runs. beside, unknown_share, left: what `unknown` has of the best effect's score, of what a
-    wider floor gains beside it, and of every nat that it leaves; unknown [nats]: what that must exceed. bias [nats]: of a
-    name, what its gains are short of.
+    wider floor gains beside it, and of every nat that it leaves; unknown [nats]: what that must exceed. bias [nats]:
+    of a name, what its gains are short of.
     commit, commit_unknown: probability from which an effect or `unknown` is the verdict.
     conformal: names whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many
     it rests on, 0 for the defaults. lapse: how often the evidence says nothing of the truth, so that no name is ever

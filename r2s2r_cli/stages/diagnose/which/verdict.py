@@ -43,7 +43,7 @@ def concluded(m: Material) -> Which:
     table = {name: worth[i] for name, i in best.items()}
     table |= {one.effect: calibration.score(one.effect, one.gain, parity=one.parity) for one in others}
     table[NONE] = calibration.score(NONE, m.chance, equivalent=m.no_gap.equivalent, beyond=m.left.refit)
-    table[UNKNOWN] = calibration.score(UNKNOWN, m.unexplained, beyond=m.left.best, best=_best_replayed(table))
+    table[UNKNOWN] = calibration.score(UNKNOWN, m.unexplained, beyond=m.left.best, best=best_replayed(table))
     both = [TwoCauses((m.fits[i].hypothesis.effects[0], m.fits[i].hypothesis.effects[1]), gains[i]) for i in order
             if len(m.fits[i].hypothesis.parts) == 2]  # fmt: skip
     probability, pair = with_pairs(calibration.probabilities(table), both, names, m.chance, calibration.temperature)
@@ -77,7 +77,7 @@ def concluded(m: Material) -> Which:
     )  # fmt: skip
 
 
-def _best_replayed(worth: Mapping[str, float]) -> float:
+def best_replayed(worth: Mapping[str, float]) -> float:
     """Of the scores of effects and `none` the best of an effect that changes a prediction [nats]."""
     return max((nats for name, nats in worth.items() if name != NONE and name not in NO_REPLAY), default=0.0)
 

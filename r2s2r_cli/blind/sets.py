@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.blind.recorded import SUFFIX, read_recording
-from r2s2r_cli.blind.split import FOLLOW
+from r2s2r_cli.blind.split import FOLLOW, judged
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, Run, whole
 from r2s2r_cli.stages.estimate import estimate
@@ -23,8 +23,6 @@ from r2s2r_cli.stages.import_ import import_source, merge_runs
 from schemas.estimate import EstimateSettings
 from schemas.robot import Robot
 
-JUDGED = 3
-"""Of so many gaits one is judged on, the last ones; the others are fitted."""
 ROD_TOLERANCE = 0.1
 """A camera whose scale is wrong is something to be diagnosed, not refused."""
 
@@ -58,10 +56,10 @@ def read_set(folder: Path, *, shuffled: int | None = None) -> Evidence:
     # Judged are the same gaits whatever was run later, and runs stand in the order in which they were made: an effect
     # may begin with one of them.
     later = _runs(folder / FOLLOW, robot) if (folder / FOLLOW).is_dir() else ()
-    judged = max(1, round(len(runs) / JUDGED))
+    last = judged(len(runs))
     evidence = Evidence(
-        robot=robot, model=nominal(robot), runs=(*runs, *later), fit=whole((*runs[:-judged], *later)),
-        judge=whole(runs[-judged:]), healthy=healthy,
+        robot=robot, model=nominal(robot), runs=(*runs, *later), fit=whole((*runs[:-last], *later)),
+        judge=whole(runs[-last:]), healthy=healthy,
     )  # fmt: skip
     return evidence if shuffled is None else evidence.shuffled(shuffled)
 

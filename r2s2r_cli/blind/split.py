@@ -61,8 +61,15 @@ RATES_HZ = (10.0, 30.0)
 GAITS = (3, 5, 8)
 TARGETS = 5
 """Of a gait."""
+JUDGED = 3
+"""Of so many gaits one is judged on, the last ones; the others are fitted."""
 FOLLOW = "follow"
 """Folder in a set of what was run after its gaits, because of their verdict (`blind follow`)."""
+
+
+def judged(gaits: int) -> int:
+    """How many of the gaits of a set are judged on: what begins in one of these nobody could have learned of."""
+    return max(1, round(gaits / JUDGED))
 
 
 def seeds(bank: Bank, count: int, first: int = 0) -> range:

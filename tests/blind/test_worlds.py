@@ -14,7 +14,7 @@ from r2s2r_cli.blind.make.oracle import detectability
 from r2s2r_cli.blind.make.outside import OUTSIDE
 from r2s2r_cli.blind.make.worlds import STRANGE_WITHOUT_RIG, WITHOUT_RIG, Hidden, hidden
 from r2s2r_cli.blind.make.write import robot_text
-from r2s2r_cli.blind.split import Bank, Kind
+from r2s2r_cli.blind.split import Bank, Kind, judged
 from schemas.robot import Robot
 
 SEED = 150_321
@@ -76,6 +76,16 @@ def test_worlds_of_a_seed_differ_in_what_is_wrong_alone() -> None:
     assert np.array_equal(plain.day, wrong.healthy().day)
     other = hidden(Bank.CALIBRATION, SEED + 1, Kind.NONE)
     assert other.friction != plain.friction and 0.45 <= other.friction <= 1.0
+
+
+@pytest.mark.parametrize("gaits", [3, 5, 8])
+def test_what_begins_late_begins_in_a_gait_that_is_fitted(gaits: int) -> None:
+    """A knock, or a push, that only the judged gaits have could be learned of by nobody."""
+    for seed in range(SEED, SEED + 40):
+        knocked = hidden(Bank.CALIBRATION, seed, Kind.SINGLE, effects=("camera_pose",), gaits=gaits).planted[0].late
+        once = hidden(Bank.CALIBRATION, seed, Kind.OUTSIDE, strange="lateral_push", gaits=gaits).strange
+        assert knocked is not None and once is not None and once[2] is not None
+        assert max(knocked[0], once[2]) < gaits - judged(gaits)
 
 
 def test_a_knocked_camera_is_straight_before_and_askew_after() -> None:

@@ -15,7 +15,7 @@ from r2s2r_cli.effects.camera_pose import CameraPose
 from r2s2r_cli.effects.camera_scale import CameraScale
 from r2s2r_cli.effects.dropout import Dropout
 from r2s2r_cli.effects.sensor_bias import SensorBias
-from r2s2r_cli.effects.sensor_gain import SensorGain
+from r2s2r_cli.effects.sensor_gain import ABOUT_M, SensorGain
 from r2s2r_cli.engine import LatchedPid, Simulator, closed_loop, observe, sense, unseen
 from tests.support.variants import Variant, pair, plugged
 
@@ -40,14 +40,15 @@ def seen(model: Variant, t: Tensor, p_WE: Tensor) -> Tensor:
 
 
 def test_sensors_read_gain_then_bias_and_drift(plain: Variant) -> None:
-    """In the order of the catalogue: bias and drift are of the sensor's input, the gain on all of it."""
+    """In the order of the catalogue: bias and drift are of the sensor's input, the gain on how far that is from the
+    middle of the travel."""
     model = with_(plain, SensorBias(), SensorGain(), bias_m=0.004, drift_m_per_s=1e-4, gain=1.05)
     length = torch.tensor([[0.1, 0.15, 0.2]], dtype=torch.float64)
     found = sense(model.structure, model.theta, length, 30.0)
-    assert torch.allclose(found, 1.05 * (length + 0.004 + 0.003), rtol=1e-14)
+    assert torch.allclose(found, ABOUT_M + 1.05 * (length + 0.004 + 0.003 - ABOUT_M), rtol=1e-14)
     t = torch.tensor([[0.0], [10.0]], dtype=torch.float64)
     many = sense(model.structure, model.theta, length.expand(2, -1), t)
-    assert torch.allclose(many, 1.05 * (length + 0.004 + 1e-4 * t), rtol=1e-14)
+    assert torch.allclose(many, ABOUT_M + 1.05 * (length + 0.004 + 1e-4 * t - ABOUT_M), rtol=1e-14)
 
 
 def test_the_controller_acts_on_what_the_sensors_read(plain: Variant) -> None:

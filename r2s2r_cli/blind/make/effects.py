@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from r2s2r_cli.blind.split import judged
+
 Table = dict[str, Any]
 
 
@@ -198,7 +200,7 @@ def _gain(d: Draw) -> Planted:
 def _pose(d: Draw) -> Planted:
     turn = np.deg2rad(1.0) * d.s * d.rng.standard_normal(3) / np.sqrt(3)
     by = 0.008 * d.s * d.way()
-    late = (d.one(d.gaits), float(d.rng.uniform(2.5, 6.0)))
+    late = (d.one(d.gaits - judged(d.gaits)), float(d.rng.uniform(2.5, 6.0)))
     return Planted("camera_pose", {"turn_rad": turn.tolist(), "by_m": [*by.tolist(), 0.0]}, "observation",
                    {"turn_rad": float(np.linalg.norm(turn))}, {"kind": "camera"}, late)  # fmt: skip
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from r2s2r_cli.blind.make.effects import STARRED, USUAL, Draw, Planted
 from r2s2r_cli.blind.make.outside import OUTSIDE, Outside, outside
-from r2s2r_cli.blind.split import AR1, GAITS, NOISE_M, RATES_HZ, Bank, Kind, size
+from r2s2r_cli.blind.split import AR1, GAITS, NOISE_M, RATES_HZ, Bank, Kind, judged, size
 from r2s2r_cli.rig.effects.base import Law, Scene
 from r2s2r_cli.rig.world import World
 
@@ -120,7 +120,7 @@ def hidden(
     if kind is Kind.OUTSIDE:
         name = strange or str(wrong.choice(OUTSIDE if tier == "B" else STRANGE_WITHOUT_RIG))
         once = name in ("cable_snag", "lateral_push")
-        limited = int(wrong.integers(count)) if once else None
+        limited = int(wrong.integers(count - judged(count))) if once else None
         # What happens once must be larger to be seen at all.
         return replace(plain, strange=(name, outside(name, wrong, 1.5 * s if once else s), limited), factor=s)
     number = {Kind.NONE: 0, Kind.SINGLE: 1, Kind.PAIR: 2}[kind]

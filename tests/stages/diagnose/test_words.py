@@ -15,8 +15,8 @@ def found(verdict: str, **changes: object) -> SimpleNamespace:
     """A diagnosis with a payload on rod 1 as its best effect, and 12 mm that become 6 at a floor of 5."""
     best = SimpleNamespace(effect="payload", element=changes.pop("element", Element("rod", 1)), probability=0.4)
     much = SimpleNamespace(
-        effects=("payload",), names=("b:1", "b:2"), floor=0.005, within_run=False, set_aside=(), share=0.7, ci90=(-0.004, 0.9),
-        predicted=0.65, rmse={"refit": 0.012, "effect": 0.006}.get,
+        effects=("payload",), names=("b:1", "b:2"), floor=0.005, within_run=False, set_aside=(), share=0.7,
+        ci90=(-0.004, 0.9), predicted=0.65, rmse={"refit": 0.012, "effect": 0.006}.get,
     )  # fmt: skip
     values = {"verdict": verdict, "effects": ("payload",), "probability": 0.9, "set90": ("payload", "none", "unknown"),
               "best": best, "ranking": (SimpleNamespace(effect="none"), best),

@@ -132,7 +132,7 @@ class Asked:
 
     def _split(self, runs: Sequence[Run], found: ArtifactData) -> tuple[tuple[Selection, ...], tuple[Selection, ...]]:
         """As typed, else that of the identification; runs that it does not know are fitted, the last of them judged."""
-        from r2s2r_cli.stages.identify.data import Selection
+        from r2s2r_cli.stages.diagnose.evidence import whole
         from r2s2r_cli.stages.identify.selection import split
 
         caps = [run.caps for run in runs]
@@ -142,14 +142,11 @@ class Asked:
         fit, judge = (_selected(table, role, {run.name for run in runs}) for role in (TRAIN, TEST))
         known = {name.decode() for name in table["run"].tolist()}
         new = [run for run in runs if run.name not in known]
-        whole = [
-            Selection(run.name, tuple(i + 1 for i, yes in enumerate(run.caps.intervals.complete.tolist()) if yes))
-            for run in new
-        ]
-        if whole and judge:
-            fit += whole
-        elif whole:
-            fit, judge = [*fit, *whole[:-1]], [whole[-1]]
+        added = list(whole(new))
+        if added and judge:
+            fit += added
+        elif added:
+            fit, judge = [*fit, *added[:-1]], [added[-1]]
         return tuple(fit), tuple(judge)
 
     def _floor(self) -> FloorGiven | None:

@@ -20,6 +20,7 @@ from r2s2r_cli.stages.diagnose.which.shake import shaken
 from r2s2r_cli.stages.diagnose.which.stretches import stretches
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.measures.floor import floor_of
+from r2s2r_cli.stages.measures.gap import counting
 from r2s2r_cli.stages.measures.steps import steps_of
 
 NUMERICS_M = 3e-3
@@ -98,7 +99,7 @@ def refit(
             sensor = float(np.sqrt(np.mean([np.sum(one.noise[-1] ** 2, axis=-1).mean() for one in arena.whole])))
             squared = healthy.score.squared
             squared = squared[np.isfinite(squared)]
-            usual = squared[squared <= np.quantile(squared, KEPT)]
+            usual = squared[counting(squared, KEPT)]
             rmse = float(np.sqrt(np.mean(usual)))
             floor = FloorGiven(rmse, min(sensor, rmse), "the healthy runs, refitted", True, KEPT)
         told("healthy runs", 1, 1)

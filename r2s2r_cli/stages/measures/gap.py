@@ -6,6 +6,16 @@ import numpy as np
 
 NO_GAP_FACTOR = 1.25
 """There is no gap where the refit RMSE is surely below this many floors."""
+TINY = 1e-9
+"""Of a number of segments: shares are not exact."""
+
+
+def counting(worst: np.ndarray, kept: float) -> np.ndarray:
+    """Which of squared errors (..., segment), of several models the largest, are among the share `kept` of the best; no
+    error that is not finite is."""
+    worst = np.where(np.isfinite(worst), worst, np.inf)
+    last = int(np.floor(kept * (worst.shape[-1] - 1) + TINY))
+    return np.asarray((worst <= np.sort(worst, axis=-1)[..., last : last + 1]) & np.isfinite(worst))
 
 
 def corrected_gap(mse: float, floor_m: float) -> float:

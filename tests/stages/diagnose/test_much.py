@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.much.blackbox import corrected
-from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, counting, foretold, share_with_interval
+from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, foretold, share_with_interval
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
-from r2s2r_cli.stages.measures.gap import own_share
+from r2s2r_cli.stages.measures.gap import counting, own_share
 
 
 def test_a_share_is_of_the_gap_above_the_floor() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run, whole
 from r2s2r_cli.stages.diagnose.much.blackbox import corrected
-from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, counting, foretold, share_with_interval
+from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, foretold, share_with_interval
 from r2s2r_cli.stages.diagnose.prepare import KEPT
 from r2s2r_cli.stages.diagnose.starts import Starts
 from r2s2r_cli.stages.diagnose.which.arena import Arena
@@ -20,6 +20,7 @@ from r2s2r_cli.stages.diagnose.which.score import Score, groups_of
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch, stretches
 from r2s2r_cli.stages.diagnose.which.which import Compared
 from r2s2r_cli.stages.identify.data import Selection
+from r2s2r_cli.stages.measures.gap import counting
 
 Told = Callable[[str, int, int], None]
 

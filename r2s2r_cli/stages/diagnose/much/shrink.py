@@ -13,11 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.stages.measures.bootstrap import DRAWS
-from r2s2r_cli.stages.measures.gap import corrected_gap, own_share
+from r2s2r_cli.stages.measures.gap import corrected_gap, counting, own_share
 
 LEVEL = 0.90
-TINY = 1e-9
-"""Of a number of segments: shares are not exact."""
 
 
 @dataclass(frozen=True)
@@ -81,14 +79,6 @@ class Shrinkage:
         """Own share of the black box: what could have been closed."""
         refit, ceiling = self.of("refit"), self.of("ceiling")
         return None if refit is None or ceiling is None else own_share(refit, ceiling, self.floor)
-
-
-def counting(worst: np.ndarray, kept: float) -> np.ndarray:
-    """Which of squared errors (..., segment), of several models the largest, are among the share `kept` of the best; no
-    error that is not finite is."""
-    worst = np.where(np.isfinite(worst), worst, np.inf)
-    last = int(np.floor(kept * (worst.shape[-1] - 1) + TINY))
-    return np.asarray((worst <= np.sort(worst, axis=-1)[..., last : last + 1]) & np.isfinite(worst))
 
 
 def _means(before: np.ndarray, after: np.ndarray, kept: float) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.screen import Response
 from r2s2r_cli.stages.measures.bootstrap import upper_bound
-from r2s2r_cli.stages.measures.gap import no_gap as at_floor
+from r2s2r_cli.stages.measures.gap import counting, no_gap as at_floor
 
 LEVELS = (0.99, 0.975, 0.95, 0.9, 0.8, 0.7, 0.6)
 """Of confidence that are told apart."""
@@ -41,7 +41,7 @@ def no_gap(refit: Score, floor_m: float, *, kept: float = 1.0) -> NoGap:
     """Of the refit nominal model. kept: share of the intervals, the best ones, that the floor was taken from: the same
     share counts here."""
     squared = refit.squared[np.isfinite(refit.squared)]
-    squared = squared[squared <= np.quantile(squared, kept)] if len(squared) else squared
+    squared = squared[counting(squared, kept)] if len(squared) else squared
     rmse = float(np.sqrt(squared.mean())) if len(squared) else float("inf")
     bound = upper_bound(squared, level=0.90) if len(squared) else None
     return NoGap(rmse, bound, floor_m, 0.0 if bound is None else _sure(squared, floor_m))

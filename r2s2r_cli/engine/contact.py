@@ -70,7 +70,7 @@ def contact_rows(
     for effect in overrides(structure, "surface"):
         zero = torch.zeros_like(gap)
         own = (memory or {})[effect.name]
-        surface = effect.surface(theta.of(effect.name), own, surface or GroundTerms(zero, zero, zero), h)
+        surface = effect.surface(theta.of(effect.name), own, surface or GroundTerms(zero, zero, zero, zero), h)
     if surface is not None:
         gap, v0, v1 = gap + surface.sunk, v0 - surface.rising, v1 - surface.rising
     # Predicted, not gap < 0: a cap at rest 1e-12 above the ground must stay active.
@@ -81,9 +81,8 @@ def contact_rows(
     between = _between(theta, rods)
     if surface is None:
         return GroundRows(gap, arm, mobility, free, target, active, toi, friction, between)
-    target, give = target + surface.rising, surface.give.expand_as(gap)
-    zero = torch.zeros_like(give[..., 0])
-    softer = torch.diag_embed(torch.stack([zero, zero, give[..., 0], zero, zero, give[..., 1]], dim=-1))
+    target, give, creep = target + surface.rising, surface.give.expand_as(gap), surface.creep.expand_as(gap)
+    softer = torch.diag_embed(torch.stack([creep, creep, give], dim=-1).flatten(-2))
     return GroundRows(gap, arm, mobility + softer, free, target, active, toi, friction, between, give)
 
 

@@ -72,11 +72,13 @@ class MassTerms:
 @dataclass(frozen=True)
 class GroundTerms:
     """The surface below each cap, (B, rod, 2). sunk: how far it lies below the plane [m]; rising: its speed upwards if
-    nothing loads it [m/s]; give: how much slower per normal impulse [1/kg]."""
+    nothing loads it [m/s]; give: how much slower per normal impulse [1/kg]; creep: the same sideways, of a cap that
+    friction holds."""
 
     sunk: Tensor
     rising: Tensor
     give: Tensor
+    creep: Tensor
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from r2s2r_cli.stages.diagnose.starts import Starts
 from r2s2r_cli.stages.diagnose.where import Where
 from r2s2r_cli.stages.diagnose.where.where import where
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration, calibration
-from r2s2r_cli.stages.diagnose.which.numbers import Model
+from r2s2r_cli.stages.diagnose.which.numbers import SENSOR_LAG, Model
 from r2s2r_cli.stages.diagnose.which.remembered import Checkpoint, Remembered
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
 from r2s2r_cli.stages.diagnose.which.which import Compared, Ways, compare_effects
@@ -121,7 +121,8 @@ def diagnose(
         robot=evidence.robot.name, floor=fitted.floor, parity=said, where=found, which=compared.which, much=shrunk,
         next_gait=after,
         refit={name: (float(z), float(sd[k])) for k, (name, z) in enumerate(
-            zip(compared.arena.names[: compared.arena.shared], compared.base.z, strict=False))},
+            zip(compared.arena.names[: compared.arena.shared], compared.base.z, strict=False))
+            if name != SENSOR_LAG or compared.arena.sensors},
         segments=_segments(compared), within_run=evidence.within_run, rollouts=replayer.rollouts,
         warnings=(*fitted.warnings, *compared.which.warnings),
     )  # fmt: skip

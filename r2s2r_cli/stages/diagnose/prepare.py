@@ -9,11 +9,14 @@ import numpy as np
 
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run, whole
+from r2s2r_cli.stages.diagnose.parity.lengths import sensor_parity
+from r2s2r_cli.stages.diagnose.parity.series import series
 from r2s2r_cli.stages.diagnose.starts import Starts, as_known
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.before import Healthy
 from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
+from r2s2r_cli.stages.diagnose.which.numbers import SENSOR_LAG
 from r2s2r_cli.stages.diagnose.which.pieces import pieces
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
 from r2s2r_cli.stages.diagnose.which.shake import shaken
@@ -49,7 +52,7 @@ robots fall over, two fits of the same runs differ by as much."""
 AGED_NUMERICS = 0.1
 """The same of effects that are nuisances because another engine has a little of them: numerics do not age, and what
 has grown since is the effect."""
-AGELESS = ("stiffness", "sensor_lag")
+AGELESS = ("stiffness", SENSOR_LAG)
 """Other nuisances of that kind: how an engine pulls its cables taut, and what filters and converters take."""
 
 Told = Callable[[str, int, int], None]
@@ -174,7 +177,7 @@ def _fitted(
                 hint="r2s2r record --random 15 --port /dev/ttyUSB0   # other shapes",
             )  # fmt: skip
         arena = Arena(replayer, many, floor_m=simulator, noise=noise, lasts=lasts, prior=prior, whole=intervals)
-        z = _begun(arena, z)
+        z = _begun(arena, z) if z is not None else _first(arena, runs)
         for again in range(JACOBIANS if number == rounds - 1 else 1):
             if again:
                 arena.move_starts(arena.away)
@@ -211,12 +214,21 @@ def _frozen(arena: Arena, base: Fit, prior: tuple[np.ndarray, np.ndarray] | None
     return arena, _from(arena, z)
 
 
-def _begun(arena: Arena, z: np.ndarray | None) -> np.ndarray:
-    """Nuisances to begin with: those of before, as far as they are the same ones; else the prior's."""
+def _begun(arena: Arena, z: np.ndarray) -> np.ndarray:
+    """Nuisances to begin with: those of before, as far as they are the same ones."""
     found = arena.mean.copy()
-    if z is not None:
-        count = len(z) if len(z) == len(found) else arena.shared
-        found[:count] = z[:count]
+    count = len(z) if len(z) == len(found) else arena.shared
+    found[:count] = z[:count]
+    return np.clip(found, arena.lower, arena.upper)
+
+
+def _first(arena: Arena, runs: Sequence[Run]) -> np.ndarray:
+    """Nuisances to begin with where none are known: the prior's, but for the lag of the sensors, which the camera shows
+    without a simulator. Else a late command and a hasty camera do as well for a while, and a fit stays with them."""
+    found = arena.mean.copy()
+    seen = sensor_parity([series(run, arena.model.robot) for run in runs])
+    if seen is not None and np.isfinite(seen.later.value):
+        found[arena.names.index(SENSOR_LAG)] = -seen.later.value
     return np.clip(found, arena.lower, arena.upper)
 
 

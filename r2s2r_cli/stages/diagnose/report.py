@@ -125,7 +125,7 @@ def _missing(found: Diagnosis) -> tuple[str, ...]:
 
 def _unit(name: str) -> str:
     """Of a number of the refit nominal model."""
-    known = {one.name: one.unit for one in NUISANCES} | {name: unit for name, unit, _ in CAMERA} | {"sensor_lag": "s"}
+    known = {one.name: one.unit for one in NUISANCES} | {name: unit for name, unit, _ in CAMERA}
     known |= {f"{effect.name}.{own.name}": own.unit for effect in all_effects() for own in effect.own}
     return known.get(name, "m" if name.startswith("sensor_bias") else "")
 

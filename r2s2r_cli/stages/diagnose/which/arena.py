@@ -59,7 +59,7 @@ class Arena:
         self.starting = Starting(replayer.structure, self.many)
         self.away = np.zeros((len(self.many), self.starting.offsets))
         """Where hypotheses begin that do not say, in sd from the starts, (stretch, offset)."""
-        self._shifts = [self.shifts.columns(one, None) for one in self.many]
+        self._shifts = [self.shifts.columns(one) for one in self.many]
 
     def values(self, z: np.ndarray) -> np.ndarray:
         """Values (k, n) of the model at nuisances z (k, p + q), effects off."""
@@ -75,7 +75,6 @@ class Arena:
         seen = self.replayer.around(self.many, np.repeat(self.values(z[None]), len(each[0]), axis=0), each)
         self.starting.learn(seen)
         self._by_offset = self.starting.by_start
-        self._shifts = [self.shifts.columns(one, own.length[0]) for one, own in zip(self.many, seen, strict=True)]
         p = len(self.engine)
         by = SECANT * np.array([self.model.numbers[k].sd for k in self.engine])
         low, high = np.maximum(z[:p] - by, self.lower[:p]), np.minimum(z[:p] + by, self.upper[:p])

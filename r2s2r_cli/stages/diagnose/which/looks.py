@@ -41,13 +41,14 @@ def joined(parts: Sequence[Seen]) -> Seen:
 
 
 def looked(
-    structure: Structure, theta: Parameters, flat: Tensor, rows: Tensor, many: Sequence[Stretch], behind: np.ndarray, *,
-    every: float, p_BE: Tensor, cable_caps: Sequence[tuple[int, int]], up: float,
+    structure: Structure, theta: Parameters, flat: Tensor, rows: Tensor, many: Sequence[Stretch], behind: np.ndarray,
+    lag: np.ndarray, *, every: float, p_BE: Tensor, cable_caps: Sequence[tuple[int, int]], up: float,
 ) -> list[tuple[np.ndarray, np.ndarray]]:  # fmt: skip
     """Caps and lengths, as `Seen`, of each stretch, from the states (row, stored, NS), which are `every` seconds apart;
     rows (k stretch,): of each hypothesis and stretch.
 
-    theta: batch k, without the camera's delay; behind (k,) [s]: that delay. p_BE (1, rod, 2, 3) [m]: caps on the rods,
+    theta: batch k, without the camera's delay; behind (k,) [s]: that delay; lag (k,) [s]: of the sensors, which read
+    before the first state as if what moves there had moved on before. p_BE (1, rod, 2, 3) [m]: caps on the rods,
     which no effect moves. cable_caps: end caps of each cable, between which the sensors measure; up: height of the
     ground in the world [m].
     """
@@ -61,7 +62,7 @@ def looked(
     shown = _mixed(caps.take(first + low, axis=0), caps.take(first + low + 1, axis=0), share)
     shown = shown.reshape(*low.shape, -1, 3)
     shown[..., 2] += up
-    low, share = _places((since + np.repeat(behind, len(many))[:, None]) / every, stored)
+    low, share = _places((since + np.repeat(behind - lag, len(many))[:, None]) / every, stored, before=True)
     begin = torch.as_tensor([one.window.start for one in many])
     stamps = (begin[:, None] + every * torch.arange(stored)).repeat(k, 1).numpy()
     ends = np.asarray(cable_caps)
@@ -126,10 +127,11 @@ def _since(many: Sequence[Stretch]) -> np.ndarray:
     return found
 
 
-def _places(place: np.ndarray, stored: int) -> tuple[np.ndarray, np.ndarray]:
-    """Of places (row, F) among stored states the ones before, and shares of the next ones, as `begins.between`."""
+def _places(place: np.ndarray, stored: int, *, before: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Of places (row, F) among stored states the ones before, and shares of the next ones, as `begins.between`.
+    before: places before the first state go on along the first straight line."""
     low = np.clip(np.floor(place + TINY).astype(int), 0, stored - 2)
-    return low, np.clip(place - low, 0.0, 1.0)
+    return low, np.clip(place - low, -np.inf if before else 0.0, 1.0)
 
 
 def _mixed(low: np.ndarray, high: np.ndarray, share: np.ndarray) -> np.ndarray:

@@ -36,12 +36,15 @@ FARTHEST = 3.0
 """Prior sd from off to which such a nuisance goes."""
 MOST = 1.0
 """Of a logarithm: no nuisance that is a factor leaves e^-1 .. e^1."""
+SENSOR_LAG = "sensor_lag"
+MOST_LATE = 0.12
+"""[s] Of a sensor."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """One number. kind: `factor`, the field times exp(x), `shift`, the field plus x within 0..1, or `own`, of an
-    effect. field: of Parameters; index: which of its numbers, () for all. off: where it changes nothing. sd: of its
+    """One number. kind: `factor`, the field times exp(x), `shift`, the field plus x within 0..1, `own`, of an effect, or
+    `reading`, of what reads the simulated robot, which the engine does not know. field: of Parameters; index: which of its numbers, () for all. off: where it changes nothing. sd: of its
     prior as a nuisance, from what the nominal model has; scale: of an effect's number, how far from off it usually
     is."""
 
@@ -72,8 +75,10 @@ NUISANCES = (
            "speed of all winches out"),
     Number("restitution", "1", "shift", "restitution", (), 0.0, -1.0, 1.0, 0.1, 0.1, "restitution"),
     Number("stiffness", "log", "factor", "stiffness", (), 0.0, -MOST, MOST, 0.15, 0.15, "stiffness of all cables"),
+    Number(SENSOR_LAG, "s", "reading", "", (), 0.0, -MOST_LATE, MOST_LATE, 0.04, 0.04, "delay of all length sensors"),
 )  # fmt: skip
-"""Of the robot, fitted again in every hypothesis alike. The last stands for how an engine pulls its cables taut."""
+"""Of the robot, fitted again in every hypothesis alike. `stiffness` stands for how an engine pulls its cables taut; the
+lag for filters, converters and half a control tick, which are in no log: 40 ms are 2 to 3 mm on every ramp."""
 
 
 class Model:
@@ -132,6 +137,8 @@ class Model:
             if number.kind == "own":
                 own_numbers.setdefault(number.field, []).append(value)
                 continue
+            if number.kind == "reading":
+                continue
             own = getattr(self._base, number.field)
             by = value.reshape(-1, *[1] * (own.ndim - 1))
             named[number.field] = own * by.exp() if number.kind == "factor" else (own + by).clamp(0.0, 1.0)
@@ -162,6 +169,10 @@ class Model:
         """The controller, as identified."""
         del values
         return self._nominal.pid(self._values)
+
+    def sensor_lags(self, values: np.ndarray) -> np.ndarray:
+        """By how much all length readings are late at values (k, n), (k,) [s]."""
+        return np.asarray(values[:, self.place[SENSOR_LAG]])
 
     def off(self, effect: str) -> tuple[int, ...]:
         """Places of the numbers of an effect."""

@@ -123,7 +123,8 @@ class Replayer(Predictor):
         whose = torch.arange(k).repeat_interleave(count)
         late = self.model.observation()
         s0 = placed(structure, own, whose, self._starts(many, k, begin, by).flatten(0, 1), late.ground_height)
-        lasting = max(one.window.duration + one.goes_on for one in many) + max(0.0, float(behind.max()))
+        lag = self.model.sensor_lags(values)
+        lasting = max(one.window.duration + one.goes_on for one in many) + max(0.0, float((behind - lag).max()))
         rows = EVERY * (math.ceil(lasting / step / EVERY - TINY) + 1)
         own_delay = delay_of(structure, own)
         delays = np.zeros(k) if own_delay is None else own_delay[:, 0].numpy()
@@ -148,8 +149,8 @@ class Replayer(Predictor):
                     s0[moved], u, packed[whose[moved]], h=step / n, hold=n, every=EVERY * n, threads=engine.threads
                 )
                 seen = looked(
-                    structure, theta, flat, all_of, many, behind[new], every=EVERY * step, p_BE=self._p_BE,
-                    cable_caps=self.cable_caps, up=late.ground_height,
+                    structure, theta, flat, all_of, many, behind[new], lag[new],
+                    every=EVERY * step, p_BE=self._p_BE, cable_caps=self.cable_caps, up=late.ground_height,
                 )  # fmt: skip
             lasted = [(one.window.duration + one.goes_on) / (EVERY * step) for one in many]
             last = between(flat, torch.as_tensor(lasted, dtype=torch.float64).repeat(len(which))[:, None])

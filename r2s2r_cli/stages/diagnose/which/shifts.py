@@ -1,5 +1,5 @@
-"""Nuisances that are simple shifts of what is seen: what is left of the camera's pose, offsets and lag of the sensors,
-and the height of each run's floor."""
+"""Nuisances that are simple shifts of what is seen: what is left of the camera's pose, offsets of the sensors, and the
+height of each run's floor."""
 
 from __future__ import annotations
 
@@ -14,9 +14,6 @@ CAMERA = (("camera_height", "m", 2e-3), ("camera_tilt_x", "rad", 5e-3), ("camera
 where a stretch starts."""
 SENSOR_SD = 3e-3
 """[m] What a length sensor is off by, the same all the time, before anything is called an effect."""
-SENSOR_LAG_SD = 0.04
-"""[s] By how much all length readings are late, before anything is called an effect: filters, converters and half a
-control tick are in no log, and a lag of 40 ms is 2 to 3 mm on every ramp."""
 FLOOR_SD = 1e-3
 """[m] How well the height of the floor is known, run by run: each is levelled by its own lowest caps."""
 
@@ -31,8 +28,7 @@ class Shifts:
     @property
     def shared(self) -> tuple[str, ...]:
         """Names of those that are the same in every run, which come first."""
-        lag = ("sensor_lag",) if self.sensors else ()
-        return (*(name for name, _, _ in CAMERA), *(f"sensor_bias_{k}" for k in self.sensors), *lag)
+        return (*(name for name, _, _ in CAMERA), *(f"sensor_bias_{k}" for k in self.sensors))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -42,20 +38,16 @@ class Shifts:
     @property
     def sd(self) -> list[float]:
         """Of their prior, (q,)."""
-        own = [sd for _, _, sd in CAMERA] + [SENSOR_SD] * len(self.sensors) + [SENSOR_LAG_SD] * bool(self.sensors)
-        return own + [FLOOR_SD] * len(self.runs)
+        return [sd for _, _, sd in CAMERA] + [SENSOR_SD] * len(self.sensors) + [FLOOR_SD] * len(self.runs)
 
-    def columns(self, one: Stretch, length: np.ndarray | None) -> np.ndarray:
-        """What they add to what is seen of a stretch, per unit, (q, channel, F). A reading that is late shows a length
-        that was, as fast as the simulated one, `length` (F, sensor) [m], changes."""
+    def columns(self, one: Stretch) -> np.ndarray:
+        """What they add to what is seen of a stretch, per unit, (q, channel, F)."""
         F, caps, sensors = len(one.t), one.caps.shape[1], len(self.sensors)
         found = np.zeros((len(self.names), 3 * caps + sensors, F))
         found[: len(CAMERA), : 3 * caps] = camera_columns(one.caps).reshape(len(CAMERA), F, -1).transpose(0, 2, 1)
         for s in range(sensors):
             found[len(CAMERA) + s, 3 * caps + s] = 1.0
         found[len(self.shared) + self.runs.index(one.run), 2 : 3 * caps : 3] = 1.0
-        if sensors and length is not None and F > 1:
-            found[len(self.shared) - 1, 3 * caps :] = -np.gradient(length, one.t, axis=0).T
         return found
 
 

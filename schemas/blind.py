@@ -45,6 +45,8 @@ class PublishedRank(Frozen):
     elpd_gain_sd: float | None = None
     linear_gain: float | None = None
     """Of shards judged before version 7 of `diagnose`; not used."""
+    marginal_nats: float | None = None
+    """Since version 13 of `diagnose`."""
     parity_nats: float = 0.0
     fitted: bool = True
     probability: float

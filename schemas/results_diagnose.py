@@ -29,6 +29,9 @@ class RankedName(Frozen):
     """Log predictive density over the refit nominal model on gaits that were left out [nats]."""
     elpd_gain_sd: float | None = None
     """Its sd, from how much the left-out parts differ in it; None: one part, or no fit."""
+    marginal_nats: float | None = None
+    """Log ratio of marginal likelihoods over the refit nominal model, all gaits together [nats]; None: before version
+    13."""
     parity_nats: float = 0.0
     """What the parity stage says for it, without a simulator [nats]."""
     fitted: bool = True
@@ -66,6 +69,8 @@ class PairFound(Frozen):
     effects: tuple[str, ...]
     elpd_gain: float
     """As of one effect: held-out log predictive density over the refit nominal model [nats]."""
+    marginal_nats: float | None = None
+    """As of one effect, since version 13 of `diagnose`."""
 
 
 class ShrinkageFound(Frozen):

@@ -33,6 +33,8 @@ class EffectParameter:
     """robot | rod | cap | cable | actuated | sensor (that of each cable): how many there are."""
     fitted: bool = True
     """Whether a trajectory tells it; what only counts frames (dropout) is measured without a simulator."""
+    tried: tuple[float, ...] = ()
+    """Values beside off and scale where it is looked for: those of what happens all at once."""
 
     def count(self, structure: Structure) -> int:
         """How many numbers it has on a robot."""

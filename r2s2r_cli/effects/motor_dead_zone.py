@@ -3,8 +3,9 @@
 What it is: a winch does not turn at commands that are too small to overcome the stiction of motor and gearbox.
 Where it acts: channel command; commands below a threshold become 0. Over the last 0.02 of it the winch comes loose only
 in part of its turns, so that the law has a derivative.
-Parameters: threshold, as a share of full command, one a winch.
-What it looks like in data: cables stall shortly before their target. Invisible while commands saturate.
+Parameters: threshold, as a share of full command, one a winch; above 1 it never turns.
+What it looks like in data: cables stall shortly before their target, or never start. Invisible where a command that
+saturates turns the winch.
 What it is confused with: sensor_bias, sensor_gain (a cable that stops off its target).
 Source: Coulomb stiction of DC gear motors; diagnosis.md catalogue A1.
 """
@@ -28,8 +29,8 @@ class MotorDeadZone(Effect):
     channel = Channel.COMMAND
     title = "motor dead zone"
     own = (
-        EffectParameter("threshold", "1", 0.0, 0.95, off=0.0, scale=0.15,
-                        what="command below which the winch stands still", per="actuated"),
+        EffectParameter("threshold", "1", 0.0, 1.2, off=0.0, scale=0.15,
+                        what="command below which the winch stands still", per="actuated", tried=(0.5, 1.1)),
     )  # fmt: skip
     look_alikes = ("sensor_bias", "sensor_gain")
 

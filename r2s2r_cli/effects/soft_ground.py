@@ -8,7 +8,7 @@ Parameters: compliance_m_per_n; tau_s, the time constant; creep_m_per_ns, speed 
 What it looks like in data: caps sit lower the more they carry, tip-overs come late, and feet that are pulled slide
 apart slowly though friction could hold them.
 What it is confused with: rolling_resistance, cap_radius, and the numerics of another engine.
-Source: Kelvin-Voigt foundation; creep of rubber in contact (Persson, Sliding Friction, ch. 16); diagnosis.md catalogue K6.
+Source: Kelvin-Voigt foundation; creep of rubber (Persson, Sliding Friction, ch. 16); diagnosis.md catalogue K6.
 """
 
 from __future__ import annotations
@@ -32,8 +32,15 @@ class SoftGround(Effect):
     own = (
         EffectParameter("compliance_m_per_n", "m/N", 0.0, 0.004, off=0.0, scale=0.001, what="depth per force"),
         EffectParameter("tau_s", "s", 0.0, 0.2, off=0.02, scale=0.03, what="time constant of giving way"),
-        EffectParameter("creep_m_per_ns", "m/(N s)", 0.0, 0.1, off=0.0, scale=0.01,
-                        what="sideways speed per force that friction holds"),
+        EffectParameter(
+            "creep_m_per_ns",
+            "m/(N s)",
+            0.0,
+            0.1,
+            off=0.0,
+            scale=0.01,
+            what="sideways speed per force that friction holds",
+        ),
     )
     look_alikes = ("rolling_resistance", "cap_radius")
 

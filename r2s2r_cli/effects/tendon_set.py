@@ -22,7 +22,7 @@ class TendonSet(Effect):
     name = "tendon_set"
     channel = Channel.CABLE
     title = "plastic set of a cable"
-    own = (EffectParameter("shift_m", "m", -0.02, 0.02, off=0.0, scale=0.005, what="of the rest length", per="cable"),)
+    own = (EffectParameter("shift_m", "m", -0.04, 0.04, off=0.0, scale=0.005, what="of the rest length", per="cable"),)
     look_alikes = ("tendon_stiffness", "sensor_bias")
 
     @classmethod

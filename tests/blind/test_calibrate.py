@@ -42,7 +42,7 @@ def planted(
         score = np.array([*rng.normal(*gains, len(EFFECTS)), 90.0, rng.uniform(0.0, 300.0)])
         parity = np.array([*rng.exponential(1.5, len(EFFECTS)), 0.0, 0.0])
         gap = rng.uniform(0.0, 120.0)
-        one = Case(names, score, parity, bool(rng.random() < 0.3), "", gap, gap * rng.uniform(0.0, 1.0))
+        one = Case(names, score, parity, np.maximum(score, 0.0), bool(rng.random() < 0.3), "", gap, gap * rng.uniform(0.0, 1.0))
         p = np.array(list(by.probabilities(scores(by, one)).values()))
         found.append(replace(one, truth=names[rng.choice(len(names), p=p)]))
     return found

@@ -1,10 +1,10 @@
 """From verdicts on a calibration bank to the numbers that turn gains into probabilities.
 
 p(name) ~ exp((score + bias) / temperature). The score of an effect is its held-out gain, of which the first USUAL nats
-count a share (`usual_share`), since chance gives as much to whatever is tried, and `parity` times what the parity stage
-says for it; that of `none` what the best of the catalogue gains by chance, and `none`, and `equivalent`
-more where the equivalence test finds no gap, less `gap` for every nat that today's pieces cost beyond those of healthy
-runs; that of `unknown` a share (`beside`) of the best effect's score, since a stranger often looks a little like one, a
+count a share (`usual_share`), since chance gives as much to whatever is tried, `marginal` times what it gains on all
+data together, and `parity` times what the parity stage says for it; that of `none` what the best of the catalogue gains
+by chance, and `none`, and `equivalent` more where the equivalence test finds no gap, less `gap` for every nat that
+today's pieces cost beyond those of healthy runs; that of `unknown` a share (`beside`) of the best effect's score, since a stranger often looks a little like one, a
 share (`unknown_share`) of what a wider floor gains beside it, and `left` for every nat that the best effect leaves,
 less `unknown`. Linear in 1 / temperature and the products with it, but for which effect is the best, which is found in
 turns with them (TURNS): a multinomial regression, biases drawn to 0, in which any name is the truth once in 20 sets
@@ -25,12 +25,15 @@ from r2s2r_cli.blind.score.facts import NO_GAP_FACTOR, NO_REPLAY, NONE, UNKNOWN,
 from r2s2r_cli.errors import InputError
 
 LEAST_SETS = 12
-LEARNED = ("sharpness", "parity", "none", "equivalent", "gap", "unknown", "unknown_share", "left", "usual", "beside")
+LEARNED = (
+    "sharpness", "parity", "none", "equivalent", "gap", "unknown", "unknown_share", "left", "usual", "beside",
+    "marginal",
+)  # fmt: skip
 """Numbers beside the biases, in the order of the columns; all of them in the exponent."""
-BEFORE = (1.0, 0.7, 0.0, 0.0, 0.05, -1.0, 0.3, 0.05, 0.5, 0.8)
+BEFORE = (1.0, 0.7, 0.0, 0.0, 0.05, -1.0, 0.3, 0.05, 0.5, 0.8, 0.5)
 """What they are before anything is learned, gains in the unit of SHARPNESS."""
-BEFORE_SD = (2.0, 0.3, 2.0, 1.0, 0.1, 2.0, 0.3, 0.1, 0.5, 0.3)
-POSITIVE = ("sharpness", "parity", "gap", "unknown_share", "left", "usual", "beside")
+BEFORE_SD = (2.0, 0.3, 2.0, 1.0, 0.1, 2.0, 0.3, 0.1, 0.5, 0.3, 0.5)
+POSITIVE = ("sharpness", "parity", "gap", "unknown_share", "left", "usual", "beside", "marginal")
 TURNS = 4
 """In which the numbers and the best effect of every set are found."""
 FOLDS = 10
@@ -62,14 +65,16 @@ several times, outvoted the replay, which tells them apart."""
 
 @dataclass(frozen=True)
 class Case:
-    """One set. names: what was ranked; score, parity (n,) [nats]: without the numbers that are learned, parity beyond
-    BY_CHANCE, MOST at most where a replay tells; equivalent: the test found no gap. truth: the right name, not among
+    """One set. names: what was ranked; score, parity, marginal (n,) [nats]: without the numbers that are learned,
+    parity beyond BY_CHANCE, MOST at most where a replay tells, the marginal of verdicts that do not say it as much as
+    the score. equivalent: the test found no gap. truth: the right name, not among
     `names` where the screening had lost it. gap, left [nats]: what pieces cost beyond those of healthy runs, under the
     refit model and under the best effect; 0 where they cost less."""
 
     names: tuple[str, ...]
     score: np.ndarray
     parity: np.ndarray
+    marginal: np.ndarray
     equivalent: bool
     truth: str
     gap: float = 0.0
@@ -89,9 +94,11 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
         min(max(float(row.get("parity_nats", 0.0)) - BY_CHANCE, 0.0), np.inf if row["effect"] in NO_REPLAY else MOST)
         for row in rows
     ])  # fmt: skip
+    told = any(row.get("marginal_nats") is not None for row in rows)
+    marginal = np.array([float((row.get("marginal_nats") if told else row["elpd_gain"]) or 0.0) for row in rows])
     gap, left = (max(float(document.get(key) or 0.0), 0.0) for key in ("gap_nats", "left_nats"))
     names = tuple(row["effect"] for row in rows)
-    return Case(names, np.array(score), parity, equivalent, truth.right, gap, left)
+    return Case(names, np.array(score), parity, np.maximum(marginal, 0.0), equivalent, truth.right, gap, left)
 
 
 def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
@@ -124,6 +131,7 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
         "most": MOST,
         "usual": USUAL,
         "usual_share": learned["usual"] * SHARPNESS / sharp,
+        "marginal": learned["marginal"] * SHARPNESS / sharp,
         "none": learned["none"] / sharp,
         "equivalent": learned["equivalent"] / sharp,
         "gap": learned["gap"] * SHARPNESS / sharp,
@@ -151,7 +159,8 @@ def _design(one: Case, effects: Sequence[str], known: np.ndarray) -> np.ndarray:
     """What multiplies LEARNED and the biases in the exponent of every name, (name, LEARNED + effect). known: LEARNED as
     far as they are, by which the best effect is found."""
     X = np.zeros((len(one.names), len(LEARNED) + len(effects)))
-    for row, name, score, parity in zip(X, one.names, one.score, one.parity, strict=True):
+    told = zip(one.names, one.score, one.parity, one.marginal, strict=True)
+    for row, (name, score, parity, marginal) in zip(X, told, strict=True):
         if name == UNKNOWN:
             row[5:8] = 1.0, score * SHARPNESS, one.left * SHARPNESS
             continue
@@ -159,7 +168,7 @@ def _design(one: Case, effects: Sequence[str], known: np.ndarray) -> np.ndarray:
         if name == NONE:
             row[2:5] = 1.0, float(one.equivalent), -one.gap * SHARPNESS
         else:
-            row[1] = parity
+            row[1], row[10] = parity, marginal * SHARPNESS
             row[len(LEARNED) + effects.index(name)] = 1.0
     worth = X[:, : len(LEARNED)] @ known[: len(LEARNED)]
     replayed = [w for w, name in zip(worth, one.names, strict=True) if name not in (NONE, UNKNOWN, *NO_REPLAY)]

@@ -135,6 +135,8 @@ def _rank(row: Mapping[str, Any]) -> dict[str, Any]:
     found["size"] = {name: _short(value) for name, value in row.get("size", {}).items()}
     if "elpd_gain_sd" in found:
         found["elpd_gain_sd"] = _short(found["elpd_gain_sd"])
+    if not found.get("marginal_nats"):  # of what was not fitted
+        found.pop("marginal_nats", None)
     return {name: value for name, value in found.items() if (name, value) not in _USUAL}
 
 

@@ -36,7 +36,8 @@ def diagnose_report(found: Diagnosis) -> DiagnoseReport:
         verdict=which.verdict, sentence=sentence(found), effects=which.effects, probability=which.probability,  # type: ignore[arg-type]
         set90=which.set90, ranking=tuple(_ranked(one) for one in which.ranking),
         pairs=tuple(
-            PairFound(effects=one.effects, elpd_gain=one.gain) for one in which.pairs if math.isfinite(one.gain)
+            PairFound(effects=one.effects, elpd_gain=one.gain, marginal_nats=_finite(one.marginal, 0.0))
+            for one in which.pairs if math.isfinite(one.gain)
         ),
         where=_where(found),
         shrinkage=_shrinkage(found), not_testable=which.not_testable,
@@ -70,8 +71,8 @@ def _ranked(one: Ranked) -> RankedName:
     return RankedName(
         effect=one.effect, elpd_gain=_finite(one.gain, -1e9),
         elpd_gain_sd=one.gain_sd if one.gain_sd is not None and math.isfinite(one.gain_sd) else None,
-        parity_nats=one.parity, fitted=one.fitted, probability=one.probability,
-        size=dict(one.size),
+        marginal_nats=_finite(one.marginal, 0.0), parity_nats=one.parity, fitted=one.fitted,
+        probability=one.probability, size=dict(one.size),
         ci90=dict(one.ci90), units=dict(one.units), channel=one.channel,
         element=None if one.element is None else _element(one.element),
         rmse_m=None if one.rmse is None or not math.isfinite(one.rmse) else one.rmse, moved=one.moved,

@@ -22,10 +22,11 @@ class Calibration:
     """What turns evidence into probabilities.
 
     temperature [nats]: of the softmax over names. usual [nats]: about what chance gives to the best of a catalogue;
-    usual_share: what a nat below it counts. parity: nats of gain that a nat of the parity stage is worth, which
-    needs no simulator and errs far less, beyond by_chance [nats], which it says for the best of a whole catalogue where
-    nothing is wrong; most [nats]: of them that count, since a finding that stands out says that something is wrong, and
-    which of its look-alikes it is the replay tells better, where there is one. none, equivalent [nats]: what `none`
+    usual_share: what a nat below it counts; marginal: what a nat of the marginal likelihood counts beside it. parity:
+    nats of gain that a nat of the parity stage is worth, which needs no simulator and errs far less, beyond by_chance
+    [nats], which it says for the best of a whole catalogue where nothing is wrong; most [nats]: of them that count,
+    since a finding that stands out says that something is wrong, and which of its look-alikes it is the replay tells
+    better, where there is one. none, equivalent [nats]: what `none`
     gains, and more where the equivalence test finds no gap; gap: what it loses for every nat that the refit model costs
     more than in healthy runs. beside, unknown_share, left: what `unknown` has of the best effect's score, of what a
     wider floor gains beside it, and of every nat that it leaves; unknown [nats]: what that must exceed. bias [nats]:
@@ -42,6 +43,7 @@ class Calibration:
     most: float = float("inf")
     usual: float = 0.0
     usual_share: float = 1.0
+    marginal: float = 0.0
     none: float = 20.0
     equivalent: float = 6.0
     gap: float = 0.0
@@ -58,19 +60,21 @@ class Calibration:
     sets: int = 0
 
     def score(
-        self, name: str, gain: float, *, parity: float = 0.0, equivalent: bool = False,
-        beyond: float = 0.0, best: float = 0.0,
+        self, name: str, gain: float, *, marginal: float = 0.0, parity: float = 0.0,
+        equivalent: bool = False, beyond: float = 0.0, best: float = 0.0,
     ) -> float:  # fmt: skip
         """What a name is worth without its bias [nats]. gain: held out; of `none` what chance reaches, of `unknown`
-        what a wider floor gains. equivalent: the equivalence test found no gap. beyond: what pieces cost more than
-        those of healthy runs (`left.Left`): under the refit model for `none`, under the best effect for `unknown`.
-        best: of `unknown`, the score of that effect: a stranger is told from it by what it leaves."""
+        what a wider floor gains. marginal: of an effect, on all data. equivalent: the equivalence test found no gap.
+        beyond: what pieces cost more than those of healthy runs (`left.Left`): under the refit model for `none`, under
+        the best effect for `unknown`. best: of `unknown`, the score of that effect: a stranger is told from it by what
+        it leaves."""
         if name == UNKNOWN:
             return self.beside * best + self.unknown_share * gain + self.left * max(beyond, 0.0) - self.unknown
         gain = self.usual_share * min(gain, self.usual) + max(gain - self.usual, 0.0)
         if name == NONE:
             return gain + self.none + (self.equivalent if equivalent else 0.0) - self.gap * max(beyond, 0.0)
         most = float("inf") if name in NO_REPLAY else self.most
+        gain += self.marginal * max(marginal, 0.0)
         return gain + self.parity * min(max(parity - self.by_chance, 0.0), most)
 
     def absolute(self) -> Calibration:

@@ -133,6 +133,8 @@ def _candidate(
     )
     origin = off if values is None else values[[places[0] for places in spread]]
     tries = _tries(keys, origin, scale, touched)
+    for k, number in enumerate(numbers):
+        tries += [np.where(np.arange(len(origin)) == k, value, origin) for value in number.tried]
     known = {name.split(".", 1)[1]: k for k, name in enumerate(names)}
     given = [(known[name], value) for name, value in suggested.items() if name in known]
     if given:

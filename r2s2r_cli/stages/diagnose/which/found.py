@@ -18,7 +18,8 @@ NONE, UNKNOWN = "none", "unknown"
 class Ranked:
     """One name in the ranking: an effect with its best element, `none` or `unknown`.
 
-    gain: held-out log predictive density over the refit nominal model [nats]. size, ci90: of its numbers, by name, in
+    gain: held-out log predictive density over the refit nominal model [nats]; marginal: log ratio of marginal
+    likelihoods of all that was fitted [nats]; both less what healthy runs gain. size, ci90: of its numbers, by name, in
     `units`. moved: the fit left its start; on_bound: names of numbers that ended on a bound. rmse: of the caps at the
     ends of stretches left out [m]. misfit: squares over what noise and floor explain, median over stretches.
     gain_sd: of the gain, from how much what was left out differs in it [nats]. parity: what the parity stage says for
@@ -38,6 +39,7 @@ class Ranked:
     rmse: float | None = None
     misfit: float | None = None
     gain_sd: float | None = None
+    marginal: float = 0.0
     parity: float = 0.0
     fitted: bool = True
     others: tuple[tuple[Element, float], ...] = ()

@@ -35,6 +35,8 @@ class Material:
     calibration: Calibration
     chronic: np.ndarray
     """What of the gain of each fit was there before (`before.chronic`) [nats]."""
+    marginal: np.ndarray
+    """What each fit gains on all data (`marginal_gains`), less what was there before [nats]."""
     asked: tuple[str, ...] | None = None
     """Ids of the effects that may be named; None: all."""
     parity: Mapping[str, Mapping[int | None, float]] = field(default_factory=dict)

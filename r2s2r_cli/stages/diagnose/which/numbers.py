@@ -43,10 +43,10 @@ MOST_LATE = 0.12
 
 @dataclass(frozen=True)
 class Number:
-    """One number. kind: `factor`, the field times exp(x), `shift`, the field plus x within 0..1, `own`, of an effect, or
-    `reading`, of what reads the simulated robot, which the engine does not know. field: of Parameters; index: which of its numbers, () for all. off: where it changes nothing. sd: of its
-    prior as a nuisance, from what the nominal model has; scale: of an effect's number, how far from off it usually
-    is."""
+    """One number. kind: `factor`, the field times exp(x), `shift`, the field plus x within 0..1, `own`, of an effect,
+    or `reading`, of what reads the simulated robot, which the engine does not know. field: of Parameters; index: which
+    of its numbers, () for all. off: where it changes nothing. sd: of its prior as a nuisance, from what the nominal
+    model has; scale: of an effect's number, how far from off it usually is; tried: other values of it to look at."""
 
     name: str
     unit: str
@@ -59,6 +59,7 @@ class Number:
     sd: float
     scale: float
     what: str
+    tried: tuple[float, ...] = ()
 
     @property
     def within(self) -> tuple[float, float]:
@@ -108,7 +109,7 @@ class Model:
                     numerics = NUMERICS.get(effect.name, 0.0) * one.scale
                     numbers.append(
                         Number(f"{effect.name}.{one.name}{label}", one.unit, "own", f"{effect.name}.{one.name}", (i,),
-                               one.off, one.lower, one.upper, numerics, one.scale, one.what)
+                               one.off, one.lower, one.upper, numerics, one.scale, one.what, one.tried)
                     )  # fmt: skip
         self.numbers = tuple(numbers)
         self.names = tuple(number.name for number in numbers)

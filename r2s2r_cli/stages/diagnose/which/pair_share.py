@@ -25,10 +25,12 @@ LARGEST = 60.0
 
 @dataclass(frozen=True)
 class TwoCauses:
-    """Two effects fitted together, the better single one first. gain: held out, over the refit nominal model [nats]."""
+    """Two effects fitted together, the better single one first. gain: held out, over the refit nominal model
+    [nats]; marginal: on all data, as `marginal_gains` [nats]."""
 
     effects: tuple[str, str]
     gain: float
+    marginal: float = 0.0
 
 
 def with_pairs(

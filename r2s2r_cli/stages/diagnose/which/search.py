@@ -24,6 +24,8 @@ LAST = 4
 """Iterations of those that are left."""
 AGAIN, BETWEEN = 3, 2
 """Times that these show each other their nuisances and starts, and iterations after each."""
+LED, LED_ON = 4, 4
+"""Fits from whose nuisances and starts the refit nominal model is tried again, and its iterations there."""
 GIVING = 6
 """Fits whose nuisances and starts all are tried with."""
 SUSPECTED, LEAST_SAID = 3, 2.0
@@ -75,6 +77,7 @@ def fitted(arena: Arena, base: Fit, picked: Sequence[Response], told_by: Said, t
         nominal, *going = exchanged(fits, [nominal, *going])
         told("fits", number + 1, len(ROUNDS) + 1)
     fits.run([nominal, *going], iterations=LAST)
+    nominal = _led(fits, nominal, best_of(going))
     for _ in range(AGAIN):
         nominal, *going = exchanged(fits, [nominal, *best_of(going)])
         fits.run([nominal, *going], iterations=BETWEEN)
@@ -100,6 +103,17 @@ def exchanged(fits: Fits, found: Sequence[Fit]) -> list[Fit]:
     for i, one in new.items():
         one.start = found[i].start
     return [new.get(i, one) for i, one in enumerate(found)]
+
+
+def _led(fits: Fits, nominal: Fit, going: Sequence[Fit]) -> Fit:
+    """The refit nominal model, or where it comes to from what an effect's fit has found, if that is better. An effect
+    that only led the nuisances out of a hollow would else keep what they gained."""
+    led = fits.begun([(nominal.hypothesis, one.z, nominal.x) for one in going[:LED]], [one.away for one in going[:LED]])
+    fits.settle(led)
+    fits.run(led, iterations=LED_ON)
+    best = min([nominal, *led], key=lambda one: one.cost)
+    best.start = nominal.start
+    return best
 
 
 def _said(picked: Sequence[Response], told_by: Said) -> list[Candidate]:

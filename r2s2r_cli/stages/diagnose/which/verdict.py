@@ -34,7 +34,10 @@ def concluded(m: Material) -> Which:
     calibration = m.calibration
     order = sorted(gains, key=lambda i: -gains[i])
     singles = [i for i in order if len(m.fits[i].hypothesis.parts) == 1]
-    worth = {i: calibration.score(m.fits[i].hypothesis.effects[0], gains[i], parity=m.said(i)) for i in singles}
+    worth = {
+        i: calibration.score(m.fits[i].hypothesis.effects[0], gains[i], marginal=float(m.marginal[i]), parity=m.said(i))
+        for i in singles
+    }
     best: dict[str, int] = {}
     for i in sorted(singles, key=lambda i: -worth[i]):
         best.setdefault(m.fits[i].hypothesis.effects[0], i)
@@ -44,14 +47,17 @@ def concluded(m: Material) -> Which:
     table |= {one.effect: calibration.score(one.effect, one.gain, parity=one.parity) for one in others}
     table[NONE] = calibration.score(NONE, m.chance, equivalent=m.no_gap.equivalent, beyond=m.left.refit)
     table[UNKNOWN] = calibration.score(UNKNOWN, m.unexplained, beyond=m.left.best, best=best_replayed(table))
-    both = [TwoCauses((m.fits[i].hypothesis.effects[0], m.fits[i].hypothesis.effects[1]), gains[i]) for i in order
-            if len(m.fits[i].hypothesis.parts) == 2]  # fmt: skip
+    both = [
+        TwoCauses((m.fits[i].hypothesis.effects[0], m.fits[i].hypothesis.effects[1]), gains[i], float(m.marginal[i]))
+        for i in order if len(m.fits[i].hypothesis.parts) == 2
+    ]  # fmt: skip
     probability, pair = with_pairs(calibration.probabilities(table), both, names, m.chance, calibration.temperature)
     sds = gain_sds(m.refit, m.scores, m.groups).tolist() if m.scores else []
     ranking = [
         replace(
             _ranked(m, i, gains[i], probability[name], singles, gains),
             gain_sd=sds[i],
+            marginal=float(m.marginal[i]),
             parity=m.said(i),
         )
         for name, i in best.items()

@@ -15,6 +15,7 @@ from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.found import Which
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.left import expected, left
+from r2s2r_cli.stages.diagnose.which.marginal import marginal_gains
 from r2s2r_cli.stages.diagnose.which.material import Material
 from r2s2r_cli.stages.diagnose.which.pairs import pairs_of
 from r2s2r_cli.stages.diagnose.which.rivals import WIDER, chance, no_gap
@@ -96,9 +97,9 @@ def compare_effects(
     material = Material(
         arena=arena, base=base, refit=refit, fits=tuple(fits), scores=tuple(own), responses=responses,
         chance=by_chance, no_gap=no_gap(refit, floor_m, kept=kept), wider=wider,
-        left=left(at_least, refit, own, healthy),
+        left=left(at_least, arena.sizes, refit, own, healthy),
         unexplained=unexplained if ways.unknown else -np.inf, groups=groups, calibration=calibration,
-        chronic=old,
+        chronic=old, marginal=marginal_gains(arena, base, fits) - old,
         asked=None if effects is None else tuple(effects), parity=told_by or {},
     )  # fmt: skip
     which = concluded(material)

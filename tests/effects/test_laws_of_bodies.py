@@ -172,6 +172,27 @@ def test_soft_ground_is_a_kelvin_voigt_foundation() -> None:
     assert float(back[0, 0]) == pytest.approx(float(sunk[-1]) * math.exp(-1), rel=0.02)
 
 
+def test_soft_ground_creeps_sideways() -> None:
+    """A rod that friction would hold on a slope along its axis moves down it at creep times what each cap holds, once
+    that stops it; beyond the cone it slides as ever."""
+    creep, slope = 0.01, 0.2
+    structure, theta = rod(SoftGround(), {"creep_m_per_ns": creep})
+    along = vector(G * math.sin(slope), 0.0, -G * math.cos(slope)).expand(1, 3)
+    states = roll(structure, replace(theta, gravity=along), lying(structure), 100, H)
+    held = MASS * G * math.sin(slope) / 2
+    number = torch.arange(1, 101, dtype=torch.float64)
+    speed = torch.stack([one.v_WB[0, 0, 0] for one in states[1:]])
+    expected = creep * held * (1 - (1 + 2 * H / (creep * MASS)) ** -number)  # implicit in the step
+    assert torch.allclose(speed, expected, rtol=1e-3, atol=0)  # caps of unequal loads share a little unequally
+    steep = vector(G * math.sin(1.3), 0.0, -G * math.cos(1.3)).expand(1, 3)
+    plain, _ = rod(SoftGround(), {})
+    slid, free = (
+        roll(plain, replace(one, gravity=steep), lying(plain), 20, H)[-1].v_WB
+        for one in (theta, theta.with_values({"soft_ground.creep_m_per_ns": torch.zeros_like(along[:, :1])}))
+    )
+    assert torch.allclose(slid, free, rtol=0, atol=1e-9)
+
+
 @pytest.mark.slow
 def test_soft_ground_is_stable_when_very_soft() -> None:
     """A dropped rod on ground that gives 4 mm a newton with hardly any time constant comes to rest at its depth."""

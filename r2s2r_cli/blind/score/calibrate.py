@@ -4,13 +4,13 @@ p(name) ~ exp((score + bias) / temperature). The score of an effect is its held-
 count a share (`usual_share`), since chance gives as much to whatever is tried, `marginal` times what it gains on all
 data together, and `parity` times what the parity stage says for it; that of `none` what the best of the catalogue gains
 by chance, and `none`, and `equivalent` more where the equivalence test finds no gap, less `gap` for every nat that
-today's pieces cost beyond those of healthy runs; that of `unknown` a share (`beside`) of the best effect's score, since a stranger often looks a little like one, a
-share (`unknown_share`) of what a wider floor gains beside it, and `left` for every nat that the best effect leaves,
-less `unknown`. Linear in 1 / temperature and the products with it, but for which effect is the best, which is found in
-turns with them (TURNS): a multinomial regression, biases drawn to 0, in which any name is the truth once in 20 sets
-(LAPSE). Thresholds come from probabilities of sets left out of the fit. To commit to a name and to `unknown` are claims
-of different weight: each has its own. That of names is for sets in which the catalogue has the cause; how often
-strangers are taken for one of them is another figure.
+today's pieces cost beyond those of healthy runs; that of `unknown` a share (`beside`) of the best effect's score, since
+a stranger often looks a little like one, a share (`unknown_share`) of what a wider floor gains beside it, and `left`
+for every nat that the best effect leaves, less `unknown`. Linear in 1 / temperature and the products with it, but for
+which effect is the best, which is found in turns with them (TURNS): a multinomial regression, biases drawn to 0, in
+which any name is the truth once in 20 sets (LAPSE). Thresholds come from probabilities of sets left out of the fit. To
+commit to a name and to `unknown` are claims of different weight: each has its own. That of names is for sets in which
+the catalogue has the cause; how often strangers are taken for one of them is another figure.
 """
 
 from __future__ import annotations

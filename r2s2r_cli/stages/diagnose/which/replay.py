@@ -12,11 +12,11 @@ from r2s2r_cli.stages.diagnose.which.begins import TINY, between, carried, place
 from r2s2r_cli.stages.diagnose.which.looks import Seen, joined, looked
 from r2s2r_cli.stages.diagnose.which.motion import first_of_each
 from r2s2r_cli.stages.diagnose.which.numbers import Model
+from r2s2r_cli.stages.diagnose.which.orders import Orders
 from r2s2r_cli.stages.diagnose.which.recent import Recent, digests
 from r2s2r_cli.stages.diagnose.which.stable import Stable
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
-from r2s2r_cli.stages.identify.commands import CommandLog
-from r2s2r_cli.stages.identify.data import RunData
+from r2s2r_cli.stages.diagnose.which.turning import STEP_S, turning
 from r2s2r_cli.stages.identify.offsets import displaced
 from r2s2r_cli.stages.identify.predict import Predictor, alike
 from r2s2r_cli.stages.identify.windows import Window
@@ -42,7 +42,7 @@ class Replayer(Predictor):
 
         super().__init__(model, **how)  # type: ignore[arg-type]
         self.model = model
-        self._logs: dict[tuple[int, int, bool], tuple[RunData, CommandLog]] = {}
+        self._orders = Orders()
         self._packed: dict[int, tuple[Stretch, Tensor]] = {}
         nominal = model.theta(model.values0)
         self._stable = Stable(self.structure, nominal)
@@ -122,13 +122,16 @@ class Replayer(Predictor):
         own = own.map(lambda x: x.expand(k, *x.shape[1:]))
         whose = torch.arange(k).repeat_interleave(count)
         late = self.model.observation()
-        s0 = placed(structure, own, whose, self._starts(many, k, begin, by).flatten(0, 1), late.ground_height)
-        lag = self.model.sensor_lags(values)
-        lasting = max(one.window.duration + one.goes_on for one in many) + max(0.0, float((behind - lag).max()))
-        rows = EVERY * (math.ceil(lasting / step / EVERY - TINY) + 1)
         own_delay = delay_of(structure, own)
         delays = np.zeros(k) if own_delay is None else own_delay[:, 0].numpy()
         delays = delays + behind + late.command_delay + late.camera_delay
+        turns = turning(
+            structure, own, lambda rows: self._orders.means(many, rows, delays, step=STEP_S, before=rows * STEP_S)
+        )
+        s0 = placed(structure, own, whose, self._starts(many, k, begin, by, turns).flatten(0, 1), late.ground_height)
+        lag = self.model.sensor_lags(values)
+        lasting = max(one.window.duration + one.goes_on for one in many) + max(0.0, float((behind - lag).max()))
+        rows = EVERY * (math.ceil(lasting / step / EVERY - TINY) + 1)
         packed = pack_parameters(structure, own)
         first, back = first_of_each(structure, packed, s0, delays)
         self.rollouts += len(first) * count
@@ -141,7 +144,9 @@ class Replayer(Predictor):
             motions, among = np.unique(back[new], return_inverse=True)
             which = first[motions]
             moved, all_of = _rows(which, count), _rows(among, count)
-            u = self._commands_at(many, rows, delays[which])
+            u = torch.as_tensor(
+                self._orders.means(many, rows, delays[which], step=step).reshape(-1, rows, structure.n_actuated)
+            )
             theta = own if new.all() else rows_of(own, torch.as_tensor(new))
             with torch.no_grad():
                 # Not `advance`: nothing is differentiated here, and that keeps a copy of all frames.
@@ -162,13 +167,20 @@ class Replayer(Predictor):
         return self._recent.of(names)
 
     def _starts(
-        self, many: Sequence[Stretch], k: int, begin: Sequence[Tensor | None], by: Sequence[np.ndarray] | None
+        self, many: Sequence[Stretch], k: int, begin: Sequence[Tensor | None], by: Sequence[np.ndarray] | None,
+        turns: Tensor | None,
     ) -> Tensor:  # fmt: skip
-        """Where k hypotheses begin stretches, (k, stretch, NS): begin, by as of `_batch`."""
+        """Where k hypotheses begin stretches, (k, stretch, NS): begin, by as of `_batch`; turns: as `turning`."""
         import torch
+
+        from r2s2r_cli.engine.flat import state_slots
 
         structure = self.structure
         start = torch.stack([self._flat(one) for one in many]).expand(k, -1, -1)
+        if turns is not None:
+            winding = state_slots(structure)["winding"]
+            start = start.clone()
+            start[..., winding.start : winding.start + winding.size] = turns
         let_out: Tensor | float = 0.0
         if by is not None:
             offsets = torch.as_tensor(np.stack(by, axis=1))
@@ -213,26 +225,6 @@ class Replayer(Predictor):
             return own, np.zeros(k)
         behind = own.extra[name].expand(k, 1)[:, 0].numpy().copy()
         return own.with_values({name: torch.zeros_like(own.extra[name])}), behind
-
-    def _commands_at(self, many: Sequence[Stretch], rows: int, delays: np.ndarray) -> Tensor:
-        """Commands (k stretch, row, actuated), each hypothesis with its own delay [s]."""
-        import torch
-
-        own, back = np.unique(delays, return_inverse=True)
-        logs = [self._log(one.window.run) for one in many]
-        made = np.empty((len(own), len(many), rows, self.structure.n_actuated))
-        for log in dict.fromkeys(logs):
-            places = [i for i, one in enumerate(logs) if one is log]
-            starts = np.array([many[i].window.start for i in places])
-            made[:, places] = log.all_means(starts, rows, step=self.step, delays=own)
-        return torch.as_tensor(made[back].reshape(-1, *made.shape[2:]))
-
-    def _log(self, run: RunData) -> CommandLog:
-        """Of a run, made once: stretches have frames of their own, and the commands of their run."""
-        key = (id(run.t_command), id(run.control), run.sampled)
-        if key not in self._logs:
-            self._logs[key] = (run, CommandLog(run))  # the run is kept: nothing else gets these ids
-        return self._logs[key][1]
 
 
 def _groups(windows: Sequence[Window], count: int) -> list[list[int]]:

@@ -14,7 +14,7 @@ from r2s2r_cli.stages.diagnose.which.screen import Response
 
 WIDE = 32
 """Candidates that are looked into."""
-TWICE = 16
+TWICE = 26
 """Of them, from two starts."""
 ELEMENTS = 2
 """Of an effect, at most."""

@@ -101,6 +101,7 @@ def test_a_set_of_90_per_cent_holds_the_truth_so_often() -> None:
     promised where the catalogue has the cause."""
     made = calibrated(planted(900), words="test")
     found = Calibration(**{name: made[name] for name in Calibration.__dataclass_fields__ if name in made})
+    found = replace(found, luck=np.inf, marginal_most=np.inf)  # planted evidence has no bounds
     held = 0
     said: dict[str, list[bool]] = {"effect": [], "none": [], "unknown": []}
     fresh = planted(1500, seed=1)
@@ -130,13 +131,34 @@ def test_a_verdict_becomes_a_case() -> None:
     one = case(truth_of(label), document)
     assert one is not None and one.names == ("payload", "none", "unknown") and one.score.tolist() == [7.5, 2.0, 3.0]
     assert one.parity.tolist() == [2.5, 0.0, 0.0] and one.marginal.tolist() == [11.0, 0.0, 0.0]
+    assert one.equivalent and one.truth == "payload" and (one.gap, one.left) == (31.0, 0.0)
+    pair = next(each for each in blind_bank.bank() if each["kind"] == "pair" and each["d"] > 3)
+    assert case(truth_of(pair), document) is None
     for row in document["ranking"]:
         row.pop("marginal_nats", None)
     older = case(truth_of(label), document)
     assert older is not None and older.marginal.tolist() == [7.5, 0.0, 3.0]
-    assert one.equivalent and one.truth == "payload" and (one.gap, one.left) == (31.0, 0.0)
-    pair = next(each for each in blind_bank.bank() if each["kind"] == "pair" and each["d"] > 3)
-    assert case(truth_of(pair), document) is None
+
+
+@pytest.mark.parametrize(("gain", "marginal"), [(75.0, 9.0), (20.0, 9.0), (75.0, -3.0), (400.0, 900.0), (-5.0, 2.0)])
+def test_what_is_learned_from_is_what_counts(gain: float, marginal: float) -> None:
+    """A gain on left-out gaits beyond what all data show is luck, for the learning as for a diagnosis: 75 nats left out
+    with 9 in all count 28."""
+    label = next(each for each in blind_bank.bank() if each["kind"] == "single" and each["d"] > 8)
+    document = {
+        "ranking": [{"effect": "payload", "elpd_gain": gain, "marginal_nats": marginal},
+                    {"effect": "none", "elpd_gain": 0.0}],
+        "chance_nats": 2.0, "refit_upper_m": 0.012, "floor_m": 0.010,
+    }  # fmt: skip
+    one = case(truth_of(label), document)
+    known = calibrated(planted(12), words="test")
+    by = Calibration(**{name: known[name] for name in Calibration.__dataclass_fields__ if name in known})
+    assert one is not None
+    plain = replace(by, luck=np.inf, marginal_most=np.inf)
+    expected = plain.score("payload", float(one.score[0]), marginal=float(one.marginal[0]))
+    assert by.score("payload", gain, marginal=marginal) == pytest.approx(expected, rel=1e-12)
+    if (gain, marginal) == (75.0, 9.0):
+        assert one.score[0] == 28.0
 
 
 def test_too_few_sets_teach_nothing() -> None:

@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
     from r2s2r_cli.engine import Parameters, State
 
+LOST_SHARE = 0.5
+"""Of the members: if more leave the finite numbers in a step, it is not they but the simulator."""
+
 
 @dataclass(frozen=True)
 class Spread:
@@ -188,10 +191,17 @@ class _Ensemble:
         rows = torch.as_tensor(u)[None].expand(len(self.flat), -1, -1)
         h, hold, every = self.step / self.substeps, self.substeps, self.substeps * len(u)
         frames = self.simulator.advance(self.flat, rows, self.packed, h=h, hold=hold, every=every)
-        require_finite(
-            self.structure, self.simulator.kernels.fn, frames, rows, self.packed, h=h, hold=hold, every=every
-        )
+        lost = ~frames.isfinite().all(dim=-1).all(dim=-1)
+        if lost.sum() > LOST_SHARE * len(lost):
+            require_finite(
+                self.structure, self.simulator.kernels.fn, frames, rows, self.packed, h=h, hold=hold, every=every
+            )
         self.flat = frames[:, -1]
+        if lost.any():
+            # Drawn where no robot is, such as a cap deep in the ground: another member stands in.
+            kept = np.flatnonzero(~lost.numpy())
+            self.flat = self.flat.clone()
+            self.flat[lost] = self.flat[torch.as_tensor(self.rng.choice(kept, int(lost.sum())))]
 
     def _see(self, frame: int, since: float) -> None:
         """Analysis of one frame, `since` seconds after the one before."""

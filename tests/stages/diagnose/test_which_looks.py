@@ -10,7 +10,7 @@ import torch
 
 from r2s2r_cli.engine import end_caps
 from r2s2r_cli.engine.flat import size, state_slots, unpack_state
-from r2s2r_cli.stages.diagnose.which.looks import caps_of
+from r2s2r_cli.stages.diagnose.which.looks import _mixed, _places, caps_of
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.identified import nominal
 from tests.support.builders import robot
@@ -32,3 +32,15 @@ def test_caps_are_those_of_the_engine(axial: bool) -> None:
     plain = end_caps(theta, unpack_state(structure, flat.flatten(0, 1))).flatten(1).numpy()
     np.testing.assert_allclose(found, plain, rtol=0, atol=1e-15)
     assert np.isnan(found[2 * 7 + 5]).all()
+
+
+def test_places_between_states_and_before_the_first() -> None:
+    """A late sensor reads what was; before the first state it goes on along the first straight line, as seldom as that
+    is right, and a camera has no such place. Beyond the last state nothing moves."""
+    place = np.array([[-0.5, 0.0, 1.25, 9.0]])
+    low, share = _places(place, 4, before=True)
+    assert low.tolist() == [[0, 0, 1, 2]] and share[0] == pytest.approx([-0.5, 0.0, 0.25, 1.0])
+    assert _places(place, 4)[1][0] == pytest.approx([0.0, 0.0, 0.25, 1.0])
+    ramp = np.arange(4.0)[None, :, None]
+    low, share = _places(place, 4, before=True)
+    assert _mixed(ramp[:, low[0]], ramp[:, low[0] + 1], share)[0, :, 0] == pytest.approx([-0.5, 0.0, 1.25, 3.0])

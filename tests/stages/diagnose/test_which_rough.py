@@ -95,7 +95,7 @@ def test_what_is_left_is_what_no_hypothesis_explains() -> None:
         fits = solver.begun([(one, np.zeros(2), np.zeros(len(one.parts))) for one in both])
         solver.run(fits)
         refit, own = scores(arena, fits, arena.gait)  # type: ignore[arg-type]
-        found = left(expected(arena), refit, [own], healthy)  # type: ignore[arg-type]
+        found = left(expected(arena), arena.sizes, refit, [own], healthy)  # type: ignore[arg-type]
         assert found.refit >= found.best
         return found.refit, found.best, found.sd
 
@@ -110,6 +110,14 @@ def test_what_is_left_is_what_no_hypothesis_explains() -> None:
     strange.y = strange.y + np.random.default_rng(9).standard_normal(len(strange.y))
     refit, best, sd = of(strange, healthy)
     assert best > 2 * sd and refit - best < 0.3 * best
+    loud, today = LinearArena(0.0, seed=5), LinearArena(0.0, seed=3)
+    for k, one in enumerate((loud, today)):  # 40 % more noise than is stated, then and now
+        one.y = one.y + np.random.default_rng(k).standard_normal(len(one.y))
+    other = Fits(loud)  # type: ignore[arg-type]
+    (begun,) = other.begun([(Hypothesis(), np.zeros(2), np.zeros(0))])
+    other.run([begun])
+    refit, best, sd = of(today, Healthy(loud, begun))  # type: ignore[arg-type]
+    assert sd > 0 and abs(best) < 2 * sd
 
 
 def test_equivalence_counts_the_share_that_the_floor_was_taken_from() -> None:

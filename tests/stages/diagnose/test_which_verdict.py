@@ -12,7 +12,7 @@ from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.found import Ranked
-from r2s2r_cli.stages.diagnose.which.pair_share import LEAST, TwoCauses, with_pairs
+from r2s2r_cli.stages.diagnose.which.pair_share import LEAST, SHARE, TwoCauses, with_pairs
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.verdict import best_replayed, verdict_of
@@ -93,14 +93,15 @@ ALONE = {"payload": 40.0, "motor_lag": 10.0, "backlash": 2.0}
 NAMES = {"payload": 0.7, "motor_lag": 0.1, "backlash": 0.1, "none": 0.1}
 
 
-def shared(gain: float) -> tuple[dict[str, float], tuple[str, str] | None]:
-    """With one pair of this gain."""
-    return with_pairs(NAMES, [TwoCauses(("payload", "motor_lag"), gain)], ALONE, CHANCE, 6.0)
+def shared(added: float) -> tuple[dict[str, float], tuple[str, str] | None]:
+    """With one pair whose second effect adds as much."""
+    pair = TwoCauses(("payload", "motor_lag"), ALONE["payload"] + added, 200.0, added)
+    return with_pairs(NAMES, [pair], ALONE, CHANCE, 6.0)
 
 
-def test_a_second_effect_must_add_as_much_as_the_first_and_more() -> None:
+def test_a_second_effect_must_add_a_share_of_the_first_and_more() -> None:
     """At just that the pair is as probable as its first effect alone; half of it goes to each name."""
-    needed = 2 * ALONE["payload"] + LEAST + CHANCE
+    needed = SHARE * ALONE["payload"] + LEAST + CHANCE
     at, believed = shared(needed)
     assert believed is None
     assert at["payload"] == pytest.approx(1.05 / 1.7) and at["motor_lag"] == pytest.approx(0.45 / 1.7)
@@ -110,7 +111,7 @@ def test_a_second_effect_must_add_as_much_as_the_first_and_more() -> None:
 def test_pairs_share_without_adding() -> None:
     """Probabilities stay ones of a whole, the second name rises with what it adds, and a pair that adds nothing changes
     next to nothing."""
-    seen = [shared(gain)[0] for gain in (40.0, 80.0, 120.0, 200.0, 1e6)]
+    seen = [shared(added)[0] for added in (-40.0, 20.0, 40.0, 120.0, 1e6)]
     assert all(sum(one.values()) == pytest.approx(1.0) for one in seen)
     second = [one["motor_lag"] for one in seen]
     assert second == sorted(second) and second[-1] == pytest.approx(0.5)

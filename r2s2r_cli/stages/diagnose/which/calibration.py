@@ -22,11 +22,13 @@ class Calibration:
     """What turns evidence into probabilities.
 
     temperature [nats]: of the softmax over names. usual [nats]: about what chance gives to the best of a catalogue;
-    usual_share: what a nat below it counts; marginal: what a nat of the marginal likelihood counts beside it. parity:
-    nats of gain that a nat of the parity stage is worth, which needs no simulator and errs far less, beyond by_chance
-    [nats], which it says for the best of a whole catalogue where nothing is wrong; most [nats]: of them that count,
-    since a finding that stands out says that something is wrong, and which of its look-alikes it is the replay tells
-    better, where there is one. none, equivalent [nats]: what `none`
+    usual_share: what a nat below it counts. luck, luck_times: no gain counts beyond luck [nats] and so many times what
+    all data together say, since what was left out cannot gain what they do not show; marginal: what a nat of that
+    counts beside it, marginal_most [nats] at most, from where on the effect is beyond doubt. parity: nats of gain that
+    a nat of the parity stage is worth, which needs no simulator and errs far less, beyond by_chance [nats], which it
+    says for the best of a whole catalogue where nothing is wrong; most [nats]: of them that count, since a finding that
+    stands out says that something is wrong, and which of its look-alikes it is the replay tells better, where there is
+    one. none, equivalent [nats]: what `none`
     gains, and more where the equivalence test finds no gap; gap: what it loses for every nat that the refit model costs
     more than in healthy runs. beside, unknown_share, left: what `unknown` has of the best effect's score, of what a
     wider floor gains beside it, and of every nat that it leaves; unknown [nats]: what that must exceed. bias [nats]:
@@ -44,6 +46,9 @@ class Calibration:
     usual: float = 0.0
     usual_share: float = 1.0
     marginal: float = 0.0
+    marginal_most: float = float("inf")
+    luck: float = float("inf")
+    luck_times: float = 2.0
     none: float = 20.0
     equivalent: float = 6.0
     gap: float = 0.0
@@ -70,11 +75,13 @@ class Calibration:
         it leaves."""
         if name == UNKNOWN:
             return self.beside * best + self.unknown_share * gain + self.left * max(beyond, 0.0) - self.unknown
+        if name != NONE:
+            gain = min(gain, self.luck + self.luck_times * max(marginal, 0.0))
         gain = self.usual_share * min(gain, self.usual) + max(gain - self.usual, 0.0)
         if name == NONE:
             return gain + self.none + (self.equivalent if equivalent else 0.0) - self.gap * max(beyond, 0.0)
         most = float("inf") if name in NO_REPLAY else self.most
-        gain += self.marginal * max(marginal, 0.0)
+        gain += self.marginal * min(max(marginal, 0.0), self.marginal_most)
         return gain + self.parity * min(max(parity - self.by_chance, 0.0), most)
 
     def absolute(self) -> Calibration:

@@ -12,8 +12,8 @@ from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.screen import Response
 from r2s2r_cli.stages.diagnose.which.search import Said, best_of
 
-PAIRED = 5
-"""Effects that are tried beside the best one."""
+PAIRED, BESIDE = 5, 2
+"""Effects that are tried beside the best one: those that explain most of what it leaves, and the next best alone."""
 ITERATIONS = 4
 KEPT = 3
 """Pairs that are scored."""
@@ -35,7 +35,9 @@ def pairs_of(
         fitted.setdefault(fits[i].hypothesis.effects[0], fits[i])
     fits_of = Fits(arena)
     points = []
-    for response in partners(fits_of, first, responses, told_by)[:PAIRED]:
+    tried = partners(fits_of, first, responses, told_by)
+    alone = [name for name in fitted if name not in first.hypothesis.effects][:BESIDE]
+    for response in [*tried[:PAIRED], *(one for one in tried[PAIRED:] if one.candidate.effect in alone)]:
         known = fitted.get(response.candidate.effect)
         part = response.candidate if known is None else known.hypothesis.parts[0]
         x, z = (response.size, response.start_z) if known is None else (known.x, known.z)
@@ -45,6 +47,19 @@ def pairs_of(
     begun = fits_of.begun(points, [first.away] * len(points))
     fits_of.run(begun, iterations=ITERATIONS)
     return best_of(begun)[:KEPT]
+
+
+def led_by(arena: Arena, alone: Fit, pairs: Sequence[Fit]) -> Fit:
+    """The first effect of the pairs alone, or where it comes to from what they have found, if that is better: else a
+    second effect that only led nuisances out of a hollow keeps what they gain."""
+    fits = Fits(arena)
+    count = len(alone.x)
+    led = fits.begun([(alone.hypothesis, one.z, one.x[:count]) for one in pairs], [one.away for one in pairs])
+    fits.settle(led)
+    fits.run(led, iterations=ITERATIONS)
+    best = min([alone, *led], key=lambda one: one.cost)
+    best.start = alone.start
+    return best
 
 
 def partners(fits: Fits, first: Fit, responses: Sequence[Response], told_by: Said) -> list[Response]:

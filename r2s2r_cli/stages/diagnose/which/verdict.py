@@ -47,10 +47,7 @@ def concluded(m: Material) -> Which:
     table |= {one.effect: calibration.score(one.effect, one.gain, parity=one.parity) for one in others}
     table[NONE] = calibration.score(NONE, m.chance, equivalent=m.no_gap.equivalent, beyond=m.left.refit)
     table[UNKNOWN] = calibration.score(UNKNOWN, m.unexplained, beyond=m.left.best, best=best_replayed(table))
-    both = [
-        TwoCauses((m.fits[i].hypothesis.effects[0], m.fits[i].hypothesis.effects[1]), gains[i], float(m.marginal[i]))
-        for i in order if len(m.fits[i].hypothesis.parts) == 2
-    ]  # fmt: skip
+    both = [_two(m, i, best, gains) for i in order if len(m.fits[i].hypothesis.parts) == 2]
     probability, pair = with_pairs(calibration.probabilities(table), both, names, m.chance, calibration.temperature)
     sds = gain_sds(m.refit, m.scores, m.groups).tolist() if m.scores else []
     ranking = [
@@ -81,6 +78,14 @@ def concluded(m: Material) -> Which:
         within=_left_out(m), calibrated=calibration.words, warnings=_warnings(m, [best[name] for name in names]),
         pairs=tuple(both),
     )  # fmt: skip
+
+
+def _two(m: Material, i: int, best: Mapping[str, int], gains: Mapping[int, float]) -> TwoCauses:
+    """Of a fit of two effects, the first of which was fitted alone as well."""
+    first, second = m.fits[i].hypothesis.effects
+    alone = best[first]
+    added = min(gains[i] - gains[alone], float(m.marginal[i] - m.marginal[alone]))
+    return TwoCauses((first, second), gains[i], float(m.marginal[i]), added)
 
 
 def best_replayed(worth: Mapping[str, float]) -> float:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from r2s2r_cli.views.page import Page, PageTable, Picture, render
 
 if TYPE_CHECKING:
-    from schemas.results_diagnose import DiagnoseReport, ElementFound, NextGaitFound, RankedName
+    from schemas.results_diagnose import DiagnoseReport, ElementFound, NextGaitFound, PairFound, RankedName
 
 INDISTINCT = 3.0
 """[nats] Below, two effects cannot be told apart."""
@@ -27,7 +27,8 @@ def diagnose_tables(report: DiagnoseReport) -> Iterator[PageTable]:
         [
             "name",
             "where",
-            "gain +- sd [nats]",
+            "left out: gain +- sd [nats]",
+            "all data: gain [nats]",
             "probability",
             "size",
             "90 % interval",
@@ -37,11 +38,11 @@ def diagnose_tables(report: DiagnoseReport) -> Iterator[PageTable]:
         [_ranked(one) for one in report.ranking],
     )
     if report.pairs:
-        alone = {one.effect: one.elpd_gain for one in report.ranking}
+        alone = {one.effect: one for one in report.ranking}
         yield PageTable(
-            "two effects at once: laws mend each other's faults, so a second cause must add as much as the first",
-            ["effects", "gain [nats]", "more than the first alone [nats]"],
-            [[" + ".join(one.effects), f"{one.elpd_gain:.1f}", f"{one.elpd_gain - alone.get(one.effects[0], 0.0):+.1f}"]
+            "two effects at once: laws mend each other's faults, so a second cause must add more, left out and in all",
+            ["effects", "left out: gain [nats]", "more than the first alone [nats]", "all data: more [nats]"],
+            [[" + ".join(one.effects), f"{one.elpd_gain:.1f}", *_more(one, alone.get(one.effects[0]))]
              for one in report.pairs],
         )  # fmt: skip
     if report.shrinkage is not None:
@@ -85,6 +86,14 @@ def element_words(element: ElementFound | None) -> str:
     return f"all {element.kind}s" if element.index is None else f"{element.kind} {element.index}"
 
 
+def _more(pair: PairFound, first: RankedName | None) -> tuple[str, str]:
+    """What the second effect adds to the first, on left-out gaits and on all data."""
+    if first is None:
+        return "", ""
+    both, one = pair.marginal_nats, first.marginal_nats
+    return f"{pair.elpd_gain - first.elpd_gain:+.1f}", "" if both is None or one is None else f"{both - one:+.1f}"
+
+
 def _ranked(one: RankedName) -> list[str]:
     sizes, wide = [], []
     for name, value in one.size.items():
@@ -104,7 +113,8 @@ def _ranked(one: RankedName) -> list[str]:
         if not one.fitted
         else f"{one.elpd_gain:.1f}" + ("" if one.elpd_gain_sd is None else f" +- {one.elpd_gain_sd:.1f}")
     )
-    return [one.effect, where, gain, f"{one.probability:.2f}", "; ".join(sizes), "; ".join(wide),
+    whole = f"{one.marginal_nats:.1f}" if one.fitted and one.size and one.marginal_nats is not None else ""
+    return [one.effect, where, gain, whole, f"{one.probability:.2f}", "; ".join(sizes), "; ".join(wide),
             rmse, "; ".join(remarks)]  # fmt: skip
 
 

@@ -71,7 +71,7 @@ def test_rivals_and_numbers_say_what_they_are() -> None:
         "refit_units": units,
     })  # fmt: skip
     text = "\n".join(" | ".join(row) for table in diagnose_tables(made) for row in table.rows)
-    assert "31.0 +- 4.0" in text and "none |  | 0.0 | 0.10" in text and "counts with what chance gains" in text
+    assert "31.0 +- 4.0" in text and "none |  | 0.0 |  | 0.10" in text and "counts with what chance gains" in text
     assert "refit: friction | +10.5 % +- 2.2 % of the identified value" in text
     assert "refit: motor_lag.tau_s | +0.03 +- 0.004 s" in text
 
@@ -85,21 +85,25 @@ def test_what_was_not_fitted_has_no_gain() -> None:
     )
     ci90 = {"payload.mass_kg.1": (0.03, 0.05), "payload.place_m.1": (0.05, 0.15)}
     ranking = (
-        first.model_copy(update={"size": size, "units": units, "ci90": ci90}),
-        second.model_copy(update={"effect": "dropout", "fitted": False}),
+        first.model_copy(update={"size": size, "units": units, "ci90": ci90, "marginal_nats": 52.0}),
+        second.model_copy(update={"effect": "dropout", "fitted": False, "marginal_nats": 0.0}),
     )
     table = next(iter(diagnose_tables(report().model_copy(update={"ranking": ranking}))))
     rows = {row[0]: row for row in table.rows}
     assert rows["dropout"][2] == "-" and "not fitted" in rows["dropout"][-1]
-    assert rows["payload"][2].startswith("31.0")
-    assert rows["payload"][5] == "mass_kg 0.03 .. 0.05 kg; place_m 0.05 .. 0.15 m"
+    assert rows["payload"][2].startswith("31.0") and rows["payload"][3] == "52.0" and rows["dropout"][3] == ""
+    assert rows["payload"][6] == "mass_kg 0.03 .. 0.05 kg; place_m 0.05 .. 0.15 m"
 
 
 def test_two_effects_at_once_say_what_the_second_one_adds() -> None:
-    """Over the first alone; without pairs there is no such table."""
-    made = report().model_copy(update={"pairs": (PairFound(effects=("payload", "backlash"), elpd_gain=44.5),)})
+    """Over the first alone, on what was left out and on all data; without pairs there is no such table."""
+    first = report().ranking[0].model_copy(update={"marginal_nats": 52.0})
+    pair = PairFound(effects=("payload", "backlash"), elpd_gain=44.5, marginal_nats=80.0)
+    made = report().model_copy(update={"ranking": (first, *report().ranking[1:]), "pairs": (pair,)})
     rows = [row for table in diagnose_tables(made) for row in table.rows if row[0] == "payload + backlash"]
-    assert rows == [["payload + backlash", "44.5", "+13.5"]]
+    assert rows == [["payload + backlash", "44.5", "+13.5", "+28.0"]]
+    older = made.model_copy(update={"ranking": report().ranking})
+    assert ["payload + backlash", "44.5", "+13.5", ""] in [r for t in diagnose_tables(older) for r in t.rows]
     assert len(list(diagnose_tables(made))) == len(list(diagnose_tables(report()))) + 1
 
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run, whole
-from r2s2r_cli.stages.diagnose.parity.lengths import sensor_parity
-from r2s2r_cli.stages.diagnose.parity.series import series
+from r2s2r_cli.stages.diagnose.parity.lengths import late_readings
 from r2s2r_cli.stages.diagnose.starts import Starts, as_known
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.before import Healthy
@@ -89,10 +88,11 @@ def refit(
     simulator = simulator if with_floor else NO_FLOOR_M
     begin = prior = healthy = None
     noise, lasts = 1.0, 0.0
+    late = late_readings(evidence)
     if evidence.healthy:
         told("healthy runs", 0, 1)
         arena, base = _fitted(
-            evidence.healthy, whole(evidence.healthy), replayer, simulator, (1.0, 0.0), None, starts, None,
+            evidence.healthy, whole(evidence.healthy), replayer, simulator, (1.0, 0.0), None, starts, None, late,
             calibrate=with_floor,
         )  # fmt: skip
         simulator, noise, lasts = arena.floor_m, arena.noise, arena.lasts
@@ -106,7 +106,9 @@ def refit(
             rmse = float(np.sqrt(np.mean(usual)))
             floor = FloorGiven(rmse, min(sensor, rmse), "the healthy runs, refitted", True, KEPT)
         told("healthy runs", 1, 1)
-    arena, base = _fitted(evidence.runs, evidence.fit, replayer, simulator, (noise, lasts), prior, starts, begin, told)
+    arena, base = _fitted(
+        evidence.runs, evidence.fit, replayer, simulator, (noise, lasts), prior, starts, begin, late, told
+    )
     if not again:
         arena, base = _frozen(arena, base, prior)
     asked = sum(len(one.intervals) for one in evidence.fit)
@@ -148,10 +150,11 @@ def _sensor(runs: Sequence[Run]) -> float:
 
 def _fitted(
     runs: Sequence[Run], part: Sequence[Selection], replayer: Replayer, simulator: float, errs: tuple[float, float],
-    prior: tuple[np.ndarray, np.ndarray] | None, starts: Starts, begin: np.ndarray | None, told: Told | None = None,
-    calibrate: bool = False,
+    prior: tuple[np.ndarray, np.ndarray] | None, starts: Starts, begin: np.ndarray | None, late: float,
+    told: Told | None = None, calibrate: bool = False,
 ) -> tuple[Arena, Fit]:  # fmt: skip
-    """Nuisances and start states in turns. errs: factor on the noise, and how long it lasts [s]. calibrate: with them
+    """Nuisances and start states in turns. errs: factor on the noise, and how long it lasts [s]. begin: nuisances to
+    begin with; late: of the sensors [s], where there are none. calibrate: with them
     the floor and the noise, of healthy runs: under a noise that is too small every piece looks like a fall, and a fit
     of falls learns nothing."""
     model = replayer.model
@@ -177,7 +180,7 @@ def _fitted(
                 hint="r2s2r record --random 15 --port /dev/ttyUSB0   # other shapes",
             )  # fmt: skip
         arena = Arena(replayer, many, floor_m=simulator, noise=noise, lasts=lasts, prior=prior, whole=intervals)
-        z = _begun(arena, z) if z is not None else _first(arena, runs)
+        z = _begun(arena, z, late)
         for again in range(JACOBIANS if number == rounds - 1 else 1):
             if again:
                 arena.move_starts(arena.away)
@@ -214,21 +217,15 @@ def _frozen(arena: Arena, base: Fit, prior: tuple[np.ndarray, np.ndarray] | None
     return arena, _from(arena, z)
 
 
-def _begun(arena: Arena, z: np.ndarray) -> np.ndarray:
-    """Nuisances to begin with: those of before, as far as they are the same ones."""
+def _begun(arena: Arena, z: np.ndarray | None, late: float) -> np.ndarray:
+    """Nuisances to begin with: those of before, as far as they are the same ones; else the prior's, with sensors that
+    are late by so much [s]."""
     found = arena.mean.copy()
-    count = len(z) if len(z) == len(found) else arena.shared
-    found[:count] = z[:count]
-    return np.clip(found, arena.lower, arena.upper)
-
-
-def _first(arena: Arena, runs: Sequence[Run]) -> np.ndarray:
-    """Nuisances to begin with where none are known: the prior's, but for the lag of the sensors, which the camera shows
-    without a simulator. Else a late command and a hasty camera do as well for a while, and a fit stays with them."""
-    found = arena.mean.copy()
-    seen = sensor_parity([series(run, arena.model.robot) for run in runs])
-    if seen is not None and np.isfinite(seen.later.value):
-        found[arena.names.index(SENSOR_LAG)] = -seen.later.value
+    if z is None:
+        found[arena.names.index(SENSOR_LAG)] = late
+    else:
+        count = len(z) if len(z) == len(found) else arena.shared
+        found[:count] = z[:count]
     return np.clip(found, arena.lower, arena.upper)
 
 

@@ -17,6 +17,8 @@ from r2s2r_cli.stages.diagnose.parity.finding import (
     Suspicion,
     discoveries,
 )
+from r2s2r_cli.stages.diagnose.parity.fitted import fitted_runs
+from r2s2r_cli.stages.diagnose.parity.lengths import late_readings
 from r2s2r_cli.stages.diagnose.parity.parity import finding_of
 from r2s2r_cli.stages.diagnose.parity.quantities import Quantities
 from r2s2r_cli.stages.diagnose.parity.series import Measured, combined, regression
@@ -117,9 +119,15 @@ def test_nothing_of_judged_intervals_is_looked_at() -> None:
     length = run.lengths.length.copy()
     length[tick:] = 9.9
     spoiled = replace(with_caps(run, observed=observed, control=control), lengths=replace(run.lengths, length=length))
-    first, second = parity(split), parity(replace(split, runs=(spoiled,)))
+    spoiled_split = replace(split, runs=(spoiled,))
+    first, second = parity(split), parity(spoiled_split)
     assert first.findings
     assert first == second
+    # Nor does the fit begin elsewhere: as the fitted part alone says.
+    assert (
+        late_readings(split) == late_readings(spoiled_split) == late_readings(replace(split, runs=fitted_runs(split)))
+    )
+    assert late_readings(split) != 0.0
 
 
 def test_what_findings_say_in_nats_is_half_their_square_by_effect_and_element() -> None:

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from r2s2r_cli.stages.diagnose.parity.series import Measured, Series, regression
+from r2s2r_cli.stages.diagnose.evidence import Evidence
+from r2s2r_cli.stages.diagnose.parity.fitted import fitted_runs
+from r2s2r_cli.stages.diagnose.parity.series import Measured, Series, regression, series
 
 LATEST_S = 0.35
 """Time shifts are looked for up to so much, both ways."""
@@ -62,6 +64,15 @@ def sensor_parity(runs: Sequence[Series]) -> SensorParity | None:
         beta, cov = regression(y, x, group[good])
         drift.append(Measured(float(beta[2]), float(np.sqrt(cov[2, 2]))))
     return SensorParity(bias, gain, drift, later, about)
+
+
+def late_readings(evidence: Evidence) -> float:
+    """By how much the length sensors seem late against the camera [s], without a simulator: in the healthy runs, else
+    in what is fitted of today's; 0 where it cannot be told. A fit that does not begin there stays with a late command
+    and a hasty camera, which do as well for a while."""
+    runs = evidence.healthy or fitted_runs(evidence)
+    seen = sensor_parity([series(run, evidence.robot) for run in runs])
+    return -seen.later.value if seen is not None and np.isfinite(seen.later.value) else 0.0
 
 
 def _moved(one: Series, shift: float) -> np.ndarray:

@@ -124,10 +124,8 @@ def test_nothing_of_judged_intervals_is_looked_at() -> None:
     assert first.findings
     assert first == second
     # Nor does the fit begin elsewhere: as the fitted part alone says.
-    assert (
-        late_readings(split) == late_readings(spoiled_split) == late_readings(replace(split, runs=fitted_runs(split)))
-    )
-    assert late_readings(split) != 0.0
+    alone = replace(split, runs=fitted_runs(split), judge=())
+    assert late_readings(split) == late_readings(spoiled_split) == late_readings(alone) != 0.0
 
 
 def test_what_findings_say_in_nats_is_half_their_square_by_effect_and_element() -> None:

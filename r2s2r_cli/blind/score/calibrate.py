@@ -30,6 +30,7 @@ LEARNED = (
     "marginal",
 )  # fmt: skip
 """Numbers beside the biases, in the order of the columns; all of them in the exponent."""
+AT = {name: k for k, name in enumerate(LEARNED)}
 BEFORE = (1.0, 0.7, 0.0, 0.0, 0.05, -1.0, 0.3, 0.05, 0.5, 0.8, 0.5)
 """What they are before anything is learned, gains in the unit of SHARPNESS."""
 BEFORE_SD = (2.0, 0.3, 2.0, 1.0, 0.1, 2.0, 0.3, 0.1, 0.5, 0.3, 0.5)
@@ -96,11 +97,9 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
     told = any(row.get("marginal_nats") is not None for row in rows)
     said = np.array([float((row.get("marginal_nats") if told else row["elpd_gain"]) or 0.0) for row in rows])
     marginal = np.clip(said, 0.0, MARGINAL_MOST)
-    score = [
-        chance if row["effect"] == NONE else float(row["elpd_gain"]) if row["effect"] == UNKNOWN
-        else min(float(row["elpd_gain"]), LUCK + LUCK_TIMES * max(float(whole), 0.0))
-        for row, whole in zip(rows, said, strict=True)
-    ]  # fmt: skip
+    gain = np.array([chance if row["effect"] == NONE else float(row["elpd_gain"]) for row in rows])
+    rival = np.array([row["effect"] in (NONE, UNKNOWN) for row in rows])
+    score = np.where(rival, gain, np.minimum(gain, LUCK + LUCK_TIMES * np.maximum(said, 0.0)))
     upper, floor = document.get("refit_upper_m"), document["floor_m"]
     equivalent = upper is not None and float(upper) < NO_GAP_FACTOR * float(floor)
     parity = np.array([
@@ -109,7 +108,7 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
     ])  # fmt: skip
     gap, left = (max(float(document.get(key) or 0.0), 0.0) for key in ("gap_nats", "left_nats"))
     names = tuple(row["effect"] for row in rows)
-    return Case(names, np.array(score), parity, marginal, equivalent, truth.right, gap, left)
+    return Case(names, score, parity, marginal, equivalent, truth.right, gap, left)
 
 
 def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
@@ -176,18 +175,19 @@ def _design(one: Case, effects: Sequence[str], known: np.ndarray) -> np.ndarray:
     told = zip(one.names, one.score, one.parity, one.marginal, strict=True)
     for row, (name, score, parity, marginal) in zip(X, told, strict=True):
         if name == UNKNOWN:
-            row[5:8] = 1.0, score * SHARPNESS, one.left * SHARPNESS
+            row[AT["unknown"]] = 1.0
+            row[AT["unknown_share"]], row[AT["left"]] = score * SHARPNESS, one.left * SHARPNESS
             continue
-        row[[0, 8]] = max(score - USUAL, 0.0) * SHARPNESS, min(score, USUAL) * SHARPNESS
+        row[AT["sharpness"]], row[AT["usual"]] = max(score - USUAL, 0.0) * SHARPNESS, min(score, USUAL) * SHARPNESS
         if name == NONE:
-            row[2:5] = 1.0, float(one.equivalent), -one.gap * SHARPNESS
+            row[AT["none"]], row[AT["equivalent"]], row[AT["gap"]] = 1.0, float(one.equivalent), -one.gap * SHARPNESS
         else:
-            row[1], row[10] = parity, marginal * SHARPNESS
+            row[AT["parity"]], row[AT["marginal"]] = parity, marginal * SHARPNESS
             row[len(LEARNED) + effects.index(name)] = 1.0
     worth = X[:, : len(LEARNED)] @ known[: len(LEARNED)]
     replayed = [w for w, name in zip(worth, one.names, strict=True) if name not in (NONE, UNKNOWN, *NO_REPLAY)]
     if UNKNOWN in one.names:
-        X[one.names.index(UNKNOWN), 9] = max(replayed, default=0.0)
+        X[one.names.index(UNKNOWN), AT["beside"]] = max(replayed, default=0.0)
     return X
 
 

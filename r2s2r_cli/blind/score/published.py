@@ -26,6 +26,7 @@ _ELEMENT = ("kind", "index", "xy_m")
 _USUAL: tuple[tuple[str, object], ...] = (
     ("moved", True),
     ("fitted", True),
+    ("marginal_nats", 0.0),
     ("parity_nats", 0.0),
     ("size", {}),
 )
@@ -135,8 +136,6 @@ def _rank(row: Mapping[str, Any]) -> dict[str, Any]:
     found["size"] = {name: _short(value) for name, value in row.get("size", {}).items()}
     if "elpd_gain_sd" in found:
         found["elpd_gain_sd"] = _short(found["elpd_gain_sd"])
-    if not found.get("marginal_nats"):  # of what was not fitted
-        found.pop("marginal_nats", None)
     return {name: value for name, value in found.items() if (name, value) not in _USUAL}
 
 

@@ -44,15 +44,16 @@ def left(
 ) -> Left:  # fmt: skip
     """Of scores without their groups. at_least: `expected` of the arena before its floor was widened; sizes: data of
     its pieces. Without healthy runs pieces are held to what noise and floor explain."""
-    then = np.zeros(0) if healthy is None else healthy_excess(healthy)
-    usual_share = float(np.median(then / healthy.arena.sizes)) if healthy is not None else 0.0
-    at_least = at_least + usual_share * sizes
+    then = np.zeros(0)
+    if healthy is not None:
+        excess, own_sizes = healthy_excess(healthy), healthy.arena.sizes
+        of_each = float(np.median(excess / own_sizes))
+        then, at_least = _bounded(excess - of_each * own_sizes), at_least + of_each * sizes
     own = _bounded(-refit.elpd - at_least)
     best = _bounded(-np.max([refit.elpd, *(one.elpd for one in others)], axis=0) - at_least)
     count = len(own)
     usually, sd = 0.0, float(np.std(own, ddof=1)) * np.sqrt(count) if count > 1 else float("nan")
     if healthy is not None:
-        then = _bounded(then - usual_share * healthy.arena.sizes)
         usually = float(then.mean())
         sd = count * float(np.std(then, ddof=1)) * np.sqrt(1 / count + 1 / len(then)) if len(then) > 1 else float("nan")
     return Left(float(own.sum()) - count * usually, float(best.sum()) - count * usually, float(sd))

@@ -14,7 +14,8 @@ from r2s2r_cli.stages.identify.data import RunData
 class Orders:
     """Command logs of runs, each made once: stretches have frames of their own, and the commands of their run."""
 
-    def __init__(self) -> None:
+    def __init__(self, actuated: int) -> None:
+        self.actuated = actuated
         self._logs: dict[tuple[int, int, bool], tuple[RunData, CommandLog]] = {}
 
     def means(
@@ -24,13 +25,12 @@ class Orders:
         [s], (k, stretch, row, actuated)."""
         own, back = np.unique(delays, return_inverse=True)
         logs = [self._log(one.window.run) for one in many]
-        parts = {}
+        made = np.empty((len(own), len(many), rows, self.actuated))
         for log in dict.fromkeys(logs):
             places = [i for i, one in enumerate(logs) if one is log]
             starts = np.array([many[i].window.start for i in places]) - before
-            for i, made in zip(places, log.all_means(starts, rows, step=step, delays=own).swapaxes(0, 1), strict=True):
-                parts[i] = made
-        return np.stack([parts[i] for i in range(len(many))], axis=1)[back]
+            made[:, places] = log.all_means(starts, rows, step=step, delays=own)
+        return made[back]
 
     def _log(self, run: RunData) -> CommandLog:
         key = (id(run.t_command), id(run.control), run.sampled)

@@ -49,19 +49,6 @@ def pairs_of(
     return best_of(begun)[:KEPT]
 
 
-def led_by(arena: Arena, alone: Fit, pairs: Sequence[Fit]) -> Fit:
-    """The first effect of the pairs alone, or where it comes to from what they have found, if that is better: else a
-    second effect that only led nuisances out of a hollow keeps what they gain."""
-    fits = Fits(arena)
-    count = len(alone.x)
-    led = fits.begun([(alone.hypothesis, one.z, one.x[:count]) for one in pairs], [one.away for one in pairs])
-    fits.settle(led)
-    fits.run(led, iterations=ITERATIONS)
-    best = min([alone, *led], key=lambda one: one.cost)
-    best.start = alone.start
-    return best
-
-
 def partners(fits: Fits, first: Fit, responses: Sequence[Response], told_by: Said) -> list[Response]:
     """The best element of every other effect, in the order of what it would explain of what `first` leaves. Alone an
     effect may explain nothing that a larger one does not; beside that one it is judged by what is left."""

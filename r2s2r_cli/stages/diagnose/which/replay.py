@@ -42,7 +42,7 @@ class Replayer(Predictor):
 
         super().__init__(model, **how)  # type: ignore[arg-type]
         self.model = model
-        self._orders = Orders()
+        self._orders = Orders(self.structure.n_actuated)
         self._packed: dict[int, tuple[Stretch, Tensor]] = {}
         nominal = model.theta(model.values0)
         self._stable = Stable(self.structure, nominal)
@@ -176,10 +176,9 @@ class Replayer(Predictor):
         from r2s2r_cli.engine.flat import state_slots
 
         structure = self.structure
-        start = torch.stack([self._flat(one) for one in many]).expand(k, -1, -1)
+        start = torch.stack([self._flat(one) for one in many]).repeat(k, 1, 1)
         if turns is not None:
             winding = state_slots(structure)["winding"]
-            start = start.clone()
             start[..., winding.start : winding.start + winding.size] = turns
         let_out: Tensor | float = 0.0
         if by is not None:
@@ -190,7 +189,6 @@ class Replayer(Predictor):
         if after:
             before = torch.stack([one for one in begin if one is not None], dim=1)
             more = let_out if isinstance(let_out, float) else let_out[:, after]
-            start = start.clone()
             start[:, after] = carried(structure, [many[i] for i in after], start[:, after], before, more)
         return start
 

@@ -77,7 +77,7 @@ def fitted(arena: Arena, base: Fit, picked: Sequence[Response], told_by: Said, t
         nominal, *going = exchanged(fits, [nominal, *going])
         told("fits", number + 1, len(ROUNDS) + 1)
     fits.run([nominal, *going], iterations=LAST)
-    nominal = _led(fits, nominal, best_of(going))
+    nominal = led(fits, nominal, best_of(going)[:LED], iterations=LED_ON)
     for _ in range(AGAIN):
         nominal, *going = exchanged(fits, [nominal, *best_of(going)])
         fits.run([nominal, *going], iterations=BETWEEN)
@@ -105,14 +105,15 @@ def exchanged(fits: Fits, found: Sequence[Fit]) -> list[Fit]:
     return [new.get(i, one) for i, one in enumerate(found)]
 
 
-def _led(fits: Fits, nominal: Fit, going: Sequence[Fit]) -> Fit:
-    """The refit nominal model, or where it comes to from what an effect's fit has found, if that is better. An effect
-    that only led the nuisances out of a hollow would else keep what they gained."""
-    led = fits.begun([(nominal.hypothesis, one.z, nominal.x) for one in going[:LED]], [one.away for one in going[:LED]])
-    fits.settle(led)
-    fits.run(led, iterations=LED_ON)
-    best = min([nominal, *led], key=lambda one: one.cost)
-    best.start = nominal.start
+def led(fits: Fits, one: Fit, by: Sequence[Fit], *, iterations: int) -> Fit:
+    """The fit, or where it comes to from the nuisances and starts of fits that have an effect more, if that is better.
+    An effect that only led them out of a hollow would else keep what they gain."""
+    points = [(one.hypothesis, other.z, other.x[: len(one.x)]) for other in by]
+    tried = fits.begun(points, [other.away for other in by])
+    fits.settle(tried)
+    fits.run(tried, iterations=iterations)
+    best = min([one, *tried], key=lambda fit: fit.cost)
+    best.start = one.start
     return best
 
 

@@ -17,11 +17,11 @@ from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.left import expected, left
 from r2s2r_cli.stages.diagnose.which.marginal import marginal_gains
 from r2s2r_cli.stages.diagnose.which.material import Material
-from r2s2r_cli.stages.diagnose.which.pairs import led_by, pairs_of
+from r2s2r_cli.stages.diagnose.which.pairs import ITERATIONS, pairs_of
 from r2s2r_cli.stages.diagnose.which.rivals import WIDER, chance, no_gap
 from r2s2r_cli.stages.diagnose.which.score import ENOUGH, Score, gains, groups_of, scores
 from r2s2r_cli.stages.diagnose.which.screen import screen
-from r2s2r_cli.stages.diagnose.which.search import Said, Told, fitted, picked_of
+from r2s2r_cli.stages.diagnose.which.search import Said, Told, fitted, led, picked_of
 from r2s2r_cli.stages.diagnose.which.verdict import concluded
 
 PLACES = 8
@@ -92,10 +92,10 @@ def compare_effects(
     pairs = pairs_of(arena, base, fits, gained, responses, told_by or {}) if gained.max(initial=0.0) > by_chance else []
     if pairs:
         first = int(gained.argmax())
-        led = led_by(arena, fits[first], pairs)
-        if led is not fits[first]:
-            fits[first], own[first] = led, scores(arena, [led], groups, held_out=ways.held_out)[0]
-            old[first] = chronic(arena, healthy, [led])[0]
+        alone = led(Fits(arena), fits[first], pairs, iterations=ITERATIONS)
+        if alone is not fits[first]:
+            fits[first], own[first] = alone, scores(arena, [alone], groups, held_out=ways.held_out)[0]
+            old[first] = chronic(arena, healthy, [alone])[0]
         fits, own = [*fits, *pairs], [*own, *scores(arena, pairs, groups, held_out=ways.held_out)]
         old = np.concatenate([old, chronic(arena, healthy, pairs)])
     told("left out", 1, 1)

@@ -13,14 +13,21 @@ import numpy as np
 import tomlkit
 
 COMMAND = [sys.executable, "-m", "r2s2r_cli"]
-FRICTION, SPEED, STIFFNESS, REST = (0.32, 0.45), (0.62, 0.75), (0.8, 1.25), (0.8, 0.9)
+FRICTION, SPEED, STIFFNESS, REST = (0.3, 0.45), (0.62, 0.75), (0.4, 0.7), (0.9, 1.05)
 """From where the truth is drawn: friction (0.76 in robot.toml); factors of the motors' speed, of stiffness and rest
-length of each passive tendon."""
+length of each passive tendon, as of tendons that have become soft."""
 
 
-def unknown(project: Path, seed: int) -> dict[str, object]:
-    """Write truth.toml and world.toml, which only the rig reads; what is true, for those who ask afterwards."""
-    rng = np.random.default_rng([seed, 7])
+def r2s2r(project: Path, *words: str, quiet: bool = True) -> None:
+    """A command that must succeed."""
+    print("$ r2s2r", *words, file=sys.stderr, flush=True)
+    subprocess.run([*COMMAND, *words, *(["--quiet"] if quiet else [])], cwd=project, check=True, stdout=sys.stderr)
+
+
+def unknown(project: Path, seed: int, number: int = 0) -> dict[str, object]:
+    """Write truth.toml and world.toml, which only the rig reads; what is true, for those who ask afterwards. number: of
+    the worlds that a seed has."""
+    rng = np.random.default_rng([seed, 7, number])
     document = tomlkit.parse((project / "robot.toml").read_text("utf-8"))
     drawn: dict[str, object] = {"friction": rng.uniform(*FRICTION), "speed": rng.uniform(*SPEED)}
     document["contact"]["friction"] = round(float(drawn["friction"]), 4)

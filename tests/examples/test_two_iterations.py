@@ -49,6 +49,34 @@ def test_the_world_is_another_one(tmp_path: Path, seed: int) -> None:
     assert true.cables[:6] == told.cables[:6]
 
 
+def test_worlds_are_drawn_until_one_is_far_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first world in which policies end five floors apart in the median is the one that the rig gets; where none
+    is, it ends. What is asked is the engine, of both files."""
+    far, world = loaded("far"), loaded("world")
+    (tmp_path / "robot.toml").write_text(robot_toml("threebar"))
+    asked: list[Path] = []
+    enough = far.FLOORS * far.FLOOR_M
+
+    def simulated(folder: Path, robot: Path, project: Path, policies: list[str]) -> list[dict[str, Any]]:
+        """Two of four policies are off by little, two by more in every world."""
+        asked.append(robot)
+        off = 0.0 if robot.name == "robot.toml" else (len(asked) - 1) * enough / 2.99
+        return [{"com_displacement_m": [x, 0.0, 0.1]} for x in (0.1 * off, off, off, 3.0 * off)]
+
+    monkeypatch.setattr(far, "prior_plan", lambda project: project / "40-plan.h5")
+    monkeypatch.setattr(far, "simulated", simulated)
+    drawn = far.far_apart(tmp_path, 5)
+    assert drawn["world"] == 2 and [path.name for path in asked] == ["robot.toml", *["truth.toml"] * 3]
+    assert list(drawn["ends apart, mm"].values())[1] == pytest.approx(3e3 * enough / 2.99)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "robot.toml").write_text(robot_toml("threebar"))
+    world.unknown(tmp_path / "other", 5, 2)
+    assert (tmp_path / "other" / "truth.toml").read_text() == (tmp_path / "truth.toml").read_text()
+    monkeypatch.setattr(far, "simulated", lambda *_: [{"com_displacement_m": [0.0, 0.0, 0.1]}] * 4)
+    with pytest.raises(SystemExit, match="none of"):
+        far.far_apart(tmp_path, 5)
+
+
 def report(refined: float, gap: float, floor: float | None = 0.01) -> dict[str, Any]:
     """A comparison of ends under two simulators."""
     ends = {"initial": (0.2, 0.15), "iteration 2": (refined, gap)}

@@ -12,7 +12,6 @@ from r2s2r_cli.stages.identify.fit import fit
 from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep
 from r2s2r_cli.stages.identify.free.base import values_of
 from r2s2r_cli.stages.identify.kept import Kept
-from r2s2r_cli.stages.identify.near import reached
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.rounds import Fit, more_starts
@@ -33,9 +32,6 @@ def find_default(task: Task) -> Found:
     """Fit and judge. Raises as `identify`."""
     frees = free_parameters(task.robot, task.runs, task.request, task.settings)
     predictor = task.predictor(frees)
-    if task.near is not None:
-        predictor = task.near.predictor  # it holds machine code and start states already
-        predictor.rollouts = 0
     task, before = holding(task, predictor)
     kept = Kept(task.checkpoint)
     fitted = first_fit(task, predictor, kept)
@@ -84,13 +80,9 @@ def first_fit(task: Task, predictor: Predictor, kept: Kept) -> Fit:
         solver = None if saved["solver"] is None else SolverCheckpoint.from_dict(saved["solver"])
         resume = saved["round"], np.array(saved["values"]), solver
         predictor.rollouts = saved["rollouts"]
-    near, begin = task.near, None
-    if near is not None and task.held:  # with numbers held it was another fit, which shows where to begin
-        both = zip(predictor.mapping.frees, reached(near), strict=True)
-        near, begin = None, np.array([free.start if free.name in task.held else value for free, value in both])
     found = fit(
-        task.runs, task.request.train, predictor, task.recipe, seed=task.request.seed, begin=begin, progress=told,
-        checkpoint=hold, resume=resume, near=near,
+        task.runs, task.request.train, predictor, task.recipe, seed=task.request.seed, progress=told,
+        checkpoint=hold, resume=resume,
     )  # fmt: skip
     return as_the_others(found)
 

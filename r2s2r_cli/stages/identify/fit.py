@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.stages.identify.data import RunData, Selection
-from r2s2r_cli.stages.identify.near import Near
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
 from r2s2r_cli.stages.identify.rounds import Fit, first_round, later_round
@@ -37,13 +36,11 @@ def fit(
     progress: Told | None = None,
     checkpoint: Kept | None = None,
     resume: tuple[int, np.ndarray, Checkpoint | None] | None = None,
-    near: Near | None = None,
 ) -> Fit:
     """Fit the free parameters of `predictor` to the training intervals.
 
     begin: values (n,) to start from, default those of the free parameters. known: see `training_windows`; where every
-    window starts known there is one round. resume is what the last checkpoint was called with. near: of these training
-    intervals, predictor, recipe and values, where the beginning was made already.
+    window starts known there is one round. resume is what the last checkpoint was called with.
 
     Raises NumericalError where nothing can be simulated, InputError for runs that cannot be started.
     """
@@ -58,15 +55,14 @@ def fit(
         if checkpoint is not None and inner is None:
             checkpoint(number, values, None)
         make = training_windows if number == 0 else filtered_windows
-        begun = near if number == 0 and inner is None else None
-        windows = begun.windows if begun else make(runs, train, predictor, values, recipe, known)
+        windows = make(runs, train, predictor, values, recipe, known)
         if inner is not None:
             predictor.rollouts -= len(windows)  # the evaluation at the checkpoint is made again
         hear = None if progress is None else partial(progress, number, rounds)
         keep = None if checkpoint is None else partial(checkpoint, number, values)
         if number == 0:
             found = first_round(predictor, windows, values, recipe, seed=seed, progress=hear, checkpoint=keep,
-                                resume=inner, near=begun)  # fmt: skip
+                                resume=inner)  # fmt: skip
             if found.problem.exact or all(one.known for one in windows):
                 break  # the model explains the data, or there is nothing to make again
         else:

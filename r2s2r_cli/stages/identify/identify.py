@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from r2s2r_cli.artifact import ArtifactData
-from r2s2r_cli.stages.identify.cables import with_cables
 from r2s2r_cli.stages.identify.closed_method import find_closed
 from r2s2r_cli.stages.identify.cma_method import find_cma
 from r2s2r_cli.stages.identify.data import RunData
@@ -57,7 +56,6 @@ def find(
     task = Task(robot, runs, request, settings, cache_dir, progress, checkpoint)
     if request.method == "paper":
         return find_paper(task)
-    task = with_cables(task)
     if request.online:
         return find_online(task)
     if request.method == "cma":

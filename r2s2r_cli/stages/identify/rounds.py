@@ -11,7 +11,6 @@ import numpy as np
 
 from r2s2r_cli.stages.identify.free.base import values_of
 from r2s2r_cli.stages.identify.growing import BEFORE_POPULATION, EARLY_HORIZONS, problem_of, stages_of, started
-from r2s2r_cli.stages.identify.near import Near, tell
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
 from r2s2r_cli.stages.identify.residuals import CapResiduals
@@ -68,12 +67,10 @@ def first_round(
     progress: Callable[[Progress], None] | None = None,
     checkpoint: Callable[[Checkpoint], None] | None = None,
     resume: Checkpoint | None = None,
-    near: Near | None = None,
 ) -> Fit:
     """From far off, over growing horizons: derivatives lead near, a population goes on where they mislead.
 
-    With many start states that are free there is no population, and derivatives go on to the end. near: what `near_fit`
-    found for the same windows and values, which is not computed again. Raises as `fit`.
+    With many start states that are free there is no population, and derivatives go on to the end. Raises as `fit`.
     """
     frees, loss = predictor.mapping.frees, LOSSES[recipe.loss]
     names, stages, count = stages_of(predictor, windows, recipe)
@@ -81,20 +78,10 @@ def first_round(
     few = len(moving_of(problem)) <= MOST_UNKNOWNS
     smooth = count if few else len(stages)
     last = Limits(max_iterations=recipe.max_iterations, tolerance=FROM_AFAR, step_sd=0.05)
-    begun = near if resume is None else None
-    if begun is not None and few:
-        solution = begun.solution
-        predictor.rollouts += begun.rollouts
-        tell(begun.said, progress)
-    else:
-        if begun is not None and begun.mark is not None:
-            resume = begun.mark.checkpoint
-            predictor.rollouts += begun.mark.rollouts - len(windows)  # the evaluation at the mark is made again
-            tell(begun.said[: begun.mark.said], progress)
-        solution = solve_growing(
-            list(zip(names, stages, strict=True))[:smooth], started(problem, values), loss=loss, early=EARLY_HORIZONS,
-            last=BEFORE_POPULATION if few else last, progress=progress, checkpoint=checkpoint, resume=resume,
-        )  # fmt: skip
+    solution = solve_growing(
+        list(zip(names, stages, strict=True))[:smooth], started(problem, values), loss=loss, early=EARLY_HORIZONS,
+        last=BEFORE_POPULATION if few else last, progress=progress, checkpoint=checkpoint, resume=resume,
+    )  # fmt: skip
     if few:
         cooling = Cooling(members=members_for(problem))
         led = Begin(solution.z, solution.normal, min(smooth, len(stages) - 1))

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from r2s2r_cli.stages.identify.cables import with_cables
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.default_method import first_fit, holding
 from r2s2r_cli.stages.identify.kept import Kept
@@ -35,12 +34,12 @@ def self_tested(
     """
     require_replay(request)
     frees = free_parameters(robot, runs, request, settings)
-    task = with_cables(Task(robot, runs, request, settings, cache_dir))
+    task = Task(robot, runs, request, settings, cache_dir)
     predictor = task.predictor(frees)
 
     def once(planted: Sequence[RunData]) -> Fitted:
         before = predictor.rollouts
-        own, _ = holding(replace(task, runs=planted, near=None), predictor)
+        own, _ = holding(replace(task, runs=planted), predictor)
         made = first_fit(own, predictor, Kept(None))
         near = made.solution.z[None, : len(frees)]
         sure = sureness(made, near, loss=own.recipe.loss, seed=request.seed)

@@ -14,7 +14,6 @@ from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.found import ParameterFound
 from r2s2r_cli.stages.identify.free import Free, Mapping, select
 from r2s2r_cli.stages.identify.free.extend import PLUS, extended, name_of
-from r2s2r_cli.stages.identify.near import Near
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe, default_fixed, default_free, recipe_of
 from r2s2r_cli.stages.identify.request import Checkpoint, Progress, Request, silent
@@ -40,10 +39,6 @@ class Task:
     checkpoint: Checkpoint | None = None
     held: tuple[str, ...] = ()
     """Free parameters that the training intervals do not show."""
-    stock: bool = False
-    """Winched cables as robot.toml has them, although the default set goes with softer ones (`cables.py`)."""
-    near: Near | None = None
-    """The beginning of the default fit, where choosing between them has made it."""
 
     @property
     def recipe(self) -> Recipe:
@@ -57,19 +52,13 @@ class Task:
 
     @property
     def given(self) -> dict[str, float]:
-        """Values of parameters that are not fitted: of the request, and those that the default set goes with."""
-        return {**({} if self.stock else self.softer), **self.request.fixed}
-
-    @property
-    def softer(self) -> dict[str, float]:
-        """Those that the default set goes with, where it is what is free and none of them was asked for."""
+        """Values of parameters that are not fitted: those that the default set goes with, where it is what is free and
+        none of them was asked for; and those of the request."""
         asked = (*self.settings.free, *self.request.free)
         own = default_fixed(self.robot) if all(spec.startswith(PLUS) for spec in asked) else {}
         named = {name_of(spec.removeprefix(PLUS)).partition(".")[0] for spec in asked}
-        return {
-            name: value for name, value in own.items()
-            if not {name, name.partition("_")[0]} & named and name not in self.request.fixed
-        }  # fmt: skip
+        mine = {name: value for name, value in own.items() if not {name, name.partition("_")[0]} & named}
+        return {**mine, **self.request.fixed}
 
     def predictor(self, frees: Sequence[Free]) -> Predictor:
         """The engine with these free numbers, those that were given, and the effects that were asked for."""
@@ -88,7 +77,7 @@ class Task:
             ParameterFound(
                 known[name], value, nan, nan, nan, (nan, nan), None,
                 "fixed by hand" if name in self.request.fixed
-                else f"the training intervals prefer it to robot.toml's {known[name].start:g}",
+                else f"the default set goes with it; robot.toml has {known[name].start:g}",
             )
             for name, value in self.given.items()
         )  # fmt: skip

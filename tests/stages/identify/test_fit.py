@@ -14,7 +14,6 @@ import pytest
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.fit import fit
-from r2s2r_cli.stages.identify.near import near_fit
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
 from r2s2r_cli.stages.identify.rounds import Fit, more_starts
@@ -74,23 +73,6 @@ def test_planted_values_come_back_from_a_known_start() -> None:
     np.testing.assert_allclose(fitted.values, value)
     elsewhere = known_fit(planted(0), begin=1.1 * truth())
     assert (np.abs(elsewhere.values - value) < 0.5 * sd).all()
-
-
-@pytest.mark.slow
-def test_a_beginning_that_was_made_is_not_made_again() -> None:
-    """The fit that goes on from it has the same bits, the same trace and the same count of simulations."""
-    known = {"walk": start()}
-    values = np.array([free.start for free in predictor().mapping.frees])
-    windows = training_windows([planted(0)], TRAIN, predictor(), values, RECIPE, known)
-    near = near_fit(predictor(), windows, values, RECIPE)
-    found, said, spent = [], [], []
-    for begun in (near, None):
-        before, heard = predictor().rollouts, list[Progress]()
-        found.append(known_fit(planted(0), near=begun, progress=lambda number, rounds, one, h=heard: h.append(one)))
-        said.append([(one.stage_name, one.iteration, one.cost) for one in heard])
-        spent.append(predictor().rollouts - before)
-    assert near.rollouts > 0 and spent[0] == spent[1] and said[0] == said[1]
-    assert np.array_equal(found[0].values, found[1].values)
 
 
 class Interrupted(Exception):

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from r2s2r_cli.stages.identify.data import RunData, Selection
+from r2s2r_cli.stages.identify.recipe import WINCH_DAMPING
 from r2s2r_cli.stages.identify.request import Request
-from r2s2r_cli.stages.identify.task import busy
+from r2s2r_cli.stages.identify.task import Task, busy
+from schemas.config import IdentifySettings
 from tests.stages.measures.gait import run
 from tests.support.robots import subject
 
@@ -48,3 +51,23 @@ def test_half_speed_is_half_the_time() -> None:
     for speed, found in ((0.25, 1), (0.5, 2)):
         walk = sent([(0.0, 0, 1.0), (0.4, 1, speed), (0.8, 0, 0.0)])
         assert len(busy(ROBOT, [walk], FIRST)) == found
+
+
+@pytest.mark.parametrize(
+    ("asked", "given"),
+    [
+        ({}, {"damping_actuated": WINCH_DAMPING}),
+        ({"free": ("+stiffness.6",)}, {"damping_actuated": WINCH_DAMPING}),
+        ({"free": ("friction",)}, {}),
+        ({"free": ("+damping_actuated",)}, {}),
+        ({"free": ("+damping.0",)}, {}),
+        ({"fixed": {"damping_actuated": 4.0}}, {"damping_actuated": 4.0}),
+    ],
+)
+def test_winches_do_not_follow_a_pull_unless_one_says_so(asked: dict[str, object], given: dict[str, float]) -> None:
+    """Their damping goes with the default set, also with more beside it; not with a set of the user's own, nor where
+    damping is free or fixed. Of the request or of the settings."""
+    walk = sent([(0.0, 0, 1.0)])
+    assert Task(ROBOT, [walk], replace(FIRST, **asked), IdentifySettings()).given == given  # type: ignore[arg-type]
+    if free := asked.get("free"):
+        assert Task(ROBOT, [walk], FIRST, IdentifySettings(free=free)).given == given  # type: ignore[arg-type]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -124,25 +124,12 @@ def _iterate(
         costs = (*state.costs, new.cost)
         z_now = tuple(new.z.tolist())
         done = state.iteration + 1
-        return State(z_now, damping, 2.0, done, small, costs, counts, reason_now, idle, gained, still), new, length
+        return State(z_now, damping, 2.0, done, small, costs, counts, reason_now, idle), new, length
     return replace(state, damping=damping, growth=growth, counts=counts, reason=Reason.STUCK), at, 0.0
 
 
 def _done(still: bool, small: int, idle: int) -> Reason | None:
     return Reason.COST if still else Reason.STEP if small >= 2 else Reason.STUCK if idle >= IDLE else None
-
-
-def ended_at(states: Sequence[State], *, max_iterations: int, tolerance: float) -> State:
-    """Where a search that went through these states, one an iteration, would have ended with at most so many iterations
-    and a wider tolerance, other limits alike: the state that it would have had then; the last one where that ended it
-    as well."""
-    idle = 0
-    for state in states:
-        idle = idle + 1 if state.gained <= tolerance else 0
-        reason = _done(state.still <= tolerance, state.small_steps, idle)
-        if reason or state.iteration >= max_iterations:
-            break
-    return replace(state, reason=reason, idle_steps=idle)
 
 
 def _try(

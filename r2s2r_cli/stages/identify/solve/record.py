@@ -79,11 +79,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class State:
-    """All that Levenberg-Marquardt carries from one iteration to the next; the evaluation at z is made again.
-
-    gained: by what share of the cost the last step lowered it; still: the smallest tolerance at which that step says
-    that the minimum is near, 1 where none does.
-    """
+    """All that Levenberg-Marquardt carries from one iteration to the next; the evaluation at z is made again."""
 
     z: tuple[float, ...]
     damping: float
@@ -94,8 +90,6 @@ class State:
     counts: Counts = Counts()
     reason: Reason | None = None
     idle_steps: int = 0
-    gained: float = 1.0
-    still: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -74,6 +74,8 @@ class IdentifySettings(Frozen):
     """Whether rods collide with each other."""
     free: tuple[Annotated[str, Field(min_length=1)], ...] = ()
     """Free parameters, as after --free; empty: the default set of the method."""
+    fix: tuple[Annotated[str, Field(min_length=1)], ...] = ()
+    """Parameters that are given a value and not fitted, as after --fix: NAME=VALUE."""
     train_share: Annotated[float, Field(strict=True, gt=0, le=1)] = 0.65
     """Share of the target intervals of each run, from its beginning, that is trained on where --train is not given."""
     window: Annotated[int, Field(strict=True, ge=1, le=100)] = 12

@@ -196,7 +196,7 @@ class Asked:
         from r2s2r_cli.stages.identify.task import Task, free_parameters, require_combination
 
         robot, runs = self.project.robot(), self.runs()
-        request = self.request(runs, settings.train_share)
+        request = self.request(runs, settings)
         require_combination(request)
         frees = free_parameters(robot, runs, request, settings)
         if request.method == "paper" or request.drive == "closed loop":
@@ -204,7 +204,7 @@ class Asked:
         else:
             Task(robot, runs, request, settings).predictor(frees)
 
-    def request(self, runs: Sequence[RunData], train_share: float) -> Request:
+    def request(self, runs: Sequence[RunData], settings: IdentifySettings) -> Request:
         """The request, its intervals resolved. Raises UsageError for runs and intervals that do not exist."""
         from r2s2r_cli.stages.identify.effects_asked import effects_asked, effects_kept
         from r2s2r_cli.stages.identify.free.extend import name_of
@@ -212,7 +212,7 @@ class Asked:
         from r2s2r_cli.stages.identify.selection import split
         from r2s2r_cli.store.read import read_artifact
 
-        train, test = split(runs, self.train, self.test, train_share)
+        train, test = split(runs, self.train, self.test, settings.train_share)
         before, kept = (
             read_artifact(place.artifact("identification"), "identification")[1] if place else None
             for place in (self.last, self.kept)
@@ -220,7 +220,8 @@ class Asked:
         robot = self.project.robot()
         wanted = effects_asked(self.effects, robot) if kept is None else effects_kept(kept, robot)
         named = {name_of(text.removeprefix("+")) for text in self.free}
-        fixed = {name: value for name, value in wanted.fixed.items() if name not in named} | parse_fixed(self.fix)
+        kept_fixed = {**wanted.fixed, **parse_fixed(settings.fix, where="identify.fix")}
+        fixed = {name: value for name, value in kept_fixed.items() if name not in named} | parse_fixed(self.fix)
         return Request(
             train=train, test=test, free=self.free, fixed=fixed, effects=wanted.ids,
             of_effects=wanted.specs,
@@ -229,8 +230,8 @@ class Asked:
         )  # fmt: skip
 
 
-def parse_fixed(texts: Sequence[str]) -> dict[str, float]:
-    """`friction=0.6` items as numbers by parameter. Raises UsageError."""
+def parse_fixed(texts: Sequence[str], where: str = "--fix") -> dict[str, float]:
+    """`friction=0.6` items as numbers by parameter. where: they stand. Raises UsageError."""
     fixed: dict[str, float] = {}
     for text in texts:
         name, _, number = text.partition("=")
@@ -239,7 +240,7 @@ def parse_fixed(texts: Sequence[str]) -> dict[str, float]:
         except ValueError:
             value = math.nan
         if not name or not math.isfinite(value):
-            raise UsageError("a fixed parameter has no number", where="--fix", expected="NAME=VALUE", received=text,
+            raise UsageError("a fixed parameter has no number", where=where, expected="NAME=VALUE", received=text,
                              hint=f"--fix {name or 'friction'}=0.6")  # fmt: skip
         fixed[name] = value
     return fixed

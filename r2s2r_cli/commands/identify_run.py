@@ -24,7 +24,7 @@ def compute(
 ) -> tuple[ArtifactData, IdentifyReport]:
     """Fit; the report knows how long each part took. What is asked for is checked before anything heavy is loaded."""
     runs = asked.runs()
-    request = asked.request(runs, settings.train_share)
+    request = asked.request(runs, settings)
     stage = loaded("r2s2r_cli.stages.identify")
     clock = Clock()
     with _shown(console, clock) as progress:
@@ -41,7 +41,7 @@ def plant(asked: Asked, settings: IdentifySettings, console: Console) -> None:
     from schemas.results_identify import SelfTestReport, SelfTestResult
 
     runs = asked.runs()
-    request = asked.request(runs, settings.train_share)
+    request = asked.request(runs, settings)
     stage = loaded("r2s2r_cli.stages.identify.self_tested")
     clock = Clock()
     with _shown(console, clock) as progress:

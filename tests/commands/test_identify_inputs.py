@@ -18,6 +18,7 @@ from r2s2r_cli.commands.identify_run import Clock
 from r2s2r_cli.errors import R2S2RError, UsageError
 from r2s2r_cli.store.again import command_again
 from r2s2r_cli.store.project import Project
+from schemas.config import IdentifySettings
 from schemas.results import StageResult
 from tests.commands.conftest import invoke
 from tests.stages.identify.reports import report
@@ -145,7 +146,7 @@ def test_online_goes_on_from_the_last_identification(estimated: Path) -> None:
     write_artifact(estimated / "iterations/001/30-identify.h5", builders.identification(), builders.provenance())
     later = asked(estimated, 2, online=True)
     assert later.last is not None and later.last.number == 1
-    request = later.request(later.runs(), 0.65)
+    request = later.request(later.runs(), IdentifySettings())
     assert request.before is not None and request.before.kind == "identification"
     assert asked(estimated, 1, online=True).last is None
 
@@ -159,7 +160,7 @@ def test_an_iteration_of_also_that_is_not_there_is_named_so(estimated: Path) -> 
 def test_intervals_are_resolved(estimated: Path) -> None:
     """--train 1-2 leaves the other complete intervals to be predicted."""
     found = asked(estimated, train=("sample:1-2",))
-    request = found.request(found.runs(), 0.65)
+    request = found.request(found.runs(), IdentifySettings())
     assert [one.intervals for one in request.train] == [(1, 2)]
     assert request.test[0].intervals[0] == 3
 
@@ -281,6 +282,21 @@ def test_fixed_values_are_numbers() -> None:
     for text in ("friction", "friction=", "=1", "friction=nan", "friction=a"):
         with pytest.raises(UsageError, match="no number"):
             parse_fixed((text,))
+
+
+def test_what_the_settings_fix_a_command_may_free_or_fix_otherwise(estimated: Path) -> None:
+    """`identify.fix` holds like --fix; a number without a value is refused where it stands."""
+    settings = IdentifySettings(fix=("damping_actuated=40", "friction=0.6"))
+    for given, fixed in (
+        ({}, {"damping_actuated": 40.0, "friction": 0.6}),
+        ({"free": ("+friction",)}, {"damping_actuated": 40.0}),
+        ({"fix": ("friction=0.5",)}, {"damping_actuated": 40.0, "friction": 0.5}),
+    ):
+        found = asked(estimated, train=("sample:1-2",), **given)
+        assert found.request(found.runs(), settings).fixed == fixed
+    with pytest.raises(UsageError, match="no number") as caught:
+        asked(estimated).request(asked(estimated).runs(), IdentifySettings(fix=("friction",)))
+    assert caught.value.where == "identify.fix"
 
 
 def test_the_command_that_makes_it_again(estimated: Path) -> None:

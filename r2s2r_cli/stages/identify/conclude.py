@@ -48,7 +48,7 @@ def known_before(task: Task, predictor: Predictor) -> Identifiability:
     values = np.array([free.start for free in frees])
     windows = training_windows(task.runs, task.request.train, predictor, values, replace(recipe, window=1))
     problem = CapResiduals(predictor, windows, spread=recipe.spread, noise=recipe.noise)
-    return identifiability(problem, problem.z0, frees, dead_refused=bool(task.request.free or task.settings.free))
+    return identifiability(problem, problem.z0, frees, excused=task.of_default)
 
 
 def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:

@@ -51,11 +51,22 @@ class Task:
         return {run.name: run.nature for run in self.runs if run.nature}
 
     @property
+    def with_default(self) -> bool:
+        """Whether the default set is free, alone or with more beside it."""
+        return all(spec.startswith(PLUS) for spec in (*self.settings.free, *self.request.free))
+
+    @property
+    def of_default(self) -> tuple[str, ...]:
+        """Names of the default set, where it is free: nobody asked for one of them by itself."""
+        moved = busy(self.robot, self.runs, self.request)
+        return tuple(map(name_of, default_free(self.robot, moved))) if self.with_default else ()
+
+    @property
     def given(self) -> dict[str, float]:
         """Values of parameters that are not fitted: those that the default set goes with, where it is what is free and
         none of them was asked for; and those of the request."""
         asked = (*self.settings.free, *self.request.free)
-        own = default_fixed(self.robot) if all(spec.startswith(PLUS) for spec in asked) else {}
+        own = default_fixed(self.robot) if self.with_default else {}
         named = {name_of(spec.removeprefix(PLUS)).partition(".")[0] for spec in asked}
         mine = {name: value for name, value in own.items() if not {name, name.partition("_")[0]} & named}
         return {**mine, **self.request.fixed}

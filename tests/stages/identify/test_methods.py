@@ -71,7 +71,7 @@ def task(tmp_path_factory: pytest.TempPathFactory) -> Task:
     asked = Asked(project, project.iteration(1, create=False), train=("gait:1-2",), free=("motor_speed",))
     runs = asked.runs()
     settings = IdentifySettings(starts=1, profiles=0)
-    return Task(project.robot(), runs, asked.request(runs, 1.0), settings, project.cache)
+    return Task(project.robot(), runs, asked.request(runs, settings), settings, project.cache)
 
 
 @pytest.fixture

@@ -71,3 +71,14 @@ def test_winches_do_not_follow_a_pull_unless_one_says_so(asked: dict[str, object
     assert Task(ROBOT, [walk], replace(FIRST, **asked), IdentifySettings()).given == given  # type: ignore[arg-type]
     if free := asked.get("free"):
         assert Task(ROBOT, [walk], FIRST, IdentifySettings(free=free)).given == given  # type: ignore[arg-type]
+
+
+def test_who_asked_for_a_number_is_told_that_it_has_no_effect() -> None:
+    """Of the default set nobody did, also with more beside it; with a set of one's own everything is asked for."""
+    walk = sent([(0.0, 0, 1.0)])
+    (both, beside, own) = (
+        Task(ROBOT, [walk], replace(FIRST, free=free), IdentifySettings()).of_default
+        for free in ((), ("+stiffness.6",), ("friction",))
+    )
+    assert both == beside and f"motor_speed_in.{ROBOT.actuated[0]}" in both and "stiffness.6" not in both
+    assert own == ()

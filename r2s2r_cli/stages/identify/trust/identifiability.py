@@ -6,7 +6,7 @@ prior and bounds think possible.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -100,7 +100,7 @@ def identifiability(
     inflation: float = 1.0,
     secant: float | None = 0.3,
     refuse: bool = True,
-    dead_refused: bool = True,
+    excused: Collection[str] = (),
 ) -> Identifiability:
     """Of the parameters at z0 (n,), nuisances marginalised with their priors, priors of parameters off.
 
@@ -109,8 +109,8 @@ def identifiability(
     derivatives, two evaluations a parameter; None: no check. A derivative at a kink of contact can be 0 or huge: where
     a finite change shows less than a third of it, or where it is 0, the change takes its place.
 
-    Raises, with `refuse`, InputError for starts on a bound or outside, and, with `dead_refused` as well, for parameters
-    without any effect.
+    Raises, with `refuse`, InputError for starts on a bound or outside, and for parameters without any effect, but those
+    that are `excused` by name.
     Raises NumericalError where z0 cannot be evaluated.
     """
     z0 = np.asarray(z0, dtype=float)
@@ -138,8 +138,9 @@ def identifiability(
     rough = column_norm > KINK * np.maximum(secant_norm, NOTHING)
     dead = (column_norm < NOTHING) & ~(secant_norm >= NOTHING)
     stalled = (column_norm < NOTHING) & (secant_norm >= NOTHING)
-    if refuse and dead_refused:
-        refuse_hopeless(problem.names, dead, stalled, column_norm, frees)
+    if refuse:
+        asked = np.array([name not in excused for name in problem.names], dtype=bool)
+        refuse_hopeless(problem.names, dead & asked, stalled & asked, column_norm, frees)
     full = jacobian.T @ jacobian
     full[np.diag_indices_from(full)] += np.concatenate([np.zeros(p), precision(problem)[p:]])
     scaled = marginal(full, p) * np.outer(width, width)

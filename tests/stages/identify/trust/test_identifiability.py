@@ -78,7 +78,7 @@ def test_no_effect_is_refused_with_a_hint():
         identifiability(problem, np.array([0.0, 0.2]), frees)
     assert caught.value.hint == "r2s2r identify --fix restitution=0.2"
     # Of a default set, which nobody asked for, it is told and not refused; the other is known as if it were alone.
-    found = identifiability(problem, np.array([0.0, 0.2]), frees, dead_refused=False)
+    found = identifiability(problem, np.array([0.0, 0.2]), frees, excused=[free.name for free in frees])
     assert found.no_effect == ("restitution",)
     assert [trust.name for trust in found.trust] == ["IDENTIFIED", "NOT_IDENTIFIABLE"]
     assert found.sd_z[0] == pytest.approx(1 / 3)

@@ -109,9 +109,10 @@ def source_ref(project: Project, path: Path, *, kind: str = "") -> InputRef:
 
 
 def _plain(value: Any) -> Any:
-    """Lists as mappings by index, so that a difference names the one entry."""
+    """Lists as mappings by index, so that a difference names the one entry; an empty one is absent: a setting that is
+    newer than the artifact, and asks for nothing, does not make it stale."""
     if isinstance(value, list | tuple):
-        return {str(i): item for i, item in enumerate(value)}
+        return {str(i): item for i, item in enumerate(value)} or None
     return value
 
 

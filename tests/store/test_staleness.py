@@ -214,10 +214,19 @@ MAPPINGS = st.dictionaries(st.sampled_from("abc"), TREES, max_size=3)
 
 
 def _without_none(value: Any) -> Any:
-    """Absent and None are one; lists and tuples are one."""
+    """Absent, None and an empty list are one; lists and tuples are one."""
     if isinstance(value, list):
         value = {str(i): item for i, item in enumerate(value)}
-    return {k: _without_none(v) for k, v in value.items() if v is not None} if isinstance(value, dict) else value
+    if not isinstance(value, dict):
+        return value
+    return {k: _without_none(v) for k, v in value.items() if v is not None and v != []}
+
+
+def test_a_list_that_is_newer_than_the_artifact_and_empty_does_not_make_it_stale() -> None:
+    """With an entry it does; a table or a number that is new does."""
+    assert differences({"free": ["friction"]}, {"free": ["friction"], "fix": []}) == []
+    assert differences({}, {"fix": ["friction=1"]}) == ["fix was absent, is a table of 1"]
+    assert differences({}, {"fix": {}}) and differences({}, {"fix": 0})
 
 
 @given(MAPPINGS, MAPPINGS)

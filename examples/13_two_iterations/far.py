@@ -7,7 +7,6 @@ camera, no rig and no identification is asked, and the loop plans its own polici
 
 from __future__ import annotations
 
-import math
 import shutil
 import sys
 from pathlib import Path
@@ -15,11 +14,11 @@ from statistics import median
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
-from shown import simulated  # noqa: E402 - beside this file
+from shown import ends_apart, simulated  # noqa: E402 - beside this file
 from world import r2s2r, unknown  # noqa: E402
 
 FLOORS, FLOOR_M = 5.0, 5e-3
-"""How far apart; and the floor [m] at ends: what repeats differ by here (README.md: 3.8 and 4.6 mm in the median)."""
+"""How far apart; and the floor [m] at ends, about what repeats of a policy differ by (README.md, in the median)."""
 POLICIES = ("straight", "turn-clockwise", "turn-counterclockwise", "arching")
 TRIES = 40
 
@@ -48,10 +47,7 @@ def far_apart(project: Path, seed: int) -> dict[str, object]:
     for number in range(TRIES):
         drawn = unknown(project, seed, number)
         true = simulated(project / "prior" / "true", project / "truth.toml", project, words)
-        away = [
-            math.dist(one["com_displacement_m"][:2], other["com_displacement_m"][:2])
-            for one, other in zip(told, true, strict=True)
-        ]
+        away = [ends_apart(one, other) for one, other in zip(told, true, strict=True)]
         if median(away) >= FLOORS * FLOOR_M:
             return {
                 **drawn,

@@ -57,7 +57,7 @@ class Profile:
     draw: bool = False
 
 
-DEMO = Profile(targets=14, policies=(("straight",), ("turn-clockwise",)), settings=SHORT, draw=True)
+DEMO = Profile(policies=(("straight",), ("turn-clockwise",)), settings=SHORT, draw=True)
 """Minutes instead of a quarter of an hour: `make demo`."""
 
 

@@ -49,6 +49,11 @@ def simulated(folder: Path, robot: Path, project: Path, policies: Sequence[str])
     return runs
 
 
+def ends_apart(one: Mapping[str, Any], other: Mapping[str, Any]) -> float:
+    """How far the centres of mass of two simulated runs end from each other, over the ground [m]."""
+    return math.dist(one["com_displacement_m"][:2], other["com_displacement_m"][:2])
+
+
 def apart(project: Path) -> Iterator[Apart]:
     """All executed policies of both iterations. Raises FileNotFoundError where the seed is not finished."""
     report = json.loads((project / "comparison.json").read_text("utf-8"))
@@ -68,7 +73,7 @@ def apart(project: Path) -> Iterator[Apart]:
             for kind, file in (("told", "robot"), ("true", "truth"))
         )
         for name, one, other in zip(names, told, true, strict=True):
-            com = math.dist(one["com_displacement_m"][:2], other["com_displacement_m"][:2])
+            com = ends_apart(one, other)
             turn = one["heading_change_rad"] - other["heading_change_rad"]
             heading = abs(math.remainder(turn, math.tau))
             segment = abs(one["duration_s"] - other["duration_s"]) / one["targets"]

@@ -58,7 +58,7 @@ def test_worlds_are_drawn_until_one_is_far_enough(tmp_path: Path, monkeypatch: p
     enough = far.FLOORS * far.FLOOR_M
 
     def simulated(folder: Path, robot: Path, project: Path, policies: list[str]) -> list[dict[str, Any]]:
-        """Two of four policies are off by little, two by more in every world."""
+        """One of four policies is off by little, one by more; all by more from world to world."""
         asked.append(robot)
         off = 0.0 if robot.name == "robot.toml" else (len(asked) - 1) * enough / 2.99
         return [{"com_displacement_m": [x, 0.0, 0.1]} for x in (0.1 * off, off, off, 3.0 * off)]

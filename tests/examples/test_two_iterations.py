@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import math
+import shutil
+import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -50,8 +54,8 @@ def test_the_world_is_another_one(tmp_path: Path, seed: int) -> None:
 
 
 def test_worlds_are_drawn_until_one_is_far_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The first world in which policies end five floors apart in the median is the one that the rig gets; where none
-    is, it ends. What is asked is the engine, of both files."""
+    """The first world in which policies end so many floors apart in the median, and no cable gets shorter than the
+    guard allows, is the one that the rig gets; where none is, it ends. What is asked is the engine, of both files."""
     far, world = loaded("far"), loaded("world")
     (tmp_path / "robot.toml").write_text(robot_toml("threebar"))
     asked: list[Path] = []
@@ -64,17 +68,46 @@ def test_worlds_are_drawn_until_one_is_far_enough(tmp_path: Path, monkeypatch: p
         return [{"com_displacement_m": [x, 0.0, 0.1]} for x in (0.1 * off, off, off, 3.0 * off)]
 
     monkeypatch.setattr(far, "prior_plan", lambda project: project / "40-plan.h5")
+    short = iter([0.04, 0.06])
     monkeypatch.setattr(far, "simulated", simulated)
+    monkeypatch.setattr(far, "shortest", lambda folder: next(short))
     drawn = far.far_apart(tmp_path, 5)
-    assert drawn["world"] == 2 and [path.name for path in asked] == ["robot.toml", *["truth.toml"] * 3]
-    assert list(drawn["ends apart, mm"].values())[1] == pytest.approx(3e3 * enough / 2.99)
+    assert drawn["world"] == 3 and [path.name for path in asked] == ["robot.toml", *["truth.toml"] * 4]
+    assert list(drawn["ends apart, mm"].values())[1] == pytest.approx(4e3 * enough / 2.99)
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "robot.toml").write_text(robot_toml("threebar"))
-    world.unknown(tmp_path / "other", 5, 2)
+    world.unknown(tmp_path / "other", 5, 3)
     assert (tmp_path / "other" / "truth.toml").read_text() == (tmp_path / "truth.toml").read_text()
     monkeypatch.setattr(far, "simulated", lambda *_: [{"com_displacement_m": [0.0, 0.0, 0.1]}] * 4)
     with pytest.raises(SystemExit, match="none of"):
         far.far_apart(tmp_path, 5)
+
+
+def test_a_world_whose_robot_is_stopped_is_drawn_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Exit code 5 of a run: the next world of the seed, from the beginning; any other ends the example."""
+    run = loaded("run")
+    asked: list[int] = []
+
+    def prepared(out: Path, seed: int, profile: Any, drawn: Any) -> Path:
+        asked.append(drawn.keywords["first"])
+        (out / "seed-4").mkdir()
+        (out / "seed-4" / "drawn.json").write_text(json.dumps({"world": asked[-1] + 1}))
+        return out / "seed-4"
+
+    def iterate(project: Path, number: int, *_: Any) -> None:
+        if codes and (code := codes.pop(0)):
+            raise subprocess.CalledProcessError(code, ["r2s2r", "run"])
+
+    monkeypatch.setattr(run, "prepared", prepared)
+    monkeypatch.setattr(run, "iterate", iterate)
+    monkeypatch.setattr(run, "rig", lambda project: nullcontext(("--port", "p")))
+    codes, said = [5, 0, 5], []
+    assert run.went_through(tmp_path, 4, run.Profile(), said.append) == tmp_path / "seed-4"
+    assert asked == [0, 2, 4] and len(said) == 2 and "world 1" in said[0]
+    shutil.rmtree(tmp_path / "seed-4")
+    codes = [4]
+    with pytest.raises(subprocess.CalledProcessError):
+        run.went_through(tmp_path, 4, run.Profile(), said.append)
 
 
 def report(refined: float, gap: float, floor: float | None = 0.01) -> dict[str, Any]:

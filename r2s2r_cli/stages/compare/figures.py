@@ -29,6 +29,27 @@ def measures(mine: Sequence[CompareRun], first: Sequence[CompareRun], floor: Com
     return found
 
 
+def in_common(rows: Sequence[CompareRun]) -> tuple[list[CompareRun], list[str]]:
+    """The same rows, without the measures of a run that one simulator has and another has not: what they err by is
+    compared over the same runs. A simulator that has a measure of no run takes nothing from the others. And what is to
+    be said of each run that lost one."""
+    blank: dict[str, dict[str, None]] = {}
+    missing: dict[str, set[str]] = {}
+    for field in RUN_VALUES.values():
+        has = [(row.model, row.run) for row in rows if getattr(row, field) is not None]
+        models, runs = dict.fromkeys(model for model, _ in has), dict.fromkeys(run for _, run in has)
+        for run in runs:
+            if without := {model for model in models if (model, run) not in has}:
+                blank.setdefault(run, {})[field] = None
+                missing.setdefault(run, set()).update(without)
+    said = [
+        f"run {run} is left out of the figures over several runs for all simulators: "
+        f"{', '.join(sorted(missing[run]))} could not be simulated in it"
+        for run in missing
+    ]
+    return [row.model_copy(update=blank.get(row.run, {})) for row in rows], said
+
+
 def floor_of(walks: Mapping[str, Walk], policies: Mapping[str, str], keyframe_m: float | None) -> CompareFloor:
     """From repeats among these runs; that of key frames is of caps at the end of an interval, laid on each other at its
     start, and where nothing repeats that of floor.h5 (keyframe_m). A run is compared with one simulation, so that the

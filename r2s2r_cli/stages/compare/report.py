@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.stages.compare.errors import RunErrors
-from r2s2r_cli.stages.compare.figures import floor_of, measures
+from r2s2r_cli.stages.compare.figures import floor_of, in_common, measures
 from r2s2r_cli.stages.compare.opening import Opening
 from r2s2r_cli.stages.compare.predicted import Model, PredictedRun
 from r2s2r_cli.stages.compare.ranking import LEAST, ranking
@@ -54,7 +54,8 @@ def report_of(
     repeats = [_repeatability(one) for one in repeatability(walks, policies)]
     by_run = {run: one for one in repeats for run in one.runs}
     rows = [_run(one, floor[one.real.iteration], by_run.get(one.real.name)) for one in compared]
-    warnings = [*_unsettled(runs), *(text for one in compared for text in one.predicted.warnings)]
+    even, left_out = in_common(rows)
+    warnings = [*_unsettled(runs), *left_out, *(text for one in compared for text in one.predicted.warnings)]
     if floor[numbers[0]].com_end_m is None:
         warnings.append(
             "no policy was run twice from the same shape on the same side: where the floor of an end is unknown, "
@@ -63,10 +64,10 @@ def report_of(
     seen = {name for model in models for name in model.trained_on}
     return CompareReport(
         iteration=numbers[0], runs=tuple(rows),
-        models=tuple(_model(model, models[0], compared, rows, seen, floor[numbers[0]]) for model in models),
-        policies=tuple(_policies(runs, models, rows)),
+        models=tuple(_model(model, models[0], compared, even, seen, floor[numbers[0]]) for model in models),
+        policies=tuple(_policies(runs, models, even)),
         history=tuple(
-            _history(number, model, models[0], rows, floor[number]) for number in sorted(numbers) for model in models
+            _history(number, model, models[0], even, floor[number]) for number in sorted(numbers) for model in models
         ),
         repeatability=tuple(repeats), floor=floor[numbers[0]], warnings=tuple(dict.fromkeys(warnings)),
     )  # fmt: skip

@@ -60,7 +60,7 @@ class Starts:
                     states = [rest]
                     if last[run.name] > 1:
                         later = _Ensemble(caps, predictor, values, rest, self.belief).starts()
-                        states += islice(later, last[run.name] - 1)
+                        states += (start.state for start in islice(later, last[run.name] - 1))
             except EngineError as error:
                 raise refused(error, ()) from error
             found.update({(run.name, k + 1): state for k, state in enumerate(states)})

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
-from r2s2r_cli.stages.identify.start import states_at
+from r2s2r_cli.stages.identify.start import starts_at
+from r2s2r_cli.stages.identify.ways import Start
 from r2s2r_cli.stages.identify.windows import Window, window
 from r2s2r_cli.stages.measures.steps import Step, chains, steps_of
 from r2s2r_cli.stages.measures.table import Predicted
@@ -19,14 +21,17 @@ from r2s2r_cli.stages.measures.table import Predicted
 if TYPE_CHECKING:
     from r2s2r_cli.engine import State
 
-Starts = dict[tuple[str, int], "State"]
-"""Start states (batch of 1) by run and interval, 1-based."""
+Starts = dict[tuple[str, int], Start]
+"""Where intervals start, by run and interval, 1-based."""
+MEMBERS = 32
+"""Of the filter's ensemble, that predict what follows from a start."""
 
 
 @dataclass(frozen=True)
 class Replayed:
     """Simulated steps: simulated (frame, cap, 3) [m] of each, start frame first; free: the same of each chain of steps,
-    from the start of its first; () where no free run was asked for."""
+    from the start of its first; () where no free run was asked for. Means over what is not known of the start: how caps
+    stick and slip from a start that is known to millimetres is chance, and of all predictions their mean errs least."""
 
     steps: tuple[Step, ...]
     simulated: tuple[np.ndarray, ...]
@@ -53,14 +58,14 @@ def steps_from(runs: Sequence[RunData], selections: Sequence[Selection], *, smoo
 def starts_of(
     runs: Sequence[RunData], selections: Sequence[Selection], predictor: Predictor, values: np.ndarray, recipe: Recipe
 ) -> Starts:
-    """Causal start states of the selected intervals, and of those before them: one pass of the filter over each run.
+    """Causal starts of the selected intervals, and of those before them: one pass of the filter over each run.
 
-    Raises as `states_at`.
+    Raises as `starts_at`.
     """
     last: dict[str, int] = {}
     for one in selections:
         last[one.run] = max(*one.intervals, last.get(one.run, 1))
-    return states_at([run for run in runs if run.name in last], predictor, values, last, belief=recipe.belief)
+    return starts_at([run for run in runs if run.name in last], predictor, values, last, belief=recipe.belief)
 
 
 def replayed(
@@ -83,17 +88,44 @@ def replayed(
     if not steps:
         return Replayed((), (), ())
     named = {run.name: run for run in runs}
-    states = starts_of(runs, selections, predictor, values, recipe) if starts is None else dict(starts)
-    states.update({(name, 1): state for name, state in (known or {}).items()})
-    windows = [window(named[step.run], (step.interval,), states[step.run, step.interval], whole=True) for step in steps]
-    runs_free = [
-        window(
-            named[chain[0].run], tuple(s.interval for s in chain), states[chain[0].run, chain[0].interval], whole=True
+    found = starts_of(runs, selections, predictor, values, recipe) if starts is None else dict(starts)
+    found.update({(name, 1): Start(state) for name, state in (known or {}).items()})
+    parts = [*((step,) for step in steps), *(chains(steps) if free_run else ())]
+    paths = [
+        mean_path(
+            predictor, values, named[part[0].run], tuple(step.interval for step in part),
+            found[part[0].run, part[0].interval],
         )
-        for chain in (chains(steps) if free_run else ())
-    ]
-    paths = simulated_paths(predictor, values, [*windows, *runs_free])
-    return Replayed(steps, tuple(paths[: len(windows)]), tuple(paths[len(windows) :]))
+        for part in parts
+    ]  # fmt: skip
+    return Replayed(steps, tuple(paths[: len(steps)]), tuple(paths[len(steps) :]))
+
+
+def mean_path(
+    predictor: Predictor, values: np.ndarray, run: RunData, intervals: tuple[int, ...], start: Start
+) -> np.ndarray:
+    """End caps (frame, cap, 3) [m] of these intervals in a row, start frame first: the mean over MEMBERS of the start,
+    those left out that cannot be simulated. Raises NumericalError where none can."""
+    from r2s2r_cli.engine.flat import unpack_state
+
+    own = window(run, intervals, start.state, whole=True)
+    if start.members is None:
+        return simulated_paths(predictor, values, [own])[0]
+    many = [replace(own, state=unpack_state(predictor.structure, one[None])) for one in start.members[:MEMBERS]]
+    try:
+        paths = simulated_paths(predictor, values, many)
+    except NumericalError:
+        paths = [path for one in many for path in _or_none(predictor, values, one)]
+        if not paths:
+            raise
+    return np.asarray(np.mean(paths, axis=0))
+
+
+def _or_none(predictor: Predictor, values: np.ndarray, one: Window) -> list[np.ndarray]:
+    try:
+        return simulated_paths(predictor, values, [one])
+    except NumericalError:
+        return []
 
 
 def simulated_paths(predictor: Predictor, values: np.ndarray, windows: Sequence[Window]) -> list[np.ndarray]:

@@ -21,7 +21,7 @@ from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.ensemble import analysis, centred, student_weights
 from r2s2r_cli.stages.identify.members import mean, placed, places
 from r2s2r_cli.stages.identify.predict import Predictor, refused
-from r2s2r_cli.stages.identify.ways import Way
+from r2s2r_cli.stages.identify.ways import Start, Way
 from r2s2r_cli.stages.init.attachment import rod_frames
 
 if TYPE_CHECKING:
@@ -67,10 +67,10 @@ class Filter:
     interval: Spread = Spread(roll=0.01)
 
 
-def start_states(
+def starts_to(
     run: RunData, predictor: Predictor, values: np.ndarray, last: int, *, belief: Filter | None = None
-) -> list[State]:
-    """States at the first frames of intervals 1 to `last`, each a batch of 1; none depends on a later frame.
+) -> list[Start]:
+    """Starts at the first frames of intervals 1 to `last`; none depends on a later frame.
 
     The first is the robot at rest in the observed pose (paper, section System Identification: cable lengths and end
     caps at t = 0, then gravity), from the run's first frame. The others are means of an ensemble.
@@ -96,14 +96,21 @@ def start_states(
     return way.found[:last]
 
 
-def _coming(run: RunData, predictor: Predictor, values: np.ndarray, belief: Filter) -> Iterator[State]:
-    """The start states, each simulated when it is asked for."""
+def start_states(
+    run: RunData, predictor: Predictor, values: np.ndarray, last: int, *, belief: Filter | None = None
+) -> list[State]:
+    """The states of `starts_to`, each a batch of 1. Raises as it does."""
+    return [start.state for start in starts_to(run, predictor, values, last, belief=belief)]
+
+
+def _coming(run: RunData, predictor: Predictor, values: np.ndarray, belief: Filter) -> Iterator[Start]:
+    """The starts, each simulated when it is asked for."""
     import torch
 
     theta = predictor.mapping.theta(torch.as_tensor(values, dtype=torch.float64))
     up = np.array([0.0, 0.0, predictor.mapping.observation(values).ground_height])
     rest = _rest(predictor, theta, run.observed[run.intervals.first[0]] - up)
-    yield rest
+    yield Start(rest)
     if len(run.intervals) > 1:
         yield from _Ensemble(run, predictor, values, rest, belief).starts()
 
@@ -112,11 +119,20 @@ def states_at(
     runs: Sequence[RunData], predictor: Predictor, values: np.ndarray, last: dict[str, int], *,
     belief: Filter | None = None,
 ) -> dict[tuple[str, int], State]:  # fmt: skip
-    """Start states by run and interval (1-based), of intervals 1 to last[run]. Raises as `start_states`."""
-    found: dict[tuple[str, int], State] = {}
+    """Start states by run and interval (1-based), of intervals 1 to last[run]. Raises as `starts_to`."""
+    found = starts_at(runs, predictor, values, last, belief=belief)
+    return {place: start.state for place, start in found.items()}
+
+
+def starts_at(
+    runs: Sequence[RunData], predictor: Predictor, values: np.ndarray, last: dict[str, int], *,
+    belief: Filter | None = None,
+) -> dict[tuple[str, int], Start]:  # fmt: skip
+    """Starts by run and interval (1-based), of intervals 1 to last[run]. Raises as `starts_to`."""
+    found: dict[tuple[str, int], Start] = {}
     for run in runs:
-        for k, state in enumerate(start_states(run, predictor, values, last[run.name], belief=belief)):
-            found[run.name, k + 1] = state
+        for k, start in enumerate(starts_to(run, predictor, values, last[run.name], belief=belief)):
+            found[run.name, k + 1] = start
     if not found:
         raise NumericalError("there is nothing to start from", where="identify", expected="a run", received="none",
                              hint="r2s2r status")  # fmt: skip
@@ -163,8 +179,8 @@ class _Ensemble:
         self._add(belief.first)
         self._redraw()
 
-    def starts(self) -> Iterator[State]:
-        """States at the starts of intervals 2, 3 and so on."""
+    def starts(self) -> Iterator[Start]:
+        """Where intervals 2, 3 and so on start."""
         from r2s2r_cli.engine.flat import unpack_state
 
         run, first = self.run, [int(frame) for frame in self.run.intervals.first]
@@ -176,7 +192,7 @@ class _Ensemble:
             self._add(self.belief.drift, math.sqrt(t[k] - t[k - 1]))
             self._see(first[0] + k, float(t[k] - t[k - 1]))
             if first[0] + k in first:
-                yield unpack_state(self.structure, mean(self.structure, self.flat)[0][None])
+                yield Start(unpack_state(self.structure, mean(self.structure, self.flat)[0][None]), self.flat)
                 self._add(self.belief.interval)
                 self._redraw()
 

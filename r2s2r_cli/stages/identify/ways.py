@@ -11,13 +11,24 @@ import numpy as np
 from r2s2r_cli.stages.identify.data import RunData
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from r2s2r_cli.engine import State
     from r2s2r_cli.stages.identify.start import Filter
 
 
 @dataclass(frozen=True)
+class Start:
+    """Where an interval starts. state: a batch of 1; members: flat states (E, NS) that scatter about it as far as it is
+    unknown, None where it is what robot.toml and the first frame say."""
+
+    state: State
+    members: Tensor | None = None
+
+
+@dataclass(frozen=True)
 class Way:
-    """Start states of one run with parameter values (n,): `found` from interval 1 on, and those that are coming.
+    """Starts of one run with parameter values (n,): `found` from interval 1 on, and those that are coming.
 
     What is asked for grows: of the first windows, of all intervals. None depends on a later frame, so what was found
     stays, and the filter goes on from there.
@@ -26,8 +37,8 @@ class Way:
     run: RunData
     values: np.ndarray
     belief: Filter
-    coming: Iterator[State]
-    found: list[State] = field(default_factory=list)
+    coming: Iterator[Start]
+    found: list[Start] = field(default_factory=list)
 
     def same(self, run: RunData, values: np.ndarray, belief: Filter) -> bool:
         """Whether these are the start states of that."""

@@ -46,19 +46,18 @@ class Primitive:
 
 
 def start_poses(executor: Executor, robot: Robot, starts: int, generator: np.random.Generator) -> Standing:
-    """Rested robots, every draw from `starts` poses, draw by draw: the first with all cables at their rest lengths, the
-    others where the controller may leave them (done within its tolerance, reached from the short side)."""
+    """Rested robots, every draw from `starts` poses, draw by draw: the first of all with all cables at their rest
+    lengths, the others where the controller leaves them, done within its tolerance, reached from the short side, and
+    that by what its sensors read. A sensor that is off moves where a robot starts as well as where it goes."""
     p_WE = np.array(robot.rest_caps_m)
     ends = np.array([cable.caps for cable in robot.cables])
-    length = np.linalg.norm(p_WE[ends[:, 1]] - p_WE[ends[:, 0]], axis=-1)
-    lengths = np.tile(length, (starts, 1))
-    short = robot.pid.tolerance * robot.pid.range_m
-    lengths[1:, list(robot.actuated)] -= short * generator.random((starts - 1, len(robot.actuated)))
+    winched = list(robot.actuated)
     pairs = len(executor) * starts
-    return executor.standing(
-        np.repeat(p_WE[None], pairs, axis=0), np.repeat(np.arange(len(executor)), starts),
-        np.tile(lengths, (len(executor), 1)),
-    )  # fmt: skip
+    draw = np.repeat(np.arange(len(executor)), starts)
+    lengths = np.tile(np.linalg.norm(p_WE[ends[:, 1]] - p_WE[ends[:, 0]], axis=-1), (pairs, 1))
+    short = robot.pid.tolerance * robot.pid.range_m * generator.random((pairs, len(winched)))
+    lengths[1:, winched] -= (short + executor.bias.numpy()[draw][:, winched])[1:]
+    return executor.standing(np.repeat(p_WE[None], pairs, axis=0), draw, lengths)
 
 
 def arrived(

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.stages.compare.errors import run_errors
-from r2s2r_cli.stages.compare.figures import floor_of
+from r2s2r_cli.stages.compare.figures import floor_of, in_common, measures
 from r2s2r_cli.stages.compare.ranking import LEAST, ranking
 from r2s2r_cli.stages.compare.repeats import ended, floors, repeatability, turned
 from r2s2r_cli.stages.compare.walk import Walk, same_targets
 from r2s2r_cli.stages.measures.align import PlanarMove
 from r2s2r_cli.stages.segments import Intervals
+from schemas.results_compare import CompareEnd, CompareFloor, CompareRun
 
 PRISM = np.array([[-0.15, 0.0, 0.02], [0.15, 0.02, 0.1], [-0.16, 0.1, 0.02], [0.14, 0.12, 0.02], [-0.14, 0.05, 0.12],
                   [0.16, 0.04, 0.11]])  # fmt: skip
@@ -161,3 +162,29 @@ def test_ranking_is_of_order_and_not_of_size() -> None:
     assert wrong.turn is None  # none of them turns: there is no order
     few = dict(list(real.items())[: LEAST - 1])
     assert ranking(few, few, policies) is None
+
+
+def test_simulators_are_compared_over_the_same_runs() -> None:
+    """A run in which one simulator fails counts for none, or the one that gets through would pay for it; a simulator
+    that gets through no run takes nothing from the others, and what all have stays."""
+
+    none = CompareFloor.model_validate(dict.fromkeys(CompareFloor.model_fields))
+    blank = {
+        **dict.fromkeys(CompareRun.model_fields), "policy": "p", "iteration": 1, "trained_on": False, "intervals": 1,
+        "floor": none, "real_end": CompareEnd(com_m=(0.0, 0.0), turn_rad=None),
+    }  # fmt: skip
+
+    def row(run: str, model: str, end: float | None, key: float | None = 0.01) -> CompareRun:
+        own = {"run": run, "model": model, "com_end_error_m": end, "keyframe_cap_rmse_m": key}
+        return CompareRun.model_validate({**blank, **own})
+
+    rows = [
+        row("easy", "a", 0.02), row("hard", "a", None), row("easy", "b", 0.03), row("hard", "b", 0.9),
+        row("easy", "never", None), row("hard", "never", None),
+    ]  # fmt: skip
+    even, said = in_common(rows)
+    assert [one.com_end_error_m for one in even] == [0.02, None, 0.03, None, None, None]
+    assert all(one.keyframe_cap_rmse_m == 0.01 for one in even)
+    assert len(said) == 1 and "hard" in said[0] and "for all simulators: a could" in said[0]
+    b = [one for one in even if one.model == "b"]
+    assert measures(b, even[:2], none)["com_end_m"].rms == pytest.approx(0.03)

@@ -10,17 +10,21 @@ import pytest
 import torch
 
 from r2s2r_cli.engine import end_caps
+from r2s2r_cli.engine.flat import unpack_state
+from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.identify.data import RunData, Selection
-from r2s2r_cli.stages.identify.judged import Replayed, replayed, simulated_paths, starts_of, steps_from
+from r2s2r_cli.stages.identify.judged import Replayed, mean_path, replayed, simulated_paths, starts_of, steps_from
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
-from r2s2r_cli.stages.identify.start import Filter, states_at
+from r2s2r_cli.stages.identify.start import Filter, starts_at
+from r2s2r_cli.stages.identify.ways import Start
 from r2s2r_cli.stages.identify.windows import window
 from tests.stages.identify.replayed import predictor_of, start, values_at, walk
 
 RECIPE = Recipe(belief=Filter(members=8))
 TEST = (Selection("walk", (2, 3)),)
 NOISE = 1e-3
+UP = np.array([0.0, 0.0, 0.005])
 
 
 @lru_cache
@@ -36,8 +40,7 @@ def values() -> np.ndarray:
 
 def raised(run: RunData) -> RunData:
     """As a camera sees it that has the ground 5 mm too high."""
-    up = np.array([0.0, 0.0, 0.005])
-    return replace(run, observed=run.observed + up, p_WE=run.p_WE + up)
+    return replace(run, observed=run.observed + UP, p_WE=run.p_WE + UP)
 
 
 def seen(run: RunData) -> Replayed:
@@ -105,13 +108,15 @@ def test_later_commands_change_nothing_before_them() -> None:
 
 
 def test_paths_begin_with_the_caps_of_their_start() -> None:
-    """One row a frame of the interval; the first is the start state's caps over the camera's ground; key frames are the
-    last; steps that follow each other are one free run that begins like the first of them."""
-    states = states_at([noisy()], predictor(), values(), {"walk": 3}, belief=RECIPE.belief)
+    """One row a frame of the interval; the first is the mean of the caps of the start's members over the camera's
+    ground; key frames are the last; steps that follow each other are one free run that begins like the first."""
+    starts = starts_at([noisy()], predictor(), values(), {"walk": 3}, belief=RECIPE.belief)
     theta = predictor().mapping.theta(torch.as_tensor(values()))
     for step, path in zip(played().steps, played().simulated, strict=True):
         assert path.shape == step.p_WE.shape
-        caps = end_caps(theta, states["walk", step.interval])[0].numpy() + np.array([0.0, 0.0, 0.005])
+        members = starts["walk", step.interval].members
+        assert members is not None
+        caps = end_caps(theta, unpack_state(predictor().structure, members)).numpy().mean(axis=0) + UP
         np.testing.assert_allclose(path[0], caps, atol=1e-12)
         assert np.abs(caps - step.start).max() < 0.02
     assert len(played().free) == 1
@@ -119,6 +124,28 @@ def test_paths_begin_with_the_caps_of_their_start() -> None:
     np.testing.assert_allclose(played().free[0][: len(played().steps[0].t)], played().simulated[0], atol=1e-12)
     predicted = played().predicted
     np.testing.assert_array_equal(predicted.key, np.array([path[-1] for path in played().simulated]))
+
+
+def test_a_prediction_is_the_mean_over_what_is_not_known_of_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each member simulated by itself, averaged frame by frame; one that cannot be simulated is left out, and without
+    any there is no prediction."""
+    run = noisy()
+    start = starts_at([run], predictor(), values(), {"walk": 2}, belief=RECIPE.belief)["walk", 2]
+    assert start.members is not None
+    whole = mean_path(predictor(), values(), run, (2,), start)
+    own = window(run, (2,), start.state, whole=True)
+    each = [replace(own, state=unpack_state(predictor().structure, one[None])) for one in start.members]
+    paths = [simulated_paths(predictor(), values(), [one])[0] for one in each]
+    np.testing.assert_allclose(whole, np.mean(paths, axis=0), atol=1e-12)
+    assert np.std(paths, axis=0).max() > 1e-4
+
+    bad = start.members.clone()
+    bad[:3] = float("nan")
+    others = mean_path(predictor(), values(), run, (2,), Start(start.state, bad))
+    np.testing.assert_allclose(others, np.mean(paths[3:], axis=0), atol=1e-12)
+    bad[:] = float("nan")
+    with pytest.raises(NumericalError):
+        mean_path(predictor(), values(), run, (2,), Start(start.state, bad))
 
 
 def test_known_start_and_true_values_reproduce_the_run() -> None:

@@ -19,6 +19,7 @@ from r2s2r_cli.stages.identify.free.catalogue import entries
 from r2s2r_cli.stages.identify.free.mapping import Mapping
 from r2s2r_cli.stages.plan.belief import Belief, assumed
 from r2s2r_cli.stages.plan.executor import Executor
+from r2s2r_cli.stages.plan.robust import start_poses
 from tests.support.robots import subject
 
 
@@ -98,6 +99,24 @@ def test_a_sensor_that_reads_too_much_leaves_its_cable_shorter() -> None:
     a, b = subject().cable_caps[1]
     length = np.linalg.norm(p_WE[:, a] - p_WE[:, b], axis=-1)
     assert abs(length[0] - length[1] - 0.02) < 0.003
+
+
+def test_a_robot_starts_where_its_sensors_say_that_it_is_at_rest() -> None:
+    """A sensor that reads 8 mm too much: its winch stops 8 mm early, before the gait as in it; the first robot stands
+    as robot.toml says whatever its sensors read."""
+    robot = subject().robot
+    robot = robot.model_copy(update={"pid": robot.pid.model_copy(update={"tolerance": 1e-9})})
+    belief = assumed(robot)
+    bias = np.zeros((2, len(robot.cables)))
+    bias[:, robot.actuated[1]] = 8e-3
+    made = Executor(robot, belief, np.tile(belief.model.values, (2, 1)), step=1e-3, bias=bias)
+    made.simulator = subject().simulator
+    caps = made.caps(start_poses(made, robot, 1, np.random.default_rng(0)))
+    ends = np.array([robot.cables[k].caps for k in robot.actuated])
+    length = np.linalg.norm(caps[:, ends[:, 0]] - caps[:, ends[:, 1]], axis=-1)
+    short = 1e3 * (length[0] - length[1])
+    assert short[1] == pytest.approx(8.0, abs=1.0)
+    assert np.abs(np.delete(short, 1)).max() < 2.5
 
 
 def test_a_draw_that_does_not_come_to_rest_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,6 +30,11 @@ MEMBERS = 26
 """Candidates of a generation, with the `TRIED` ones a multiple of what the engine simulates side by side."""
 TRIED = 6
 """Points on the way to the minimum of a regression, tried beside the next draw."""
+NARROWEST = 1e-3
+"""Of a draw, in standard deviations of the prior. Candidates on both sides of a jump (a cap that tips over or does not)
+give slopes that are the steeper the narrower the draw, which would make the next one narrower still."""
+UNTOLD = 10.0
+"""The width that counts as the prior's where there is none."""
 GAIN = 0.5
 """[nats] A generation at the end that gains less is the last but one."""
 
@@ -137,7 +142,7 @@ def cool(
         _, weight = robust_sum(loss, Evaluation(at, None, problem.block))
         data = (slopes * weight[:, None]).T @ slopes
         pull = (slopes * weight[:, None]).T @ at + prior @ (middle - problem.prior_mean[moving])
-        step = -np.linalg.solve(data + prior, pull)
+        step = -np.linalg.solve(data + prior + tiny(data + prior), pull)
         extra = _tried(problem, best, moving, middle, step)
         foretold = costs_of(problem, extra[1:2], (at + slopes @ step)[None], loss).total[0]
         cold = temperature <= cooling.coldest
@@ -159,10 +164,20 @@ def moving_of(problem: Problem) -> np.ndarray:
     return np.flatnonzero((problem.prior_sd > HELD) & (problem.lower < problem.upper))
 
 
+def tiny(normal: np.ndarray) -> np.ndarray:
+    """What makes (n, n) regular where a draw at a bound tells nothing of an unknown that has no prior."""
+    return np.asarray((1e-12 * float(np.trace(normal)) + 1e-300) * np.eye(len(normal)))
+
+
 def covariance_at(data: np.ndarray, prior: np.ndarray, temperature: float) -> np.ndarray:
-    """Covariance (n, n) of a likelihood with curvature `data` raised to the power 1 / temperature, times the prior."""
-    scale = 1e-12 * float(np.trace(data) + np.trace(prior)) + 1e-300
-    found = np.linalg.inv(data / temperature + prior + scale * np.eye(len(data)))
+    """Covariance (n, n) of a likelihood with curvature `data` raised to the power 1 / temperature, times the prior; in
+    no direction narrower than NARROWEST of the prior."""
+    precision = np.diag(prior)
+    width = np.where(precision > 0, np.maximum(precision, 1e-300), UNTOLD**-2.0) ** -0.5
+    scaled = np.outer(width, width) * (data / temperature)
+    curvature, direction = np.linalg.eigh(0.5 * (scaled + scaled.T))
+    variance = 1.0 / (np.clip(curvature, 0.0, NARROWEST**-2.0) + 1.0)
+    found = (direction * variance) @ direction.T * np.outer(width, width)
     return np.asarray(0.5 * (found + found.T))
 
 

@@ -10,6 +10,7 @@ from r2s2r_cli.stages.identify.solve.found_twice import AGREE, Begin, cool_growi
 from r2s2r_cli.stages.identify.solve.levenberg import levenberg_marquardt
 from r2s2r_cli.stages.identify.solve.loss import LOSSES
 from r2s2r_cli.stages.identify.solve.population import (
+    NARROWEST,
     Cooling,
     Costs,
     cool,
@@ -178,3 +179,11 @@ def test_ways_are_begun_anew_until_the_best_is_found_twice() -> None:
         assert one.twice or len(one.costs) in (1, 4)
         assert one.twice == (len(one.costs) > 1 and sorted(one.costs)[1] < sorted(one.costs)[0] + AGREE)
         assert len(one.others) >= (len(one.costs) > 1)  # where none agrees, the next best says how far off it may be
+
+
+def test_a_draw_never_becomes_too_narrow() -> None:
+    """Curvature of a jump: along it the draw keeps NARROWEST of the prior's width; across it is as the data say."""
+    prior, jump = np.diag([4.0, 25.0]), np.array([3.0, 1.0])
+    found = covariance_at(1e12 * np.outer(jump, jump), prior, 1.0)
+    whitened = found * np.sqrt(np.outer(np.diag(prior), np.diag(prior)))
+    assert np.sqrt(np.linalg.eigvalsh(whitened)) == pytest.approx([NARROWEST, 1.0], rel=1e-3)

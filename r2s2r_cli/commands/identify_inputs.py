@@ -209,15 +209,16 @@ class Asked:
         from r2s2r_cli.stages.identify.effects_asked import effects_asked, effects_kept
         from r2s2r_cli.stages.identify.free.extend import name_of
         from r2s2r_cli.stages.identify.request import Request
-        from r2s2r_cli.stages.identify.selection import split
+        from r2s2r_cli.stages.identify.selection import split, upright
         from r2s2r_cli.store.read import read_artifact
 
-        train, test = split(runs, self.train, self.test, settings.train_share)
+        robot = self.project.robot()
+        usable, left_out = (runs, ()) if self.train or self.test else upright(runs, robot)
+        train, test = split(usable, self.train, self.test, settings.train_share)
         before, kept = (
             read_artifact(place.artifact("identification"), "identification")[1] if place else None
             for place in (self.last, self.kept)
         )
-        robot = self.project.robot()
         wanted = effects_asked(self.effects, robot) if kept is None else effects_kept(kept, robot)
         named = {name_of(text.removeprefix("+")) for text in self.free}
         kept_fixed = {**wanted.fixed, **parse_fixed(settings.fix, where="identify.fix")}
@@ -226,7 +227,7 @@ class Asked:
             train=train, test=test, free=self.free, fixed=fixed, effects=wanted.ids,
             of_effects=wanted.specs,
             method=self.method, drive=self.drive, seed=self.seed, online=self.online, before=before,
-            discrepancy=self.discrepancy,
+            discrepancy=self.discrepancy, left_out=left_out,
         )  # fmt: skip
 
 

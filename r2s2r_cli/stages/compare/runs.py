@@ -14,6 +14,7 @@ from r2s2r_cli.stages.compare.opening import Opening, opening_of, policy_part, w
 from r2s2r_cli.stages.compare.walk import Walk
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.load import run_data
+from r2s2r_cli.stages.measures.upright import not_at_rest
 from r2s2r_cli.stages.segments import Intervals
 from r2s2r_cli.stages.simulate.policies import Sequence as Targets, sequence, stored_policies
 from schemas.robot import Robot
@@ -25,7 +26,7 @@ class RealRun:
     complete; intervals: how many there are in all. targets: what the controller was given then, the rest at the end
     included. opening: what came before, `opening.intervals` of the recorded intervals.
     data: what a replay of the commands of the whole run needs; None where the motor commands were not logged.
-    iteration: in which it was run."""
+    iteration: in which it was run. fallen: what is wrong where the robot did not stand as at rest when the policy began."""
 
     name: str
     policy: str
@@ -35,6 +36,7 @@ class RealRun:
     targets: Targets
     data: RunData | None
     opening: Opening
+    fallen: str = ""
 
 
 def real_runs(
@@ -102,6 +104,7 @@ def _run(
         intervals=len(groups["intervals"]["first"]) - opening.intervals, walk=walk,
         targets=policy_part(_targets(estimate, recording, run, intervals, robot), opening),
         data=_data(estimate, recording, run, prefix + run), opening=opening,
+        fallen=not_at_rest(whole.p_WE, intervals, robot),
     )  # fmt: skip
 
 

@@ -61,7 +61,7 @@ def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:
         progress=lambda done: task.progress(Step("profiles", done, len(rows))),
     )  # fmt: skip
     sure = widened_by(fit, sure, profiles)
-    warnings = list(made.remarks)
+    warnings = [*request.left_out, *made.remarks]
     if better is not None:
         warnings.append(
             "a profile came upon a lower loss: the loss is rough, and the fit is no minimum there. Its intervals hold "

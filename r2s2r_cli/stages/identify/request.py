@@ -22,6 +22,7 @@ class Request:
     catalogue that are in the simulator. of_effects: what is free of them unless `free` or `fixed` names it, as after
     --free. before: the identification to continue from (online), or None. discrepancy: whether what the simulator
     leaves behind in training intervals and the robot repeats may be added to the prediction of test intervals.
+    left_out: what is to be said of runs that nobody named and that are not used.
     """
 
     train: tuple[Selection, ...]
@@ -36,6 +37,7 @@ class Request:
     online: bool = False
     before: ArtifactData | None = None
     discrepancy: bool = True
+    left_out: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

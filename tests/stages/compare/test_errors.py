@@ -186,5 +186,8 @@ def test_simulators_are_compared_over_the_same_runs() -> None:
     assert [one.com_end_error_m for one in even] == [0.02, None, 0.03, None, None, None]
     assert all(one.keyframe_cap_rmse_m == 0.01 for one in even)
     assert len(said) == 1 and "hard" in said[0] and "for all simulators: a could" in said[0]
+    lying, said = in_common(rows[::2], {"easy": "cable 1 is long"})
+    assert all(one.com_end_error_m is None and one.keyframe_cap_rmse_m is None for one in lying)
+    assert len(said) == 1 and "easy" in said[0] and "cable 1 is long" in said[0]
     b = [one for one in even if one.model == "b"]
     assert measures(b, even[:2], none)["com_end_m"].rms == pytest.approx(0.03)

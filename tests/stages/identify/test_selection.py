@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from r2s2r_cli.errors import ExitCode, InputError, UsageError
 from r2s2r_cli.stages.identify.data import Selection
-from r2s2r_cli.stages.identify.selection import complete, default_split, in_words, parse_selection, split
+from r2s2r_cli.stages.identify.selection import complete, default_split, in_words, parse_selection, split, upright
+from tests.stages.identify.replayed import threebar, walk
 from tests.stages.measures.gait import run
 
 CRAWL, TURN = run(11, name="crawl"), run(4, name="turn")
@@ -100,3 +104,25 @@ def test_numbers_in_words_are_read_back() -> None:
     assert in_words((1, 2, 3, 5, 7, 8)) == "1-3,5,7-8"
     assert parse_selection([f"crawl:{in_words((1, 2, 3, 5, 7, 8))}"], RUNS)[0].intervals == (1, 2, 3, 5, 7, 8)
     assert in_words(()) == ""
+
+
+def test_a_robot_that_fell_before_its_policy_teaches_nothing() -> None:
+    """A run that opens at rest counts where every cable is as long as at rest, to what sensors and controller leave; of
+    a heap of rods it is said what is wrong; where all lie, robot.toml's rest is wrong; where the opening is no rest,
+    nothing is asked."""
+    robot = threebar()
+    good = walk()
+    target = good.intervals.target.copy()
+    target[0] = 1.0
+    p_WE = good.p_WE.copy()
+    p_WE[:] = np.array(robot.rest_caps_m)
+    stands = replace(good, name="stands", p_WE=p_WE, intervals=replace(good.intervals, target=target))
+    flat = replace(stands, name="flat", p_WE=p_WE * [1.6, 1.0, 0.1])
+    kept, said = upright([flat, stands], robot)
+    assert [run.name for run in kept] == ["stands"]
+    assert len(said) == 1 and said[0].startswith("run flat ") and "--train flat" in said[0] and "at rest" in said[0]
+    assert upright([flat], robot) == ([flat], ())
+    moving = replace(flat, intervals=good.intervals)
+    assert upright([stands, moving], robot) == ([stands, moving], ())
+    near = replace(stands, p_WE=p_WE * 1.05)
+    assert upright([near, stands], robot) == ([near, stands], ())

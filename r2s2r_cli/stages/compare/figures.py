@@ -40,10 +40,8 @@ def in_common(
     missing: dict[str, set[str]] = {}
     for field in RUN_VALUES.values():
         has = [(row.model, row.run) for row in rows if getattr(row, field) is not None]
-        models, runs = (
-            dict.fromkeys(model for model, _ in has),
-            dict.fromkeys(run for _, run in has if run not in fallen),
-        )
+        models = dict.fromkeys(model for model, _ in has)
+        runs = dict.fromkeys(run for _, run in has if run not in fallen)
         for run in runs:
             if without := {model for model in models if (model, run) not in has}:
                 blank.setdefault(run, {})[field] = None

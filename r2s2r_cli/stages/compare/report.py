@@ -120,7 +120,7 @@ def _opening(one: Opening) -> CompareOpening | None:
 
 
 def _fallen(runs: Sequence[RealRun]) -> dict[str, str]:
-    """Runs in which the robot did not stand as at rest when its policy began, and how it showed; none where none did."""
+    """Runs in which the robot did not stand as at rest when its policy began, and how it showed; none if none did."""
     found = {run.name: run.fallen for run in runs if run.fallen}
     return {} if len(found) == len(runs) else found
 

@@ -26,7 +26,8 @@ class RealRun:
     complete; intervals: how many there are in all. targets: what the controller was given then, the rest at the end
     included. opening: what came before, `opening.intervals` of the recorded intervals.
     data: what a replay of the commands of the whole run needs; None where the motor commands were not logged.
-    iteration: in which it was run. fallen: what is wrong where the robot did not stand as at rest when the policy began."""
+    iteration: in which it was run. fallen: where the robot did not stand as at rest when the policy began, what was
+    wrong."""
 
     name: str
     policy: str

@@ -19,8 +19,8 @@ _SPANS = re.compile(r"\d+(-\d+)?(,\d+(-\d+)?)*")
 
 
 def upright(runs: Sequence[RunData], robot: Robot) -> tuple[list[RunData], tuple[str, ...]]:
-    """The runs in which the robot stood as at rest when its policy began, and what is to be said of each other one. Where
-    none did, robot.toml is wrong about its rest, and all are kept."""
+    """The runs in which the robot stood as at rest when its policy began, and what is to be said of each other one.
+    Where none did, robot.toml is wrong about its rest, and all are kept."""
     wrong = {run.name: not_at_rest(run.p_WE, run.intervals, robot) for run in runs}
     kept = [run for run in runs if not wrong[run.name]]
     if not kept:

@@ -25,7 +25,7 @@ from r2s2r_cli.stages.diagnose.which.numbers import SENSOR_LAG, Model
 from r2s2r_cli.stages.diagnose.which.remembered import Checkpoint, Remembered
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
 from r2s2r_cli.stages.diagnose.which.which import Compared, Ways, compare_effects
-from r2s2r_cli.stages.identify.start import Filter
+from r2s2r_cli.stages.identify.belief import Filter
 
 FALSE = 0.05
 """Share of false ones among the segments that are said to have a gap (Benjamini-Hochberg)."""

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Run
+from r2s2r_cli.stages.identify.belief import Filter
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.predict import Predictor, refused
-from r2s2r_cli.stages.identify.start import Filter, _Ensemble, _rest
+from r2s2r_cli.stages.identify.start import _Ensemble, _rest
 
 if TYPE_CHECKING:
     from r2s2r_cli.engine import State

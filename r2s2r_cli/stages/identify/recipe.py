@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from r2s2r_cli.stages.identify.belief import Filter
 from r2s2r_cli.stages.identify.offsets import StartSpread
-from r2s2r_cli.stages.identify.start import Filter
 from schemas.config import IdentifySettings
 from schemas.robot import Robot
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from r2s2r_cli.engine import State
-    from r2s2r_cli.stages.identify.start import Filter
+    from r2s2r_cli.stages.identify.belief import Filter
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.identify.belief import Filter
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.fit import fit
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
 from r2s2r_cli.stages.identify.rounds import Fit, more_starts
 from r2s2r_cli.stages.identify.solve.record import Checkpoint, Progress
-from r2s2r_cli.stages.identify.start import Filter
 from r2s2r_cli.stages.identify.training import training_windows
 from r2s2r_cli.stages.identify.trusted import sureness
 from tests.stages.identify.replayed import predictor_of, start, walk

@@ -12,11 +12,12 @@ import torch
 from r2s2r_cli.engine import end_caps
 from r2s2r_cli.engine.flat import unpack_state
 from r2s2r_cli.errors import NumericalError
+from r2s2r_cli.stages.identify.belief import Filter
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.judged import Replayed, mean_path, replayed, simulated_paths, starts_of, steps_from
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
-from r2s2r_cli.stages.identify.start import Filter, starts_at
+from r2s2r_cli.stages.identify.start import starts_at
 from r2s2r_cli.stages.identify.ways import Start
 from r2s2r_cli.stages.identify.windows import window
 from tests.stages.identify.replayed import predictor_of, start, values_at, walk

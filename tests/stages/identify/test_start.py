@@ -12,10 +12,11 @@ import torch
 from r2s2r_cli.engine import State, end_caps
 from r2s2r_cli.engine.flat import pack_state
 from r2s2r_cli.errors import NumericalError
+from r2s2r_cli.stages.identify.belief import Filter
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.free import Mapping, select
 from r2s2r_cli.stages.identify.predict import Predictor
-from r2s2r_cli.stages.identify.start import Filter, start_states
+from r2s2r_cli.stages.identify.start import start_states
 from r2s2r_cli.stages.segments import Intervals, Segments
 from tests.support.robots import subject
 

@@ -25,7 +25,7 @@ FLOORS, FLOOR_M = 8.0, 5e-3
 """How far apart; and the floor [m] at ends, about what repeats of a policy differ by (README.md, in the median). Five
 are asked for; policies that the loop plans, over what it does not know, care less than those of robot.toml."""
 POLICIES = ("straight", "turn-clockwise", "turn-counterclockwise", "arching")
-TRIES = 40
+TRIES = 200
 
 
 def prior_plan(project: Path) -> Path:

@@ -36,9 +36,9 @@ tell, and the fit ends far off."""
 # trusted, and take as long again.
 SHORT: Mapping[str, Mapping[str, object]] = {
     "identify": {"starts": 1, "profiles": 0, "max_iterations": 8, "free": UNKNOWN, "fix": ["damping_actuated=40"]},
-    "plan": {"draws": 4, "doubt": 0.5, "candidates": 24, "kept": 4, "beam": 100, "cycles": 3},
+    "plan": {"draws": 8, "doubt": 0.5, "candidates": 24, "kept": 4, "beam": 100, "cycles": 3},
 }
-# With four draws a policy by which one robot in ten tips over passes for safe, and repeats of it measure the tipping.
+# With few draws a policy by which one robot in ten tips over passes for safe, and repeats of it measure the tipping.
 MANY_DRAWS = {**SHORT, "plan": {**SHORT["plan"], "draws": 16}}
 
 

@@ -74,7 +74,7 @@ def compare(
     console = Console(json=json, quiet=quiet)
     here = Project.find(project)
     place = here.iteration(iteration)
-    executed = place.artifact("estimate", executed=True).exists() if of is None else of is Of.EXECUTE
+    executed = place.artifact("recording", executed=True).exists() if of is None else of is Of.EXECUTE
     asked = Asked(here, place, tuple(model or ()), "execute" if executed else "record", own)
     run = StageRun(
         stage="compare", kind="comparison", project=here, iteration=place, find_inputs=asked.refs,

@@ -91,7 +91,7 @@ def execute(
     robot, link = here.robot(), link_of(here, port, protocol)
     chosen, inputs = _chosen(here, place, policies or [])
     settings = here.config(place, overrides).record
-    runs = plans(chosen, repeats=repeats, rest=settings.rest_s)
+    runs = plans(chosen, repeats=repeats, rest=settings.rest_s, again="execute straight")
     own = place.artifact("identification")
     numbers = model if model is not None else own if own.exists() else None
     if numbers is not None:

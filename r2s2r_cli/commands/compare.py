@@ -74,7 +74,8 @@ def compare(
     console = Console(json=json, quiet=quiet)
     here = Project.find(project)
     place = here.iteration(iteration)
-    executed = place.artifact("recording", executed=True).exists() if of is None else of is Of.EXECUTE
+    kinds = ("recording", "estimate")
+    executed = any(place.artifact(kind, executed=True).exists() for kind in kinds) if of is None else of is Of.EXECUTE
     asked = Asked(here, place, tuple(model or ()), "execute" if executed else "record", own)
     run = StageRun(
         stage="compare", kind="comparison", project=here, iteration=place, find_inputs=asked.refs,

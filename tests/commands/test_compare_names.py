@@ -11,6 +11,7 @@ from r2s2r_cli.errors import InputError
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
 from schemas.header import Header, InputRef
+from schemas.versions import STAGE_VERSIONS
 
 SHA = "0" * 64
 
@@ -19,7 +20,8 @@ def header(project: Path, *estimates: str, **changed: object) -> Header:
     """That of an identification from these estimates, in the order in which `identify` read them."""
     found = read_header(project / "iterations" / "001" / "20-estimate.h5")
     refs = tuple(InputRef(path=path, kind="estimate", sha256=SHA) for path in estimates)
-    made = found.provenance.model_copy(update={"stage": "identify", "inputs": refs, "robot": {}, **changed})
+    named = {"stage": "identify", "stage_version": STAGE_VERSIONS["identify"], "inputs": refs, "robot": {}}
+    made = found.provenance.model_copy(update={**named, **changed})
     return found.model_copy(update={"provenance": made})
 
 

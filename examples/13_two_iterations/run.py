@@ -24,6 +24,8 @@ from far import far_apart  # noqa: E402 - beside this file
 from table import Row, rows_of, summary  # noqa: E402
 from world import COMMAND, r2s2r, rig  # noqa: E402
 
+from r2s2r_cli.errors import ExitCode  # noqa: E402 - what a guard that stops its robot ends with
+
 UNKNOWN = [
     "friction,~0.5", "motor_speed_in,~0.2", "motor_speed_out,~0.2", "command_delay=0.1,0..0.5,~0.1",
     *(f"{what}.{cable},~{sd}" for what, sd in (("rest_length", 0.02), ("stiffness", 0.5)) for cable in (6, 7, 8)),
@@ -60,10 +62,6 @@ class Profile:
 
 DEMO = Profile(policies=(("straight",), ("turn-clockwise",)), settings=SHORT, draw=True)
 """Minutes instead of a quarter of an hour: `make demo`."""
-
-
-STOPPED = 5
-"""Exit code of a run that the guard of the robot stopped."""
 
 
 def prepared(
@@ -154,7 +152,7 @@ def went_through(out: Path, seed: int, profile: Profile, say: Callable[[str], No
                     iterate(project, number, seed, profile, robot)
             return project
         except subprocess.CalledProcessError as error:
-            if error.returncode != STOPPED:
+            if error.returncode != ExitCode.HARDWARE:
                 raise
         world = int(json.loads((project / "drawn.json").read_text("utf-8"))["world"])
         say(f"{project.name}: the robot of world {world} was stopped by its guard; the next one")

@@ -97,9 +97,9 @@ def parameters_of(robot: Robot) -> Parameters:
     return theta
 
 
-def cap_distances(robot: Robot) -> np.ndarray:
-    """Distance of the two caps of every cable in the rest pose [m], (cable,)."""
-    p_WE = np.array(robot.rest_caps_m)
+def cap_distances(robot: Robot, p_WE: np.ndarray | None = None) -> np.ndarray:
+    """Distance of the two caps of every cable [m], (cable,). p_WE: end caps [m], (cap, 3); None: the rest pose."""
+    p_WE = np.array(robot.rest_caps_m) if p_WE is None else p_WE
     ends = np.array([cable.caps for cable in robot.cables]).reshape(-1, 2)
     return np.asarray(np.linalg.norm(p_WE[ends[:, 1]] - p_WE[ends[:, 0]], axis=-1))
 

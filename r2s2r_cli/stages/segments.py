@@ -27,6 +27,11 @@ class Intervals:
     def __len__(self) -> int:
         return len(self.first)
 
+    @property
+    def opens_at_rest(self) -> bool:
+        """Whether the first target is the rest shape, all cables long."""
+        return len(self) > 0 and bool((self.target[0] == 1).all())
+
     def to_group(self) -> Group:
         """As the group `runs/<run>/intervals`."""
         return Group(datasets=dict(vars(self)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 
 import numpy as np
 
@@ -30,9 +29,7 @@ def measures(mine: Sequence[CompareRun], first: Sequence[CompareRun], floor: Com
     return found
 
 
-def in_common(
-    rows: Sequence[CompareRun], fallen: Mapping[str, str] = MappingProxyType({})
-) -> tuple[list[CompareRun], list[str]]:
+def in_common(rows: Sequence[CompareRun], fallen: Mapping[str, str]) -> tuple[list[CompareRun], list[str]]:
     """The same rows, without the measures of a run that one simulator has and another has not: what they err by is
     compared over the same runs. A simulator that has a measure of no run takes nothing from the others. fallen: runs
     that have none for anybody, and why. And what is to be said of each run that lost a measure."""
@@ -46,8 +43,9 @@ def in_common(
             if without := {model for model in models if (model, run) not in has}:
                 blank.setdefault(run, {})[field] = None
                 missing.setdefault(run, set()).update(without)
-    why = {run: f"{', '.join(sorted(models))} could not be simulated in it" for run, models in missing.items()}
-    why |= {run: f"the robot did not stand as at rest when its policy began ({what})" for run, what in fallen.items()}
+    why = {run: f"{', '.join(sorted(models))} could not be simulated in it" for run, models in missing.items()} | dict(
+        fallen
+    )
     said = [f"run {run} is left out of the figures over several runs for all simulators: {why[run]}" for run in why]
     return [row.model_copy(update=blank.get(row.run, {})) for row in rows], said
 

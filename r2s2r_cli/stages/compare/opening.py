@@ -32,7 +32,7 @@ class Opening:
 def opening_of(walk: Walk) -> Opening:
     """Of a run as it was recorded, with one complete interval or more. Where the first frame is not known the motion is
     counted from the first one that is; NaN where there is none."""
-    if len(walk.intervals) == 0 or not (walk.intervals.target[0] == 1).all():
+    if not walk.intervals.opens_at_rest:
         return Opening()
     end = int(walk.intervals.last[0])
     known = np.flatnonzero(np.isfinite(walk.p_WE[: end + 1]).all(axis=(1, 2)))

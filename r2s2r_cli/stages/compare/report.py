@@ -15,6 +15,7 @@ from r2s2r_cli.stages.compare.ranking import LEAST, ranking
 from r2s2r_cli.stages.compare.repeats import SAME_START_M, Repeatability, ended, repeatability, turned
 from r2s2r_cli.stages.compare.runs import RealRun, policies_of
 from r2s2r_cli.stages.compare.walk import Walk
+from r2s2r_cli.stages.measures.upright import fallen
 from schemas.results_compare import (
     CompareEnd,
     CompareFloor,
@@ -54,7 +55,7 @@ def report_of(
     repeats = [_repeatability(one) for one in repeatability(walks, policies)]
     by_run = {run: one for one in repeats for run in one.runs}
     rows = [_run(one, floor[one.real.iteration], by_run.get(one.real.name)) for one in compared]
-    even, left_out = in_common(rows, _fallen(runs))
+    even, left_out = in_common(rows, fallen({run.name: run.fallen for run in runs}))
     warnings = [*_unsettled(runs), *left_out, *(text for one in compared for text in one.predicted.warnings)]
     if floor[numbers[0]].com_end_m is None:
         warnings.append(
@@ -117,12 +118,6 @@ def _opening(one: Opening) -> CompareOpening | None:
         return None
     moved, travel = (value if np.isfinite(value) else None for value in (one.moved, one.travel))
     return CompareOpening(duration_s=one.duration, moved_m=moved, travel_m=travel)
-
-
-def _fallen(runs: Sequence[RealRun]) -> dict[str, str]:
-    """Runs in which the robot did not stand as at rest when its policy began, and how it showed; none if none did."""
-    found = {run.name: run.fallen for run in runs if run.fallen}
-    return {} if len(found) == len(runs) else found
 
 
 def _unsettled(runs: Sequence[RealRun]) -> Iterator[str]:

@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.load import require_two_intervals
-from r2s2r_cli.stages.measures.upright import not_at_rest
+from r2s2r_cli.stages.measures.upright import fallen, not_at_rest
 from schemas.robot import Robot
 
 TRAIN_SHARE = 2 / 3
@@ -19,19 +19,14 @@ _SPANS = re.compile(r"\d+(-\d+)?(,\d+(-\d+)?)*")
 
 
 def upright(runs: Sequence[RunData], robot: Robot) -> tuple[list[RunData], tuple[str, ...]]:
-    """The runs in which the robot stood as at rest when its policy began, and what is to be said of each other one.
-    Where none did, robot.toml is wrong about its rest, and all are kept."""
-    wrong = {run.name: not_at_rest(run.p_WE, run.intervals, robot) for run in runs}
-    kept = [run for run in runs if not wrong[run.name]]
-    if not kept:
-        return list(runs), ()
+    """The runs in which the robot stood as at rest when its policy began, and what is to be said of each other one; all
+    of them where `fallen` says none."""
+    wrong = fallen({run.name: not_at_rest(run.p_WE, run.intervals, robot) for run in runs})
     said = [
-        f"run {name} is neither trained on nor tested: the robot did not stand as at rest when its policy began "
-        f"({words}); --train {name} takes it all the same"
+        f"run {name} is neither trained on nor tested: {words}; --train {name} takes it all the same"
         for name, words in wrong.items()
-        if words
     ]
-    return kept, tuple(said)
+    return [run for run in runs if run.name not in wrong], tuple(said)
 
 
 def complete(run: RunData) -> tuple[int, ...]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from r2s2r_cli.stages.model import cap_distances
 from r2s2r_cli.stages.plan.executor import Executor
 from r2s2r_cli.stages.plan.gaits import Gait, padded, run_gaits
 from r2s2r_cli.stages.plan.placement import Reference, wrapped
@@ -50,11 +51,10 @@ def start_poses(executor: Executor, robot: Robot, starts: int, generator: np.ran
     lengths, the others where the controller leaves them, done within its tolerance, reached from the short side, and
     that by what its sensors read. A sensor that is off moves where a robot starts as well as where it goes."""
     p_WE = np.array(robot.rest_caps_m)
-    ends = np.array([cable.caps for cable in robot.cables])
     winched = list(robot.actuated)
     pairs = len(executor) * starts
     draw = np.repeat(np.arange(len(executor)), starts)
-    lengths = np.tile(np.linalg.norm(p_WE[ends[:, 1]] - p_WE[ends[:, 0]], axis=-1), (pairs, 1))
+    lengths = np.tile(cap_distances(robot), (pairs, 1))
     short = robot.pid.tolerance * robot.pid.range_m * generator.random((pairs, len(winched)))
     lengths[1:, winched] -= (short + executor.bias.numpy()[draw][:, winched])[1:]
     return executor.standing(np.repeat(p_WE[None], pairs, axis=0), draw, lengths)

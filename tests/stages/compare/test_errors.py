@@ -182,7 +182,7 @@ def test_simulators_are_compared_over_the_same_runs() -> None:
         row("easy", "a", 0.02), row("hard", "a", None), row("easy", "b", 0.03), row("hard", "b", 0.9),
         row("easy", "never", None), row("hard", "never", None),
     ]  # fmt: skip
-    even, said = in_common(rows)
+    even, said = in_common(rows, {})
     assert [one.com_end_error_m for one in even] == [0.02, None, 0.03, None, None, None]
     assert all(one.keyframe_cap_rmse_m == 0.01 for one in even)
     assert len(said) == 1 and "hard" in said[0] and "for all simulators: a could" in said[0]

@@ -127,7 +127,7 @@ def test_paths_begin_with_the_caps_of_their_start() -> None:
     np.testing.assert_array_equal(predicted.key, np.array([path[-1] for path in played().simulated]))
 
 
-def test_a_prediction_is_the_mean_over_what_is_not_known_of_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_prediction_is_the_mean_over_what_is_not_known_of_its_start() -> None:
     """Each member simulated by itself, averaged frame by frame; one that cannot be simulated is left out, and without
     any there is no prediction."""
     run = noisy()

@@ -173,7 +173,7 @@ def covariance_at(data: np.ndarray, prior: np.ndarray, temperature: float) -> np
     """Covariance (n, n) of a likelihood with curvature `data` raised to the power 1 / temperature, times the prior; in
     no direction narrower than NARROWEST of the prior."""
     precision = np.diag(prior)
-    width = np.where(precision > 0, np.maximum(precision, 1e-300), UNTOLD**-2.0) ** -0.5
+    width = np.where(precision > 0, precision, UNTOLD**-2.0) ** -0.5
     scaled = np.outer(width, width) * (data / temperature)
     curvature, direction = np.linalg.eigh(0.5 * (scaled + scaled.T))
     variance = 1.0 / (np.clip(curvature, 0.0, NARROWEST**-2.0) + 1.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from io import StringIO
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
 NO_PROGRESS = "R2S2R_NO_PROGRESS"
 PIPED_WIDTH = 160
 """Columns of a table that goes to a file or pipe."""
+
+
+LINE_S = 30.0
+"""Between two lines of progress that go to a file or pipe."""
 
 
 class PipeClosed(Exception):
@@ -102,7 +107,7 @@ class Console:
     def progress(self, title: str, total: int) -> Iterator[Callable[[int], None]]:
         """A bar with rate and time left on stderr; yields a function that takes the number of items just done.
 
-        Silent when piped, with --quiet, or where R2S2R_NO_PROGRESS is set.
+        Without a terminal a line now and then; silent with --quiet, or where R2S2R_NO_PROGRESS is set.
         """
         with self.parts() as show:
             done = 0
@@ -119,10 +124,14 @@ class Console:
     def parts(self) -> Iterator[Callable[[str, int, int, str], None]]:
         """The same for work of several parts: yields a function of part, items done and in all, and a word beside them.
 
-        A part gets its bar when it is first named; parts that were done stay until all are.
+        A part gets its bar when it is first named; parts that were done stay until all are. Where stderr is no terminal
+        a line every LINE_S seconds says how far it is: a log of minutes without a word looks like one that hangs.
         """
-        if self.quiet or not sys.stderr.isatty() or os.environ.get(NO_PROGRESS):
+        if self.quiet or os.environ.get(NO_PROGRESS):
             yield lambda part, done, total, word: None
+            return
+        if not sys.stderr.isatty():
+            yield _Lines(self.say).show
             return
         from rich.console import Console as RichConsole
         from rich.progress import (
@@ -166,6 +175,28 @@ class Console:
                 bar.update(tasks[part], completed=done, total=total, word=word)
 
             yield show
+
+
+class _Lines:
+    """Progress as lines, for files and pipes: none of work that is done within LINE_S."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self.say = say
+        self.begun = self.last = time.monotonic()
+        self.since: dict[str, tuple[float, int]] = {}
+        """When a part was first named, and how far it was then: one that is resumed begins in its middle."""
+
+    def show(self, part: str, done: int, total: int, word: str) -> None:
+        """As the bar's: a part, items done and in all, and a word beside them."""
+        now = time.monotonic()
+        began, from_ = self.since.setdefault(part, (now, done))
+        if now - self.last < LINE_S or done >= total:
+            return
+        self.last = now
+        more = done - from_
+        left = f", about {(now - began) * (total - done) / more:.0f} s left" if more > 0 else ""
+        beside = f", {word}" if word else ""
+        self.say(f"{part}: {done} of {total} after {now - self.begun:.0f} s{left}{beside}")
 
 
 def print_error(error: R2S2RError, *, as_json: bool) -> None:

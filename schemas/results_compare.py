@@ -70,6 +70,9 @@ class CompareRun(Frozen):
     """The simulator's numbers were learned from this run: no claim of accuracy rests on it."""
     intervals: int
     """Target intervals that are compared."""
+    of_intervals: int = 0
+    """How many the real run has: fewer are compared where the robot was not seen to the end of one, or where the
+    simulated controller went on to another target."""
     com_end_error_m: float | None
     heading_end_error_rad: float | None
     keyframe_cap_rmse_m: float | None
@@ -134,6 +137,8 @@ class ComparePolicy(Frozen):
     """Empty: the real robot."""
     trained_on: bool
     runs: int
+    in_part: int = 0
+    """Of these runs, those of which the last target intervals are not compared; their ends are of before."""
     com_m: tuple[float, float] | None
     """Mean end of the centre of mass, along and across the heading at the start."""
     turn_rad: float | None

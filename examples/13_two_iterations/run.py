@@ -97,7 +97,10 @@ def compared(project: Path, models: Mapping[str, Path], *, draw: bool) -> None:
     words = [word for name, path in models.items() for word in ("--model", f"{name}={path}")]
     command = [*COMMAND, "compare", "--iteration", "2", "--of", "execute", *words, "--json"]
     command += [] if draw else ["--no-draw"]
-    done = subprocess.run(command, cwd=project, check=True, stdout=subprocess.PIPE, text=True)
+    done = subprocess.run(command, cwd=project, capture_output=True, text=True)
+    if done.returncode:
+        raise SystemExit(done.stderr)
+    # Its warnings were told by the runs that are compared.
     report: dict[str, object] = json.loads(done.stdout)["report"]
     (project / "comparison.json").write_text(json.dumps(report, indent=1), "utf-8")
 
@@ -182,7 +185,8 @@ def again(out: Path, seeds: Sequence[int], *, say: Callable[[str], None] = print
 def told(out: Path, seed: int, say: Callable[[str], None]) -> None:
     """The table over all seeds that are there."""
     found = rows_so_far(out)
-    say(f"\nafter seed {seed}: median (range) over {len({row.seed for row in found})} seeds")
+    count = len({row.seed for row in found})
+    say(f"\nafter seed {seed}: " + (f"median (range) over {count} seeds" if count > 1 else "the only one so far"))
     for line in summary(found):
         say(line)
 

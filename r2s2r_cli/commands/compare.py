@@ -73,7 +73,7 @@ def compare(
 
     console = Console(json=json, quiet=quiet)
     here = Project.find(project)
-    place = here.iteration(iteration)
+    place = here.iteration(iteration, first="r2s2r plan   # then: execute, estimate")
     kinds = ("recording", "estimate")
     executed = any(place.artifact(kind, executed=True).exists() for kind in kinds) if of is None else of is Of.EXECUTE
     asked = Asked(here, place, tuple(model or ()), "execute" if executed else "record", own)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.commands.compare_models import learned_names, require_current
-from r2s2r_cli.commands.outcome import require_input
+from r2s2r_cli.commands.outcome import require_input, require_model
 from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
@@ -93,7 +93,7 @@ class Asked:
             f"r2s2r estimate --iteration {number}" + " --of execute" * (self.of == "execute"),
         )
         for path in self.files.values():
-            require_input(path, "r2s2r identify")
+            require_model(self.project, path, "compare")
         states = [self.estimate(place) for place in self.places]
         others = [path for path in (*map(self.recording, self.places), self.floor) if path.exists()]
         return [

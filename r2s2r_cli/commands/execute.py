@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from r2s2r_cli.commands.robot_link import PortOption, ProtocolOption, link_of
+from r2s2r_cli.commands.robot_link import PortOption, ProtocolOption, RobotLink, link_of
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.options import (
@@ -78,7 +78,7 @@ def execute(
     """  # fmt: skip
     from r2s2r_cli.commands.cameras import stored_camera
     from r2s2r_cli.commands.execute_outcome import expect
-    from r2s2r_cli.commands.outcome import require_input
+    from r2s2r_cli.commands.outcome import require_model
     from r2s2r_cli.commands.record_run import Wish, carry_out, look
     from r2s2r_cli.stages.record import plans
     from r2s2r_cli.store.header import whole_header
@@ -86,16 +86,16 @@ def execute(
 
     console = Console(json=json, quiet=quiet)
     here = Project.find(project)
-    place = here.iteration(iteration)
+    place = here.iteration(iteration, first="r2s2r plan")
     overrides = parse_overrides(set_, "record")
     robot, link = here.robot(), link_of(here, port, protocol)
-    chosen, inputs = _chosen(here, place, policies or [])
+    chosen, inputs = _chosen(here, place, policies or [], console)
     settings = here.config(place, overrides).record
     runs = plans(chosen, repeats=repeats, rest=settings.rest_s, again="execute straight")
     own = place.artifact("identification")
     numbers = model if model is not None else own if own.exists() else None
     if numbers is not None:
-        require_input(numbers, "r2s2r identify")
+        require_model(here, numbers, "execute")
         inputs = [*inputs, artifact_ref(here, numbers, whole_header(numbers))]
     wish = Wish(
         project=here, iteration=place, robot=robot, runs=runs, settings=settings, port=link.port or "",
@@ -108,21 +108,36 @@ def execute(
         seed=None, draw=draw, force=force, stage="execute", inputs=inputs,
     )  # fmt: skip
     if not dry_run:  # before the simulation, which takes its time
+        _require_somebody(link, yes=yes)
         wish.recording().require_room(force=force)
-    expect(here, place, runs, numbers, console)
+    expect(here, place, runs, numbers, console, camera=camera is not None)
     if dry_run:
         look(wish, console)
         return
-    if link.port is None:
-        raise UsageError("no robot is named", where="--port", expected="a device, socket://HOST:PORT or udp://HOST:PORT",
-                         received="nothing",
-                         hint="r2s2r doctor ports   # what to name, or set as link.port in project.toml")  # fmt: skip
     if not yes:
         _ask(console)
     carry_out(wish, console)
 
 
-def _chosen(project: Project, place: Iteration, names: Sequence[str]) -> tuple[list[PolicyFile], list[InputRef]]:
+def _require_somebody(link: RobotLink, *, yes: bool) -> None:
+    """Raises UsageError where no robot is named, or nobody is there to be asked whether it may move."""
+    import sys
+
+    from r2s2r_cli.commands.typed import typed_again
+
+    if link.port is None:
+        raise UsageError("no robot is named", where="--port", expected="a device, socket://HOST:PORT or udp://HOST:PORT",
+                         received="nothing",
+                         hint="r2s2r doctor ports   # what to name, or set as link.port in project.toml")  # fmt: skip
+    if not yes and not sys.stdin.isatty():
+        raise UsageError("nobody is there to be asked whether the robot may move", where="r2s2r execute",
+                         expected="a terminal, or --yes", received="neither",
+                         hint=typed_again("execute", "--yes"))  # fmt: skip
+
+
+def _chosen(
+    project: Project, place: Iteration, names: Sequence[str], console: Console
+) -> tuple[list[PolicyFile], list[InputRef]]:
     """The policies, each for this robot, and the plan where they are of it. Raises InputError, UsageError."""
     from r2s2r_cli.commands.outcome import require_input
     from r2s2r_cli.commands.simulate_inputs import Asked, read_policies, split_name
@@ -132,11 +147,11 @@ def _chosen(project: Project, place: Iteration, names: Sequence[str]) -> tuple[l
     files = [text for text in names if is_file(text)]
     if not names or len(files) < len(names):
         require_input(plan, f"r2s2r plan --iteration {place.number}")
-        _require_fresh(project, place, plan)
+        _require_fresh(project, place, plan, console)
     for path in dict.fromkeys(split_name(text)[0] for text in files):
-        _require_fresh_file(project, path)
+        _require_fresh_file(project, path, console)
     texts = [text if text in files else f"{plan}:{text}" for text in names or _long(plan)]
-    found = [policy for text in texts for policy in read_policies(text)]
+    found = [policy for text in texts for policy in read_policies(text, "execute")]
     for policy in found:
         sequence(policy, project.robot())
     return found, Asked(project, place, tuple(texts), None, 0, (), None).refs()
@@ -154,14 +169,14 @@ def _stored(project: Project, names: Sequence[str]) -> list[str]:
     return [word for text in names for word in (stored_names(project, [text]) if is_file(text) else [text])]
 
 
-def _require_fresh_file(project: Project, path: Path) -> None:
+def _require_fresh_file(project: Project, path: Path, console: Console) -> None:
     """The same for a policy that was named with its file, where that is a plan of this project; other files are taken
     as they are. Raises as `_require_fresh`."""
     from r2s2r_cli.store.header import whole_header
 
     place = next((one for one in project.iterations() if one.artifact("plan").resolve() == path.resolve()), None)
     if place is not None and path.exists() and whole_header(path).kind == "plan":
-        _require_fresh(project, place, path)
+        _require_fresh(project, place, path, console)
 
 
 def _long(plan: Path) -> list[str]:
@@ -179,8 +194,10 @@ def _long(plan: Path) -> list[str]:
     return [name.decode() for name in best.values()]
 
 
-def _require_fresh(project: Project, place: Iteration, plan: Path) -> None:
-    """Raises InputError where the plan was made for another robot.toml, model or settings than there are now."""
+def _require_fresh(project: Project, place: Iteration, plan: Path, console: Console) -> None:
+    """Raises InputError where the plan was made for another robot.toml, model or settings than there are now; warns of
+    what it was made from where that is stale itself: its policies are still policies of this robot."""
+    from r2s2r_cli.commands.freshness import stale_inputs
     from r2s2r_cli.commands.wanted import wanted_again
     from r2s2r_cli.errors import InputError
     from r2s2r_cli.store.header import whole_header
@@ -194,18 +211,14 @@ def _require_fresh(project: Project, place: Iteration, plan: Path) -> None:
             where=project.relative(plan), expected="a fresh plan", received="; ".join(found),
             hint=f"r2s2r plan --iteration {place.number}",
         )  # fmt: skip
+    for text in stale_inputs(project, header.provenance.inputs):
+        console.warn(f"{project.relative(plan)}: {text}; `r2s2r status` says why")
 
 
 def _ask(console: Console) -> None:
-    """Raises UsageError where nobody can answer, or the answer is no."""
-    import sys
-
+    """Raises UsageError where the answer is no."""
     from r2s2r_cli.commands.typed import typed_again
 
-    if not sys.stdin.isatty():
-        raise UsageError("nobody is there to be asked whether the robot may move", where="r2s2r execute",
-                         expected="a terminal, or --yes", received="neither",
-                         hint=typed_again("execute", "--yes"))  # fmt: skip
     console.say("the robot will move now; the space bar stops it")
     if not typer.confirm("run these policies on the robot?", err=True):
         raise UsageError("nothing moved", where="r2s2r execute", expected="yes", received="no",

@@ -16,8 +16,17 @@ if TYPE_CHECKING:
     from schemas.results_simulate import SimulateReport
 
 
-def expect(project: Project, place: Iteration, runs: Sequence[RunPlan], numbers: Path | None, console: Console) -> None:
-    """What the simulator says that the policies will do, how long it takes, and whether the camera sees all of it."""
+PICTURE_MB = 0.34
+"""Of disk for a colour and a depth picture of 640 x 480 pixels (docs/guides/record.md)."""
+PICTURES_HZ = 30.0
+
+
+def expect(
+    project: Project, place: Iteration, runs: Sequence[RunPlan], numbers: Path | None, console: Console, *, camera: bool
+) -> None:
+    """What the simulator says that the policies will do, how long it takes, whether the camera sees all of it, and what
+    its pictures take on the disk. camera: whether one is recorded."""
+    from r2s2r_cli.views.page import counted
     from r2s2r_cli.views.simulation_page import report_tables
 
     policies = list({run.policy.name: run.policy for run in runs}.values())
@@ -31,21 +40,33 @@ def expect(project: Project, place: Iteration, runs: Sequence[RunPlan], numbers:
             console.warn(f"{run.run}: {text}")
     lasts = {run.run: run.duration_s for run in report.runs}
     total = sum(lasts[run.policy.name] + 2 * run.rest for run in runs)
-    console.say(f"{len(runs)} runs, about {total / 60:.1f} minutes of the robot")
-    _warn_of_view(project, place, data, console)
+    console.say(f"{counted(len(runs), 'run')}, about {total / 60:.1f} minutes of the robot")
+    if camera:
+        console.say(
+            f"its pictures: about {PICTURE_MB * PICTURES_HZ * total:.0f} MB, of 640 x 480 pixels {PICTURES_HZ:g} times "
+            "a second; fewer or smaller ones take as much less"
+        )
+    _tell_of_view(project, place, data, console, camera=camera)
 
 
-def _warn_of_view(project: Project, place: Iteration, data: ArtifactData, console: Console) -> None:
-    """Say which policies lead out of what the camera saw, the robot starting in the middle of its picture."""
+def _tell_of_view(project: Project, place: Iteration, data: ArtifactData, console: Console, *, camera: bool) -> None:
+    """Say which policies lead out of what the camera saw, the robot starting in the middle of its picture; of a camera
+    that has seen nothing yet, how far they lead."""
     from r2s2r_cli.commands.plan_inputs import last_estimate
     from r2s2r_cli.stages.plan.view import far, reach_seen
     from r2s2r_cli.store.read import read_artifact
 
     seen = last_estimate(project, place)
     reach = None if seen is None else reach_seen(read_artifact(seen, "estimate")[1], project.robot())
+    away = far(data)
     if seen is None or reach is None:
+        if camera:
+            console.say(
+                f"the robot goes up to {max(away.values(), default=0.0):.2f} m from where it starts; whether this "
+                "camera sees that is not known, since nothing was estimated from its pictures yet"
+            )
         return
-    for name, distance in far(data).items():
+    for name, distance in away.items():
         if distance > reach:
             console.warn(
                 f"{name}: goes {distance:.2f} m from its start, and the camera of {project.relative(seen)} sees "

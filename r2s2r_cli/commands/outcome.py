@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError
 from r2s2r_cli.store.brief import brief
+from r2s2r_cli.store.project import Project
 from schemas.results import StageResult
 
 
@@ -42,6 +44,20 @@ def require_input(path: Path, command: str) -> None:
             received="nothing",
             hint=command,
         )
+
+
+def require_model(project: Project, path: Path, command: str) -> None:
+    """Raises ArtifactError where an identification that was named with --model is not there. command: of the option."""
+    from r2s2r_cli.commands.typed import typed_instead
+
+    if path.is_file():
+        return
+    places = [place.artifact("identification") for place in project.iterations()]
+    there = [os.path.relpath(one) for one in places if one.exists()]
+    raise ArtifactError(
+        "there is no such identification", where="--model", expected=" | ".join(there) or "a 30-identify.h5",
+        received=str(path), hint=typed_instead(command, str(path), there[-1]) if there else "r2s2r identify",
+    )  # fmt: skip
 
 
 def print_config(stage: str, settings: Mapping[str, Any], console: Console) -> None:

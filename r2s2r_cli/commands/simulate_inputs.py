@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from r2s2r_cli.commands.outcome import require_input
+from r2s2r_cli.commands.outcome import require_input, require_model
 from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
@@ -65,7 +65,7 @@ class Asked:
                                  hint="r2s2r simulate --random 15") from error  # fmt: skip
             refs[ref.path] = ref
         if self.model is not None:
-            require_input(self.model, "r2s2r identify")
+            require_model(self.project, self.model, "simulate")
             ref = artifact_ref(self.project, self.model, whole_header(self.model))
             refs[ref.path] = ref
         if self._recorded is not None:
@@ -156,8 +156,12 @@ def stored_names(project: Project, texts: Sequence[str]) -> list[str]:
     return [project.relative(path) + (f":{name}" if name else "") for path, name in map(split_name, texts)]
 
 
-def read_policies(text: str) -> Iterator[PolicyFile]:
-    """The policies of a TOML file (one) or an artifact (all, or the one named). Raises InputError, UsageError."""
+def read_policies(text: str, command: str = "simulate") -> Iterator[PolicyFile]:
+    """The policies of a TOML file (one) or an artifact (all, or the one named). command: that was typed, for hints.
+    Raises InputError, UsageError."""
+    from difflib import get_close_matches
+
+    from r2s2r_cli.commands.typed import typed_instead
     from r2s2r_cli.stages.simulate.policies import stored_policies
     from r2s2r_cli.store.read import read_artifact
     from r2s2r_cli.store.toml import load_model
@@ -169,9 +173,10 @@ def read_policies(text: str) -> Iterator[PolicyFile]:
         return
     found = stored_policies(read_artifact(path)[1])
     if not found or (name and name not in found):
+        near = get_close_matches(name, found, 1, 0.5) if name else []
         raise UsageError(
             "there is no such policy" if name else "the artifact holds no policy", where=str(path),
             expected=" | ".join(found) or "a policy, or runs with targets", received=name or "none",
-            hint=f"r2s2r inspect '{path}'",
+            hint=typed_instead(command, name, near[0]) if near else f"r2s2r inspect '{path}'",
         )  # fmt: skip
     yield from [found[name]] if name else found.values()

@@ -89,8 +89,11 @@ class Project:
         )
         return [Iteration(int(p.name), p) for p in sorted(found, key=lambda p: int(p.name))]
 
-    def iteration(self, number: int | None, *, create: bool = False) -> Iteration:
-        """Iteration `number`, default the latest (with `create`: the first, where there is none).
+    def iteration(
+        self, number: int | None, *, create: bool = False, first: str = "r2s2r import run.csv"
+    ) -> Iteration:  # fmt: skip
+        """Iteration `number`, default the latest (with `create`: the first, where there is none). first:
+        the command that a project without iterations is hinted.
 
         Raises ArtifactError where there is none yet, UsageError where this one does not exist and is not to be created.
         """
@@ -100,7 +103,7 @@ class Project:
                 return existing[-1]
             if not create:
                 raise ArtifactError("there is no iteration yet", where=str(self.root / ITERATIONS),
-                                    expected="at least one", received="none", hint="r2s2r import run.csv")  # fmt: skip
+                                    expected="at least one", received="none", hint=first)  # fmt: skip
             number = 1
         if not 1 <= number <= MAX_ITERATION:
             raise UsageError("there is no such iteration number", where="--iteration",

@@ -33,6 +33,8 @@ def draw_comparison(data: ArtifactData) -> Iterator[tuple[str, bytes]]:
         axes = figure.subplot_mosaic(
             [["top", "end"], ["top", "gait"], ["top", "key"], ["top", "time"]], width_ratios=[1.2, 1]
         )
+        for name in ("end", "gait", "key"):
+            axes[name].sharex(axes["time"])
         floor = data.groups["floor"].attributes
         _top(axes["top"], real, simulated, names)
         _bars(axes["end"], 1e3 * simulated["segment_end"], names, "caps at the end\nof each interval [mm]", None)
@@ -90,8 +92,11 @@ def _bars(axes: Axes, values: np.ndarray, names: list[str], label: str, floor: S
 
 
 def _times(axes: Axes, real: Group, simulated: Group, names: list[str]) -> None:
+    from matplotlib.ticker import MaxNLocator
+
     x = np.arange(1, len(real["duration"]) + 1)
     axes.plot(x, real["duration"], "_", color=REAL, ms=14, mew=3)
     for k, _ in enumerate(names):
         axes.plot(x, simulated["duration"][k], "o", color=model_color(k), ms=4)
-    axes.set(xlabel="target interval", ylabel="duration [s]", ylim=(0, None))
+    axes.set(xlabel="target interval", ylabel="duration [s]", ylim=(0, None), xlim=(0.4, len(x) + 0.6))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))

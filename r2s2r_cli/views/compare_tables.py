@@ -17,6 +17,8 @@ MEASURES = {
 }  # fmt: skip
 """Measures with their words and what SI is multiplied by."""
 TRAINED = "†"
+IN_PART = "‡"
+"""Behind a policy of which a run is compared in part."""
 
 
 def comparison_tables(report: CompareReport) -> Iterator[PageTable]:
@@ -46,7 +48,7 @@ def verdict(report: CompareReport) -> str:
     if "com_end_m" not in a or "com_end_m" not in b:
         return f"{counted(len({run.run for run in report.runs}), 'run')}: not every simulator could be run."
     one, two = a["com_end_m"], b["com_end_m"]
-    runs = counted(two.runs, "run") + f" of iteration {report.iteration}"
+    runs = counted(two.runs, "run") + f" of iteration {report.iteration}" + _in_part(report)
     floor = "" if two.floor is None else f"; a perfect simulator would be found {1e3 * two.floor:.0f} mm away"
     if first.model == last.model:
         return f"{runs}: the simulated centre of mass ends {1e3 * one.rms:.0f} mm from the real one{floor}."
@@ -60,6 +62,15 @@ def verdict(report: CompareReport) -> str:
         before = report.models[-2]
         words.append(_beside(before.model, last.model, before.heldout if held else before.runs, b))
     return " ".join(word for word in words if word)
+
+
+def _in_part(report: CompareReport) -> str:
+    """How much of the last simulator's runs is compared, in brackets; nothing where it is all."""
+    name = report.models[-1].model
+    mine = [run for run in report.runs if run.model == name and run.iteration == report.iteration]
+    done, of = sum(run.intervals for run in mine), sum(run.of_intervals for run in mine)
+    cut = sum(run.intervals < run.of_intervals for run in mine)
+    return f" ({done} of {of} target intervals: {counted(cut, 'run')} in part)" if cut else ""
 
 
 def _beside(before: str, last: str, side: Mapping[str, CompareMeasure], now: Mapping[str, CompareMeasure]) -> str:
@@ -103,7 +114,7 @@ def _against(first: str, last: str, side: Mapping[str, CompareMeasure]) -> str:
 def table_one(repeats: Sequence[CompareRepeatability]) -> PageTable:
     """How the robot repeats itself, in the paper's layout: a column a policy, mean ± sd."""
     return PageTable(
-        "Table I: how the robot repeats itself, mean ± sd of one run",
+        "Table I: how the robot repeats itself, mean ± sd of one run, each up to where it was seen",
         ["metric", *(one.policy for one in repeats)],
         [
             ["end CoM position (m)", *(_spread(one) for one in repeats)],
@@ -121,7 +132,8 @@ def table_two(report: CompareReport, iteration: int) -> PageTable:
     policies = list(dict.fromkeys(one.policy for one in mine))
     by = {(one.policy, one.model): one for one in mine}
     over = {one.model: one for one in report.history if one.iteration == iteration}
-    short = [policy.removeprefix(f"{iteration:03d}-") for policy in policies]
+    cut = {one.policy for one in mine if one.in_part}
+    short = [policy.removeprefix(f"{iteration:03d}-") + f" {IN_PART}" * (policy in cut) for policy in policies]
     rows = []
     for model in ("", *over):
         cells = [by[policy, model] for policy in policies]
@@ -143,7 +155,8 @@ def table_two(report: CompareReport, iteration: int) -> PageTable:
     rows.append(["floor", *blank, _floor(known[0], 3), *blank, _floor(known[1], 2)])
     return PageTable(
         f"Table II, runs of iteration {iteration}: ends from the start, along and across the heading there; errors are"
-        f" root mean squares over repeats, of all runs with a 95 % interval; {TRAINED} the simulator learned from them",
+        f" root mean squares over repeats, of all runs with a 95 % interval; {TRAINED} the simulator learned from them"
+        + f"; {IN_PART} some runs in part, up to where all is known: their real ends are of there" * bool(cut),
         ["metric", *(f"CoM [m], {name}" for name in short), "all runs [m]",
          *(f"turn [rad], {name}" for name in short), "all runs [rad]"],
         rows,
@@ -201,11 +214,16 @@ def _runs(report: CompareReport) -> PageTable:
 def _row(run: CompareRun) -> list[str]:
     lasts = "-" if run.duration_s is None else f"{run.duration_s.real:.1f} / {run.duration_s.sim:.1f}"
     return [
-        run.run, run.model, "yes" if run.trained_on else "no", str(run.intervals), _scaled(run.com_end_error_m, 1e3),
+        run.run, run.model, "yes" if run.trained_on else "no", _share(run), _scaled(run.com_end_error_m, 1e3),
         _scaled(run.heading_end_error_rad, math.degrees(1)), _scaled(run.keyframe_cap_rmse_m, 1e3),
         _scaled(run.cap_rmse_m, 1e3), _scaled(run.path_error_m, 1e3), lasts,
         "-" if run.opening is None else _scaled(run.opening.moved_m, 1e3),
     ]  # fmt: skip
+
+
+def _share(run: CompareRun) -> str:
+    """Target intervals that are compared; of how many, where those are more."""
+    return f"{run.intervals} of {run.of_intervals}" if run.intervals < run.of_intervals else str(run.intervals)
 
 
 def _spread(one: CompareRepeatability) -> str:

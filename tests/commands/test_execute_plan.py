@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
-from r2s2r_cli.commands.execute import _long
+from r2s2r_cli.commands.execute import _long, _require_fresh
 from r2s2r_cli.commands.typed import typed_again
+from r2s2r_cli.console import Console
 from r2s2r_cli.stages.plan.view import far
-from r2s2r_cli.store.project import journal_of
+from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.project import Project, journal_of
 from r2s2r_cli.store.write import write_artifact
 from schemas.header import InputRef
 from tests.commands.conftest import invoke
@@ -77,6 +79,62 @@ def test_a_policy_of_another_robot_is_refused(project: Path, robot: str, target:
     refused = invoke("execute", "gait.toml", "--iteration", "1", "--dry-run")
     assert refused.exit_code == 4 and "policy gait is for another robot" in refused.stderr
     assert not list(project.rglob("50-*"))
+
+
+def test_a_robot_that_nobody_named_is_asked_for_before_anything_is_simulated(project: Path) -> None:
+    """A simulation takes its time; without a port nothing can follow it."""
+    (project / "iterations" / "001").mkdir(parents=True)
+    (project / "gait.toml").write_text(GAIT.format(robot="threebar", target=[0.5] * 6))
+    refused = invoke("execute", "gait.toml", "--yes")
+    assert refused.exit_code == 2 and "no robot is named" in refused.stderr
+    assert "what the simulator expects" not in refused.stderr
+
+
+def test_a_plan_of_a_stale_identification_is_executed_with_a_warning(
+    estimated: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its policies are still policies of this robot; that the numbers behind them are old is said."""
+    place = estimated / "iterations" / "001"
+    made = place / "30-identify.h5"
+    write_artifact(made, builders.identification(), builders.provenance(stage="identify", stage_version=1, inputs=()))
+    monkeypatch.setattr("r2s2r_cli.store.staleness.reasons", lambda *_: [])  # of the plan itself
+    ref = InputRef(path="iterations/001/30-identify.h5", kind="identification", sha256=read_header(made).content_sha256)
+    write_artifact(place / "40-plan.h5", builders.plan(), builders.provenance(stage="plan", inputs=(ref,)))
+    console = Console()
+    said: list[str] = []
+    monkeypatch.setattr(console, "warn", said.append)
+    _require_fresh(Project.find(estimated), Project.find(estimated).iteration(1), place / "40-plan.h5", console)
+    assert said == ["iterations/001/40-plan.h5: its input iterations/001/30-identify.h5 is stale itself; "
+                    "`r2s2r status` says why"]  # fmt: skip
+
+
+@pytest.mark.parametrize("command", ["execute", "compare", "simulate"])
+def test_an_identification_that_is_not_there_is_named(
+    estimated: Path, command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As what was typed, and with one that is there in its place."""
+    place = estimated / "iterations" / "001"
+    (estimated / "gait.toml").write_text(GAIT.format(robot="threebar", target=[0.5] * 6))
+    write_artifact(place / "30-identify.h5", builders.identification(), builders.provenance(stage="identify"))
+    words = [command, *(["gait.toml"] if command != "compare" else ["--of", "record"]), "--model", "no.h5"]
+    words += ["--dry-run"] if command != "simulate" else []
+    monkeypatch.setattr("sys.argv", ["r2s2r", *words])
+    refused = invoke(*words)
+    assert refused.exit_code == 4, refused.stderr
+    assert "there is no such identification\n  where: --model" in refused.stderr
+    hint = ["iterations/001/30-identify.h5" if word == "no.h5" else word for word in words]
+    assert refused.stderr.rstrip().endswith("hint: r2s2r " + " ".join(hint))
+
+
+def test_a_misspelt_policy_is_answered_with_the_next_one(estimated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command line as typed, with the name that is there."""
+    plan = estimated / "iterations" / "001" / "40-plan.h5"
+    write_artifact(plan, builders.plan(), builders.provenance(stage="plan"))
+    text = "iterations/001/40-plan.h5:straigth"
+    monkeypatch.setattr("sys.argv", ["r2s2r", "simulate", text])
+    refused = invoke("simulate", text)
+    assert refused.exit_code == 2 and "there is no such policy" in refused.stderr
+    assert refused.stderr.endswith("hint: r2s2r simulate iterations/001/40-plan.h5:straight\n")
 
 
 def test_nobody_to_ask_is_told_the_command_as_typed(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:

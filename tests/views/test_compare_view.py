@@ -17,15 +17,17 @@ from r2s2r_cli.views.compare_history import draw_history, history_table
 from r2s2r_cli.views.compare_page import comparison_page
 from r2s2r_cli.views.compare_playback import playback_data
 from r2s2r_cli.views.compare_strip import COLUMNS, draw_strips, picked
-from r2s2r_cli.views.compare_tables import TRAINED, comparison_tables, table_one, table_two, verdict
+from r2s2r_cli.views.compare_tables import IN_PART, TRAINED, comparison_tables, table_one, table_two, verdict
 from schemas.results_compare import (
     CompareFloor,
     CompareHistory,
     CompareMeasure,
     CompareModel,
+    CompareEnd,
     ComparePolicy,
     CompareRepeatability,
     CompareReport,
+    CompareRun,
 )
 from tests.support import builders
 
@@ -128,6 +130,27 @@ def test_the_tables_of_the_paper() -> None:
     assert two.rows[4][1] == f"0.160 {TRAINED}"
     assert two.rows[5][3] == "0.004"
     assert all(len(row) == len(two.columns) for row in two.rows)
+
+
+def test_runs_that_are_compared_in_part_are_marked() -> None:
+    """In the sentence, in the paper's table and in that of every run; nothing is said where all is compared."""
+    whole = report()
+    policies = [one.model_copy(update={"in_part": int(one.policy == "001-turn")}) for one in whole.policies]
+    values = dict.fromkeys(CompareRun.model_fields)
+    cut, seen = (
+        CompareRun.model_validate({
+            **values, "run": f"arching-{number}", "policy": "arching", "iteration": 2, "model": "refined",
+            "trained_on": False, "intervals": intervals, "of_intervals": 13, "floor": FLOOR,
+            "real_end": CompareEnd(com_m=(0.0, 0.0), turn_rad=None),
+        }) for number, intervals in ((1, 6), (2, 13))
+    )  # fmt: skip
+    part = whole.model_copy(update={"policies": tuple(policies), "runs": (cut, seen)})
+    assert "4 runs of iteration 2 (19 of 26 target intervals: 1 run in part), from which" in verdict(part)
+    two = table_two(part, 1)
+    assert list(two.columns)[1:3] == ["CoM [m], straight", f"CoM [m], turn {IN_PART}"] and IN_PART in two.title
+    *_, every = comparison_tables(part)
+    assert [row[3] for row in every.rows] == ["6 of 13", "13"]
+    assert "in part" not in verdict(whole) and IN_PART not in table_two(whole, 1).title
 
 
 def test_runs_of_earlier_iterations_have_a_table_of_their_own() -> None:

@@ -95,6 +95,7 @@ def _run(one: Compared, floor: CompareFloor, repeats: CompareRepeatability | Non
     return CompareRun(
         run=one.real.name, policy=one.real.policy, iteration=one.real.iteration, model=one.model.name,
         trained_on=one.trained_on, intervals=0 if seen.real is None else len(seen.real.intervals),
+        of_intervals=one.real.intervals,
         com_end_error_m=None if errors is None else errors.com_end,
         heading_end_error_rad=None if errors is None else errors.heading_end,
         keyframe_cap_rmse_m=None if seen.keyframes is None else seen.keyframes.rmse_m,
@@ -178,6 +179,7 @@ def _policy(model: str, rows: Sequence[CompareRun], ends: Sequence[CompareEnd]) 
     along, across = np.mean([end.com_m for end in ends], axis=0) if ends else (np.nan, np.nan)
     return ComparePolicy(
         policy=rows[0].policy, iteration=rows[0].iteration, model=model, runs=len(rows),
+        in_part=sum(row.intervals < row.of_intervals for row in rows),
         trained_on=bool(model) and any(row.trained_on for row in rows),
         com_m=(float(along), float(across)) if ends else None,
         turn_rad=float(np.mean(turns)) if turns else None,

@@ -92,7 +92,7 @@ def _run(
         raise InputError(
             f"run {run} has no gait to compare", where=f"runs/{run}/intervals",
             expected=f"at least two complete target intervals{after}", received=f"{count}",
-            hint="r2s2r record gait.toml --port /dev/ttyUSB0",
+            hint="r2s2r record --random 15 --port /dev/ttyUSB0",
         )  # fmt: skip
     walk = without_opening(whole, opening)
     if not (known := np.isfinite(walk.p_WE[0]).all(axis=-1)).all():

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.identify.alike import as_the_others
 from r2s2r_cli.stages.identify.conclude import Fitted, concluded, known_before, start_found
 from r2s2r_cli.stages.identify.fit import fit
@@ -43,11 +44,19 @@ def find_default(task: Task) -> Found:
 def holding(task: Task, predictor: Predictor) -> tuple[Task, Identifiability]:
     """The task with those parameters held at their starts that its training intervals do not show, and what they show.
 
-    Raises as `known_before`.
+    Raises as `known_before`, and InputError where they show none at all.
     """
     before = known_before(task, predictor)
     both = zip(before.names, before.trust, strict=True)
-    return replace(task, held=tuple(name for name, trust in both if trust is Trust.NOT_IDENTIFIABLE)), before
+    held = tuple(name for name, trust in both if trust is Trust.NOT_IDENTIFIABLE)
+    if held and len(held) == len(before.names):
+        shown = ", ".join(held[:3]) + (f" and {len(held) - 3} more" if len(held) > 3 else "")
+        raise InputError(
+            "the training intervals show no parameter that is free: there is nothing to fit", where="--train",
+            expected="intervals in which the robot moves as a free parameter says",
+            received=f"none that shows {shown}", hint="r2s2r inspect 20-estimate.h5   # targets of each interval",
+        )  # fmt: skip
+    return replace(task, held=held), before
 
 
 def loss_words(task: Task) -> str:

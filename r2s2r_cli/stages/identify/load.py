@@ -92,7 +92,7 @@ def require_two_intervals(runs: Sequence[RunData]) -> None:
     raise InputError(
         what, where="intervals/target", received=received,
         expected="at least two complete target intervals, one to train on and one to test",
-        hint="r2s2r import run.csv   # a log of a gait with several targets",
+        hint="r2s2r record --random 15 --port /dev/ttyUSB0   # or: import a log with several targets",
     )  # fmt: skip
 
 

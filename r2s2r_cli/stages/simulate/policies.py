@@ -34,7 +34,7 @@ def sequence(policy: PolicyFile, robot: Robot) -> Sequence:
             where=f"policy {policy.name}",
             expected=f"robot {robot.name}, {motors} targets a step",
             received=f"robot {policy.robot}, {width} targets a step",
-            hint="r2s2r validate lists what is wrong with every policy of the project",
+            hint=f"r2s2r plan   # makes policies of {robot.name}",
         )
     default = robot.pid.step_timeout_s
     once = [(s.target, s.hold_s, default if s.timeout_s is None else s.timeout_s) for s in policy.steps]

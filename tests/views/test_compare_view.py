@@ -19,11 +19,11 @@ from r2s2r_cli.views.compare_playback import playback_data
 from r2s2r_cli.views.compare_strip import COLUMNS, draw_strips, picked
 from r2s2r_cli.views.compare_tables import IN_PART, TRAINED, comparison_tables, table_one, table_two, verdict
 from schemas.results_compare import (
+    CompareEnd,
     CompareFloor,
     CompareHistory,
     CompareMeasure,
     CompareModel,
-    CompareEnd,
     ComparePolicy,
     CompareRepeatability,
     CompareReport,

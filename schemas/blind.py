@@ -49,6 +49,8 @@ class PublishedRank(Frozen):
     """Since version 13 of `diagnose`."""
     parity_nats: float = 0.0
     fitted: bool = True
+    seen_sd: float | None = None
+    """Since version 14 of `diagnose`."""
     probability: float
     size: dict[str, float] = Field(default_factory=dict)
     channel: str | None = None

@@ -36,6 +36,9 @@ class RankedName(Frozen):
     """What the parity stage says for it, without a simulator [nats]."""
     fitted: bool = True
     """False: the screening left it out, and it counts as gaining nothing."""
+    seen_sd: float | None = None
+    """How far these gaits would show it, at the largest size that is tried, nuisances taken off: whitened length [sd];
+    None: no replay shows it, or before version 14."""
     probability: float
     size: dict[str, float] = Field(default_factory=dict)
     """Of its numbers, by name, in `units`."""

@@ -134,8 +134,9 @@ def _diagnosis(document: Mapping[str, Any]) -> dict[str, Any]:
 def _rank(row: Mapping[str, Any]) -> dict[str, Any]:
     found = _part(row, PublishedRank) | _element(row)
     found["size"] = {name: _short(value) for name, value in row.get("size", {}).items()}
-    if "elpd_gain_sd" in found:
-        found["elpd_gain_sd"] = _short(found["elpd_gain_sd"])
+    for key in ("elpd_gain_sd", "seen_sd"):
+        if key in found:
+            found[key] = _short(found[key])
     return {name: value for name, value in found.items() if (name, value) not in _USUAL}
 
 

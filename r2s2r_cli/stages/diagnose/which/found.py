@@ -23,7 +23,9 @@ class Ranked:
     `units`. moved: the fit left its start; on_bound: names of numbers that ended on a bound. rmse: of the caps at the
     ends of stretches left out [m]. misfit: squares over what noise and floor explain, median over stretches.
     gain_sd: of the gain, from how much what was left out differs in it [nats]. parity: what the parity stage says for
-    it [nats]. fitted: False, the screening left it out, and it counts as gaining nothing.
+    it [nats]. fitted: False, the screening left it out, and it counts as gaining nothing. seen: whitened length [sd] of
+    what its best seen element changes at the largest size that was tried, nuisances taken off; nan where no replay shows
+    it.
     """
 
     effect: str
@@ -42,6 +44,7 @@ class Ranked:
     marginal: float = 0.0
     parity: float = 0.0
     fitted: bool = True
+    seen: float = float("nan")
     others: tuple[tuple[Element, float], ...] = ()
     """Other elements of the effect that were fitted, with their gains."""
 

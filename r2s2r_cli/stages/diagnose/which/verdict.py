@@ -64,6 +64,8 @@ def concluded(m: Material) -> Which:
         Ranked(NONE, 0.0, probability[NONE], rmse=m.no_gap.rmse, misfit=_misfit(m.refit)),
         Ranked(UNKNOWN, m.unexplained, probability[UNKNOWN]),
     ]
+    shown = _shown(m.responses)
+    ranking = [replace(one, seen=shown.get(one.effect, np.nan)) for one in ranking]
     ranking.sort(key=lambda one: (-one.probability, -one.gain))
     verdict, effects, p = verdict_of(ranking, calibration, pair, m.chance, m.no_gap)
     top = best.get(effects[0]) if effects else None
@@ -181,6 +183,15 @@ def _element(fit: Fit) -> Element | None:
 
 def _misfit(score: Score) -> float:
     return float(np.median(score.misfit))
+
+
+def _shown(responses: tuple[Response, ...]) -> dict[str, float]:
+    """How far every effect would be seen in these gaits, by the element that is seen best [sd]."""
+    found: dict[str, float] = {}
+    for one in responses:
+        name, sd = one.candidate.effect, one.seen * float(np.sqrt(max(1.0 - one.absorbed, 0.0)))
+        found[name] = max(found.get(name, 0.0), sd)
+    return found
 
 
 def _not_testable(responses: tuple[Response, ...]) -> tuple[str, ...]:

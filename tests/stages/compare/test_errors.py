@@ -170,8 +170,8 @@ def test_simulators_are_compared_over_the_same_runs() -> None:
 
     none = CompareFloor.model_validate(dict.fromkeys(CompareFloor.model_fields))
     blank = {
-        **dict.fromkeys(CompareRun.model_fields), "policy": "p", "iteration": 1, "trained_on": False, "of_intervals": 1, "intervals": 1,
-        "floor": none, "real_end": CompareEnd(com_m=(0.0, 0.0), turn_rad=None),
+        **dict.fromkeys(CompareRun.model_fields), "policy": "p", "iteration": 1, "trained_on": False,
+        "intervals": 1, "of_intervals": 1, "floor": none, "real_end": CompareEnd(com_m=(0.0, 0.0), turn_rad=None),
     }  # fmt: skip
 
     def row(run: str, model: str, end: float | None, key: float | None = 0.01) -> CompareRun:

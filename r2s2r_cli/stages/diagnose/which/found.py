@@ -24,8 +24,7 @@ class Ranked:
     ends of stretches left out [m]. misfit: squares over what noise and floor explain, median over stretches.
     gain_sd: of the gain, from how much what was left out differs in it [nats]. parity: what the parity stage says for
     it [nats]. fitted: False, the screening left it out, and it counts as gaining nothing. seen: whitened length [sd] of
-    what its best seen element changes at the largest size that was tried, nuisances taken off; nan where no replay shows
-    it.
+    what its best seen element changes at the largest size that was tried, nuisances taken off; nan: no replay shows it.
     """
 
     effect: str

@@ -3,6 +3,8 @@ repeats in these runs."""
 
 from __future__ import annotations
 
+from pydantic import Field
+
 from schemas.base import Frozen
 
 
@@ -122,7 +124,8 @@ class CompareModel(Frozen):
     """By measure: com_end_m, heading_end_rad, keyframe_cap_m, cap_m, path_m, gait_m, segment_s."""
     heldout: dict[str, CompareMeasure]
     srcc_com: float | None
-    """Spearman's rank correlation with the robot over gaits: of how far the centre of mass came."""
+    """Spearman's rank correlation with the robot over the gaits of all iterations that are compared: of how far the
+    centre of mass came. None: too few gaits."""
     srcc_turn: float | None
     """The same of how far the robot turned."""
     gaits: int
@@ -169,4 +172,6 @@ class CompareReport(Frozen):
     """The same runs under better and better simulators: by iteration of the runs, then in the order of the simulators."""
     repeatability: tuple[CompareRepeatability, ...]
     floor: CompareFloor
+    srcc: dict[str, float | None] = Field(default_factory=dict)
+    """`srcc_com` by simulator (design.md); None: too few gaits."""
     warnings: tuple[str, ...] = ()

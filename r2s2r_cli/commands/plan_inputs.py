@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -43,10 +47,20 @@ class Asked:
     def refs(self) -> list[InputRef]:
         """The inputs. Raises ArtifactError where one cannot be read."""
         from r2s2r_cli.store.header import whole_header
-        from r2s2r_cli.store.staleness import artifact_ref
+        from r2s2r_cli.store.staleness import artifact_ref, source_ref
 
         used = [path for path in (self.identified, self.seen) if path is not None]
-        return [artifact_ref(self.project, path, whole_header(path)) for path in used]
+        found = [artifact_ref(self.project, path, whole_header(path)) for path in used]
+        return found + [source_ref(self.project, path) for path in self.written]
+
+    @cached_property
+    def written(self) -> list[Path]:
+        """Files of the project in which rewards of its own are written. Raises UsageError as `reward_named`."""
+        from r2s2r_cli.stages.plan.rewards import source_of
+
+        with _importable(self.project.root):
+            files = dict.fromkeys(path for name in self.behaviours if (path := source_of(name)) is not None)
+        return [path for path in files if path.resolve().is_relative_to(self.project.root.resolve())]
 
     @cached_property
     def seen(self) -> Path | None:
@@ -77,7 +91,8 @@ class Asked:
         from r2s2r_cli.stages.plan.stage import Request
 
         names = dict.fromkeys(self.behaviours or BEHAVIOURS)
-        rewards = {name: reward_named(name) for name in names}
+        with _importable(self.project.root):
+            rewards = {name: reward_named(name) for name in names}
         goals = {_goal_name(k, len(self.to)): self._goal(text, settings) for k, text in enumerate(self.to)}
         return Request(self.belief(), rewards, goals, self.seed, self.reach())
 
@@ -103,6 +118,17 @@ class Asked:
             raise UsageError("this is no place to go to", where="--to", expected="X,Y,HEADING: metres and degrees",
                              received=text, hint="r2s2r plan --to 0.5,1,90") from error  # fmt: skip
         return Goal((x, y), math.radians(heading), settings.goal_within_m, math.radians(settings.goal_within_deg))
+
+
+@contextmanager
+def _importable(root: Path) -> Iterator[None]:
+    """Modules beside project.toml can be imported, whatever else may be."""
+    sys.path.insert(0, str(root))
+    importlib.invalidate_caches()
+    try:
+        yield
+    finally:
+        sys.path.remove(str(root))
 
 
 def last_estimate(project: Project, iteration: Iteration) -> Path | None:

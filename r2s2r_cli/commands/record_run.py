@@ -160,10 +160,10 @@ def _streams(wish: Wish, link: LinkFacts, camera: CameraFacts | None) -> list[An
 
 
 def _groups(wish: Wish, link: LinkFacts) -> dict[str, Mapping[str, Any]]:
-    from r2s2r_cli.stages.record import run_attributes
+    from r2s2r_cli.stages.record import place_of, run_attributes
 
     rig = wish.simulated or link.lock_step or _RIG in link.device.lower() or (wish.camera or "").startswith("rig:")
-    source = f"{wish.robot.name} at {link.port}, protocol {link.protocol}"
+    source = f"{wish.robot.name} at {place_of(link)}, protocol {link.protocol}"
     return {
         f"runs/{plan.name}": run_attributes(
             plan, wish.robot, origin=_RIG if rig else "robot", source=source, lock_step=link.lock_step

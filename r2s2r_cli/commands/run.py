@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import signal
 import subprocess
@@ -71,7 +72,8 @@ def run(
 
     Every stage is the command of that name; a fresh one says so and costs nothing, one that was interrupted goes on
     where it was, a robot that has moved is not moved again. A recording that was cut off, and that nothing was made of
-    yet, is done again; what it holds is kept. The first stage that fails ends the run, with its code.
+    yet, is done again; what it holds is kept. The first stage that fails ends the run, with its code, and so does what
+    `validate` finds wrong with runs and their states (3): nothing is learned from them.
 
     Example: r2s2r run --port /dev/ttyUSB0 --camera realsense
     """  # fmt: skip
@@ -113,8 +115,18 @@ def run(
         if dry_run:
             continue
         _carry_out((*step.words, *common, *_resumed(step)), shlex.join(words))
+        _gate(place, step)
     if dry_run:
         console.say("nothing was done")
+
+
+def _gate(place: Iteration, step: Step) -> None:
+    """What was recorded and estimated must pass `validate` before anything is learned from it. Leaves with its code."""
+    if step.words[0] != "estimate" or not step.target.exists():
+        return
+    recording = place.artifact("recording", executed=step.name == "estimate-executed")
+    files = [os.path.relpath(path) for path in (recording, step.target) if path.exists()]
+    _carry_out(("validate", *files, "--quiet"), shlex.join(["r2s2r", "validate", *files]))
 
 
 def _steps(

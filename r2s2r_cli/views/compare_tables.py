@@ -33,7 +33,7 @@ def comparison_tables(report: CompareReport) -> Iterator[PageTable]:
     ranked = [model for model in report.models if model.srcc_com is not None or model.srcc_turn is not None]
     if ranked:
         yield PageTable(
-            "order of the gaits: rank correlation with the robot (1: the same order)",
+            "order of the gaits of all iterations: rank correlation with the robot (1: the same order)",
             ["simulator", "gaits", "how far it came", "how far it turned"],
             [[m.model, str(m.gaits), _plain(m.srcc_com), _plain(m.srcc_turn)] for m in ranked],
         )

@@ -43,8 +43,8 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
 
 
 def stages(calls: Calls) -> list[str]:
-    """Their names."""
-    return [words[0] + (" executed" if "execute" in words[1:3] else "") for words in calls]
+    """Their names; the gate between them, which each test of it looks at, is none."""
+    return [words[0] + (" executed" if "execute" in words[1:3] else "") for words in calls if words[0] != "validate"]
 
 
 def test_a_robot_goes_through_all_stages(project: Path, calls: Calls) -> None:
@@ -128,6 +128,19 @@ def test_the_first_failure_ends_it_with_its_code(estimated: Path, calls: Calls, 
     assert result.exit_code == wanted
     assert ("memory" in result.stderr) == (code == -9)
     assert stages(Child.calls)[-1] == "identify"
+
+
+def test_nothing_is_learned_from_runs_that_do_not_pass(estimated: Path, calls: Calls) -> None:
+    """The recording and its states are validated; where that finds an error the run ends there, with 3."""
+    Child.codes["validate"] = 3
+    result = invoke("run")
+    assert result.exit_code == 3
+    assert [words[0] for words in Child.calls] == ["estimate", "validate"]
+    assert Child.calls[-1][1:3] == ["iterations/001/10-record.h5", "iterations/001/20-estimate.h5"]
+    Child.calls.clear()
+    Child.codes["validate"] = 0
+    assert invoke("run", "--until", "identify").exit_code == 0
+    assert [words[0] for words in Child.calls] == ["estimate", "validate", "identify"]
 
 
 def test_without_robot_and_log_nothing_begins(project: Path, calls: Calls) -> None:

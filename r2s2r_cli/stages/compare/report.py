@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,7 +55,8 @@ def report_of(
     repeats = [_repeatability(one) for one in repeatability(walks, policies)]
     by_run = {run: one for one in repeats for run in one.runs}
     rows = [_run(one, floor[one.real.iteration], by_run.get(one.real.name)) for one in compared]
-    even, left_out = in_common(rows, fallen({run.name: run.fallen for run in runs}))
+    flat = fallen({run.name: run.fallen for run in runs})
+    even, left_out = in_common(rows, flat)
     warnings = [*_unsettled(runs), *left_out, *(text for one in compared for text in one.predicted.warnings)]
     if floor[numbers[0]].com_end_m is None:
         warnings.append(
@@ -63,14 +64,16 @@ def report_of(
             "an error may be the robot's own scatter"
         )
     seen = {name for model in models for name in model.trained_on}
+    told = tuple(_model(model, models[0], compared, even, seen, floor[numbers[0]], flat) for model in models)
     return CompareReport(
         iteration=numbers[0], runs=tuple(rows),
-        models=tuple(_model(model, models[0], compared, even, seen, floor[numbers[0]]) for model in models),
+        models=told,
         policies=tuple(_policies(runs, models, even)),
         history=tuple(
             _history(number, model, models[0], even, floor[number]) for number in sorted(numbers) for model in models
         ),
-        repeatability=tuple(repeats), floor=floor[numbers[0]], warnings=tuple(dict.fromkeys(warnings)),
+        repeatability=tuple(repeats), floor=floor[numbers[0]], srcc={one.model: one.srcc_com for one in told},
+        warnings=tuple(dict.fromkeys(warnings)),
     )  # fmt: skip
 
 
@@ -133,14 +136,15 @@ def _unsettled(runs: Sequence[RealRun]) -> Iterator[str]:
 
 def _model(
     model: Model, first: Model, compared: Sequence[Compared], rows: Sequence[CompareRun], seen: set[str],
-    floor: CompareFloor,
+    floor: CompareFloor, flat: Mapping[str, str],
 ) -> CompareModel:  # fmt: skip
-    """Over the runs of the iteration. seen: runs that some simulator was trained on."""
+    """Over the runs of the iteration; the order of the gaits over those of all iterations but fallen ones (flat). seen:
+    runs that some simulator was trained on."""
     number = rows[0].iteration
     own, others = ([row for row in rows if row.iteration == number and row.model == one.name] for one in (model, first))
     others = own if model is first else others
     fresh, fresh_others = ([row for row in side if row.run not in seen] for side in (own, others))
-    mine = [one for one in compared if one.model is model and one.real.iteration == number]
+    mine = [one for one in compared if one.model is model and one.real.name not in flat]
     simulated = {one.real.name: one.predicted.walk for one in mine if one.predicted.walk is not None}
     known = [one.real for one in mine if one.real.name in simulated]
     ranks = ranking({run.name: run.walk for run in known}, simulated, policies_of(known))

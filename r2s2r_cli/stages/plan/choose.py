@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -70,11 +71,24 @@ def shortlist(found: Found, rewards: Mapping[str, Reward], count: int) -> dict[s
     return listed
 
 
+def short_names(behaviours: Iterable[str]) -> dict[str, str]:
+    """What gaits of each behaviour are called: the last word of `package.module:function`, and as many words before it
+    as tell it from the others; one word is called as it is."""
+    parts = {name: re.split(r"[.:]", name) for name in behaviours}
+    found: dict[str, str] = {}
+    for name, words in parts.items():
+        taken = [other for key, other in parts.items() if key != name]
+        count = next((n for n in range(1, len(words)) if all(other[-n:] != words[-n:] for other in taken)), len(words))
+        found[name] = "-".join(words[-count:])
+    return found
+
+
 def chosen(
     judge: Judge, listed: Mapping[str, list[Gait]], rewards: Mapping[str, Reward], settings: ChoiceSettings,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, tuple[Primitive, ...]]:  # fmt: skip
-    """The best gaits of every behaviour, best first, by their robust score; named `forward-1`, `forward-2` ..."""
+    """The best gaits of every behaviour, best first, by their robust score; named `forward-1`, `forward-2` ..., as
+    `short_names` calls the behaviour."""
     few = min(settings.first_pairs, len(judge.pairs))
     finalists: dict[str, list[Gait]] = {}
     for number, (behaviour, reward) in enumerate(rewards.items()):
@@ -87,6 +101,7 @@ def chosen(
     leading = [gaits[0] for gaits in finalists.values() if gaits]
     judge.also_from(arrived(judge.executor, judge.reference, judge.pairs, leading, judge.rest_error_m))
     kept: dict[str, tuple[Primitive, ...]] = {}
+    short = short_names(rewards)
     for number, (behaviour, reward) in enumerate(rewards.items()):
         gaits = finalists[behaviour]
         made = [
@@ -94,7 +109,6 @@ def chosen(
             for gait, (came, good) in zip(gaits, judge(gaits, len(judge.pairs)), strict=True)
         ]
         ranked = sorted(made, key=lambda one: (-one.score, one.gait.key))[: settings.kept]
-        short = behaviour.replace(":", ".").rpartition(".")[2]
-        kept[behaviour] = tuple(replace(one, name=f"{short}-{k}") for k, one in enumerate(ranked, 1))
+        kept[behaviour] = tuple(replace(one, name=f"{short[behaviour]}-{k}") for k, one in enumerate(ranked, 1))
         progress(len(rewards) + number + 1, 2 * len(rewards))
     return kept

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from importlib.metadata import entry_points
+from pathlib import Path
 
 import numpy as np
 
@@ -60,8 +62,22 @@ def reward_named(name: str) -> Reward:
 
     Raises UsageError for a name that leads nowhere, or to something that is no function.
     """
+    return BEHAVIOURS[name] if name in BEHAVIOURS else _checked(name, _brought_along(name))
+
+
+def source_of(name: str) -> Path | None:
+    """The file that a reward which a user brings along was written in; None for those of the paper, and where Python
+    does not know it. Raises as `reward_named`."""
     if name in BEHAVIOURS:
-        return BEHAVIOURS[name]
+        return None
+    try:
+        found = inspect.getsourcefile(_brought_along(name))
+    except TypeError:  # something that can be called, and has no code of its own
+        return None
+    return None if found is None else Path(found)
+
+
+def _brought_along(name: str) -> Reward:
     found = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
     module, colon, attribute = name.partition(":")
     try:
@@ -82,8 +98,8 @@ def reward_named(name: str) -> Reward:
     if not callable(made):
         raise UsageError("the reward is no function", where=f"--behaviour {name}", expected="a function of Outcomes",
                          received=type(made).__name__, hint="r2s2r plan --behaviour forward")  # fmt: skip
-    checked: Reward = _checked(name, made)
-    return checked
+    found_reward: Reward = made
+    return found_reward
 
 
 def _checked(name: str, function: Reward) -> Reward:

@@ -35,6 +35,12 @@ class CameraFacts:
     depth_scale: float
 
 
+def place_of(link: LinkFacts) -> str:
+    """Where the robot is, as its runs remember it. A rig in lock-step repeats itself exactly, on whatever free port: it
+    has none, so that its recordings have the same hash again (the provenance has the port)."""
+    return "lock-step" if link.lock_step else link.port
+
+
 def run_layout(plan: RunPlan, robot: Robot, link: LinkFacts, camera: CameraFacts | None) -> tuple[StreamLayout, ...]:
     """The streams of one run. Rows go to `runs/<run>/<stream>`, those of the sensor table to `...sensors:table`."""
     run = plan.name
@@ -52,7 +58,7 @@ def run_layout(plan: RunPlan, robot: Robot, link: LinkFacts, camera: CameraFacts
     }
     words = f"{plan.policy.description}; as it is run, with the rest shape and all its repeats".lstrip("; ")
     attributes: dict[str, Mapping[str, Scalar]] = {
-        "link": {"protocol": link.protocol, "port": link.port, "stops_by_itself": link.watchdog is not None},
+        "link": {"protocol": link.protocol, "port": place_of(link), "stops_by_itself": link.watchdog is not None},
         "policy": {"robot": robot.name, "description": words, "repeat": 1},
     }
     found = [

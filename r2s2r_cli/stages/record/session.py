@@ -38,7 +38,8 @@ _SILENT = 0.02
 class Session:
     """The runs to record, and what became of them: of every run that was begun there is a report, whatever ended it.
 
-    begin: called before every run. started: wall clock of each run that was begun [unix s].
+    begin: called before every run. started: wall clock of each run that was begun [unix s]; of none in lock-step, whose
+    time is the rig's own.
     """
 
     plans: Sequence[RunPlan]
@@ -97,7 +98,8 @@ class Session:
     def _one(self, plan: RunPlan, writer: Writer) -> None:
         self.begin()
         loop = RunLoop(plan, self.robot, self.link, writer, self.watch)
-        self.started[plan.name] = self.wall_clock()
+        if not self.link.facts.lock_step:
+            self.started[plan.name] = self.wall_clock()
         pictures = None
         ended = "complete"
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,23 +14,35 @@ from pathlib import Path
 import pytest
 
 from r2s2r_cli.commands.interrupts import whole_items
+from r2s2r_cli.store.header import read_header
 from tests.commands.conftest import invoke
 
 ESTIMATE = "iterations/001/20-estimate.h5"
 START = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background process inherits "ignore"
-sys.argv = ["r2s2r", "estimate", "--force", "--quiet"]
+sys.argv = ["r2s2r", *sys.argv[1:]]
 from r2s2r_cli.__main__ import main
 print("started", file=sys.stderr, flush=True)
 main()
 """
 
 
-def interrupted(project: Path, delay_s: float) -> tuple[int, str]:
-    """Exit code and stderr of an estimate that gets SIGINT after `delay_s`."""
+SAMPLE = Path(__file__).resolve().parents[2] / "examples" / "sample-project" / "project"
+STAGES = [
+    (("estimate", "--iteration", "1"), ESTIMATE),
+    (("simulate", "--random", "3", "--iteration", "1"), "iterations/001/simulation.h5"),
+    (("compare", "--iteration", "1", "--of", "execute"), "iterations/001/60-compare.h5"),
+    (("floor",), "floor.h5"),
+]
+"""Computing stages that begin anew, and what they write; `identify`, `plan` and `diagnose` go on (tests of their own)."""
+
+
+def interrupted(project: Path, delay_s: float, *words: str) -> tuple[int, str]:
+    """Exit code and stderr of a command (default: an estimate) that gets SIGINT after `delay_s`."""
+    words = (*(words or ("estimate",)), "--force", "--quiet")
     child = subprocess.Popen(
-        [sys.executable, "-c", START], cwd=project, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", START, *words], cwd=project, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
     if child.stderr is None:
         raise RuntimeError("the child has no stderr")
@@ -81,6 +94,37 @@ def test_ctrl_c_leaves_everything_whole(estimated: Path) -> None:
 def test_ctrl_c_at_many_moments(estimated: Path) -> None:
     """Forty moments over the whole command."""
     check(estimated, [0.02 + 0.05 * i for i in range(40)])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("words", "target"), STAGES, ids=[words[0] for words, _ in STAGES])
+def test_a_stage_that_was_interrupted_gives_the_same(
+    words: tuple[str, ...], target: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At four moments between the imports and the end: what was there is there, to the byte, or the stage was done;
+    run again it gives the hash that it has when nobody interrupts it."""
+    project = tmp_path / "sample"
+    if words[0] == "estimate":  # pictures take minutes; a log does as well
+        assert invoke("init", str(project), "--sample").exit_code == 0
+        assert invoke("import", str(project / "sample.csv"), "--project", str(project)).exit_code == 0
+    else:
+        shutil.copytree(SAMPLE, project)
+    monkeypatch.chdir(project)
+    begun = time.monotonic()
+    assert invoke(*words, "--force", "--no-draw").exit_code == 0
+    whole = time.monotonic() - begun
+    wanted = read_header(project / target).content_sha256
+    codes = []
+    for share in (0.1, 0.4, 0.7, 0.95):
+        before = (project / target).read_bytes()
+        code, stderr = interrupted(project, share * whole, *words, "--no-draw")
+        codes.append(code)
+        assert code in (0, 130) and "Traceback" not in stderr, stderr
+        assert not list(project.rglob("*.partial"))
+        assert code == 0 or (project / target).read_bytes() == before
+    assert 130 in codes
+    assert invoke(*words, "--force", "--no-draw").exit_code == 0
+    assert read_header(project / target).content_sha256 == wanted
 
 
 def test_an_interrupt_that_a_finaliser_swallows_comes_again() -> None:

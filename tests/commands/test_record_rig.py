@@ -14,6 +14,15 @@ from tests.support.desk import QUIET, aligned_error, desk, project, read_truth
 from tests.support.fake_robot import SLOPE
 
 RUN = "random-0"
+GAIT = """\
+schema_version = 1
+robot = "threebar"
+name = "nod"
+[[steps]]
+target = [0.5, 1.0, 1.0, 1.0, 1.0, 1.0]
+[[steps]]
+target = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
+"""
 COUNT_M = 42e-12 * 1024 / 3.3
 """Capacitance times converter count [F]."""
 WAYS = [
@@ -85,13 +94,37 @@ def test_in_real_time_as_well(tmp_path: Path, protocol: str) -> None:
     assert np.nanquantile(np.abs(error), 0.99) < 0.0025
 
 
+def hash_of(root: Path, *words: str) -> str:
+    """Content hash of what a command records from a rig of its own, on whatever port is free."""
+    with desk(root, "--link", "tcp", "--protocol", "checked", "--fast") as rig:
+        result = document(*words, "--project", str(root), "--port", rig.address, "--no-draw",
+                          "--set", "record.rest_s=0.5")  # fmt: skip
+    _, data = read_artifact(root / result["artifact"], "recording")
+    for run in data.runs():
+        assert "start_unix" not in data.groups[f"runs/{run}"].attributes
+        assert data.groups[f"runs/{run}/link"].attributes["port"] == "lock-step"
+    return str(result["content_sha256"])
+
+
 @pytest.mark.slow
 def test_a_recording_in_lock_step_is_the_same_again(tmp_path: Path) -> None:
-    """Same seed, same policy: every capacitance and every command of the second recording equals the first."""
+    """Same seed, same policy, another process and port: the same hash; another policy has another one."""
+    first, again = (hash_of(project(tmp_path / name), "record", "--random", "2") for name in ("one", "two"))
+    assert first == again
+    assert hash_of(project(tmp_path / "three"), "record", "--random", "2", "--seed", "1") != first
+
+
+@pytest.mark.slow
+def test_what_was_executed_in_lock_step_is_the_same_again(tmp_path: Path) -> None:
+    """A policy, twice from where the robot was put, on the rig: the outcome is shown, it runs, both runs are complete;
+    done again it has the same hash."""
     found = []
     for name in ("one", "two"):
-        data, _ = recorded(project(tmp_path / name), "pty", "checked")
-        found.append({path: group for path, group in data.groups.items() if path.endswith(("sensors", "commands"))})
-    for path, group in found[0].items():
-        for name, values in group.datasets.items():
-            assert np.array_equal(values, found[1][path][name], equal_nan=True), f"{path}/{name}"
+        root = project(tmp_path / name)
+        (root / "iterations" / "001").mkdir(parents=True)
+        (root / "gait.toml").write_text(GAIT, "utf-8")
+        found.append(hash_of(root, "execute", str(root / "gait.toml"), "--repeats", "2", "--yes"))
+        header, data = read_artifact(root / "iterations" / "001" / "50-execute.h5", "recording")
+        assert data.runs() == ["nod-1", "nod-2"]
+        assert [run["ended"] for run in header.provenance.report["runs"]] == ["complete"] * 2
+    assert found[0] == found[1]

@@ -35,7 +35,7 @@ STAGES = [
     (("compare", "--iteration", "1", "--of", "execute"), "iterations/001/60-compare.h5"),
     (("floor",), "floor.h5"),
 ]
-"""Computing stages that begin anew, and what they write; `identify`, `plan` and `diagnose` go on (tests of their own)."""
+"""Computing stages that begin anew, and what they write; those that go on have tests of their own."""
 
 
 def interrupted(project: Path, delay_s: float, *words: str) -> tuple[int, str]:

@@ -7,8 +7,9 @@ from typing import cast
 
 import numpy as np
 
-from r2s2r_cli.stages.plan.gaits import Gait, run_gaits, seen
-from r2s2r_cli.stages.plan.long import Walk, walks
+from r2s2r_cli.stages.plan.gaits import Gait, Seen, run_gaits, seen
+from r2s2r_cli.stages.plan.long import Walk, _Option, _taken, walks
+from r2s2r_cli.stages.plan.placement import Reference
 from r2s2r_cli.stages.plan.robust import Primitive
 from r2s2r_cli.stages.plan.route import walked
 from r2s2r_cli.stages.plan.runs import played, policy_file, run_groups
@@ -64,6 +65,38 @@ def test_long_policies_go_on_where_the_robot_is() -> None:
         assert np.allclose(p_WE[-1], executor.caps(walk.rested)[0], atol=1e-9)
         assert np.allclose(p_WE[0], seen(executor, at).caps[0])
         assert np.array_equal(groups[f"runs/{name}/intervals"]["target"], walk.policy)
+
+
+def ends_at(com: np.ndarray, element: int, yaw: float = 0.0) -> Seen:
+    """Robots that all stand on a triangle; caps are what `Placed` below reads."""
+    rods = np.tile(np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]] * 3), (len(com), 1, 1))
+    return cast(Seen, SimpleNamespace(com=com, caps=rods, element=element, yaw=yaw))
+
+
+class Placed:
+    """A reference that knows where the ends of this test stand."""
+
+    def __init__(self, ends: list[Seen]) -> None:
+        self.ends = ends
+
+    def place(self, caps: np.ndarray) -> SimpleNamespace:
+        """Triangle and yaw of one of them."""
+        one = cast(SimpleNamespace, next(end for end in self.ends if end.caps is caps))
+        return SimpleNamespace(element=np.full(len(caps), one.element), yaw=np.full(len(caps), one.yaw))
+
+
+def test_a_shortcut_that_tips_the_robot_is_not_taken() -> None:
+    """The first ends on another triangle, the next one turned otherwise, the next 20 cm away, the
+    next gives a target up in one of five robots: the fifth is taken; of the first four alone none is."""
+    far, beyond, close = (np.tile([x, 0.0, 0.0], (5, 1)) for x in (0.1, 0.3, 0.11))
+    ends = [ends_at(far, 1), ends_at(far, 2), ends_at(far, 1, yaw=0.5), ends_at(beyond, 1),
+            ends_at(far, 1), ends_at(close, 1)]  # fmt: skip
+    sound = [np.ones(5, dtype=bool) for _ in ends]
+    sound[4][3] = False
+    walk = cast(Walk, SimpleNamespace(com=np.zeros((5, 3)), heading=np.zeros(5), lost=np.zeros(5, dtype=bool)))
+    reference, ways = cast(Reference, Placed(ends)), cast(list[_Option], list(range(6)))
+    assert _taken(reference, walk, ways, ends, sound) == 5
+    assert _taken(reference, walk, ways[:5], ends[:5], sound[:5]) == 0
 
 
 def test_robots_that_end_elsewhere_are_astray() -> None:

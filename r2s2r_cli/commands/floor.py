@@ -119,6 +119,7 @@ def _runs(project: Project, places: Sequence[Iteration]) -> tuple[list[SeenRun],
     """Runs with caps, runs with sensors, and the policy of each by name. Recorded runs are called NUMBER:RUN, executed
     ones too unless that is taken; the same name of a policy means another one in the plan of another iteration."""
     from r2s2r_cli.stages.floor import seen_run, sensed_run
+    from r2s2r_cli.stages.repeated import policy_of
     from r2s2r_cli.store.read import read_artifact
 
     robot = project.robot()
@@ -136,11 +137,12 @@ def _runs(project: Project, places: Sequence[Iteration]) -> tuple[list[SeenRun],
         for run in estimate.runs() if estimate is not None else ():
             one = seen_run(called(run), estimate, recording, run) if estimate is not None else None
             seen += [one] if one is not None else []
-        for run in recording.runs() if recording is not None else ():
-            repeat = recording.groups[f"runs/{run}"].attributes.get("repeat") if recording is not None else None
-            policy = run.removesuffix(f"-{repeat}") if repeat is not None else run
+        if recording is None:
+            continue
+        for run in recording.runs():
+            policy = policy_of(recording, run)
             policies[called(run)] = f"{place.number}:{policy}" if executed else policy
-            other = sensed_run(called(run), recording, run, robot) if recording is not None else None
+            other = sensed_run(called(run), recording, run, robot)
             sensed += [other] if other is not None else []
     return seen, sensed, policies
 

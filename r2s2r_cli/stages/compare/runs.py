@@ -15,6 +15,7 @@ from r2s2r_cli.stages.compare.walk import Walk
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.load import run_data
 from r2s2r_cli.stages.measures.upright import not_at_rest
+from r2s2r_cli.stages.repeated import policy_of
 from r2s2r_cli.stages.segments import Intervals
 from r2s2r_cli.stages.simulate.policies import Sequence as Targets, sequence, stored_policies
 from schemas.robot import Robot
@@ -101,7 +102,7 @@ def _run(
                          expected=f"every end cap at the {frame}", received=f"none of cap {int(np.argmin(known))}",
                          hint="r2s2r validate")  # fmt: skip
     return RealRun(
-        name=prefix + run, policy=prefix + _policy(groups[""], run), iteration=iteration,
+        name=prefix + run, policy=prefix + policy_of(estimate, run), iteration=iteration,
         intervals=len(groups["intervals"]["first"]) - opening.intervals, walk=walk,
         targets=policy_part(_targets(estimate, recording, run, intervals, robot), opening),
         data=_data(estimate, recording, run, prefix + run), opening=opening,
@@ -117,12 +118,6 @@ def _intervals(groups: dict[str, Group]) -> Intervals:
     whole = Intervals.from_group(held)
     count = int(np.argmin(np.append(whole.complete, False)))
     return Intervals(**{name: value[:count] for name, value in vars(whole).items()})
-
-
-def _policy(root: Group, run: str) -> str:
-    """Name of the policy: that of the run without the number of its repeat."""
-    repeat = root.attributes.get("repeat")
-    return run.removesuffix(f"-{repeat}") if repeat is not None else run
 
 
 def _targets(

@@ -67,6 +67,18 @@ def test_leaving_a_gait_out_is_fitting_without_it() -> None:
     assert found.scores[1].without[0] == pytest.approx(direct, abs=2e-3)
 
 
+def test_a_number_of_which_the_data_say_nothing_stays() -> None:
+    """Where the simulator is flat its prior alone would lead it back to off in one step, over whatever lies between;
+    one of which the data say something goes where they say."""
+    found = tried(0.8)
+    fit = found.fits[1]
+    flat = replace(fit, x=np.array([1.1]), jacobian=fit.jacobian * np.array([1.0, 1.0, 0.0]))
+    told = replace(fit, x=np.array([1.1]))
+    one, other = scores(found.arena, [flat, told], found.arena.gait)  # type: ignore[arg-type]
+    assert (one.without[:, -1] == 1.1).all()
+    assert (np.abs(other.without[:, -1] - 1.1) > 0.01).all()
+
+
 def test_a_gait_without_a_key_frame_is_scored_by_its_pieces() -> None:
     """The robot tips over as both of its intervals begin: what they say counts as before, and no key frame is made."""
     found = tried(0.8)

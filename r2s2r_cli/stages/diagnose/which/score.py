@@ -2,7 +2,9 @@
 
 Without a gait the numbers are where one Gauss-Newton step leads from the whole fit; the gait is then really simulated
 with them. The predictive covariance has noise, floor, starts and what the other gaits leave unsure of the numbers.
-It is simulated at a few points close together (`rough`), and a piece's log density is the mean of theirs.
+It is simulated at a few points close together (`rough`), and a piece's log density is the mean of theirs. A number of
+an effect that the data say nothing of near its fit stays where it is: its prior alone would lead it back to off, over
+the cliff that it came by (motors that never turn do not tell how far beyond their drive the dead zone goes).
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
-from r2s2r_cli.stages.diagnose.which.fit import Fits
+from r2s2r_cli.stages.diagnose.which.fit import PRIOR_SCALES, Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
 from r2s2r_cli.stages.diagnose.which.rough import DRAWS, around, root_of
@@ -22,6 +24,8 @@ from r2s2r_cli.stages.diagnose.which.white import White
 
 ENOUGH = 12.0
 """[nats]"""
+SILENT = 0.01
+"""Of the precision of a number's prior, below which data say nothing of it."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +112,7 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: b
         own, ends = np.flatnonzero(groups == name), np.flatnonzero(of_whole == name)
         out = own if held_out else own[:0]
         left = [
-            _without(arena, fit, H - by[out].sum(axis=0), pull[out].sum(axis=0) - gradient)
+            _without(arena, fit, H - by[out].sum(axis=0), pull[out].sum(axis=0) - gradient, _silent(fit, by))
             for fit, (by, pull, H, gradient) in zip(fits, normals, strict=True)
         ]
         values, z = _at(solver, fits, [one.points for one in left])
@@ -133,9 +137,18 @@ def _sd(H: np.ndarray, pulls: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(np.diag(covariance), 0.0) + (pulls @ covariance).var(axis=0, ddof=1))
 
 
-def _without(arena: Arena, fit: Fit, precision: np.ndarray, pull: np.ndarray) -> _Left:
-    """The step to the numbers without a group, and points about where it leads."""
+def _silent(fit: Fit, by: np.ndarray) -> np.ndarray:
+    """Places of an effect's numbers, behind the nuisances, of which the pieces say nothing. by (piece, n, n): what each
+    adds to the normal matrix."""
+    prior = (PRIOR_SCALES * fit.hypothesis.stack("scale")) ** -2.0
+    told = np.diag(by.sum(axis=0))[len(fit.z) :]
+    return np.asarray(len(fit.z) + np.flatnonzero(told < SILENT * prior))
+
+
+def _without(arena: Arena, fit: Fit, precision: np.ndarray, pull: np.ndarray, silent: np.ndarray) -> _Left:
+    """The step to the numbers without a group, and points about where it leads. silent: numbers that stay."""
     root = root_of(precision)
+    root[silent] = 0.0
     middle = np.concatenate([fit.z, fit.x]) + root @ (root.T @ pull)
     low = np.concatenate([arena.lower, fit.hypothesis.stack("lower")])
     high = np.concatenate([arena.upper, fit.hypothesis.stack("upper")])

@@ -2,9 +2,7 @@
 
 p(name) ~ exp((score + bias) / temperature). The score of an effect is its held-out gain, of which the first USUAL nats
 count a share (`usual_share`), since chance gives as much to whatever is tried, `marginal` times what it gains on all
-data together, `parity` times what the parity stage says for it, and `shown` less for every nat that it costs to have a
-size of its own in gaits that would have shown it (an effect that hardly any gait shows stays possible where it gains
-nothing, one that all gaits show does not); that of `none` what the best of the catalogue gains
+data together, and `parity` times what the parity stage says for it; that of `none` what the best of the catalogue gains
 by chance, and `none`, and `equivalent` more where the equivalence test finds no gap, less `gap` for every nat that
 today's pieces cost beyond those of healthy runs; that of `unknown` a share (`beside`) of the best effect's score, since
 a stranger often looks a little like one, a share (`unknown_share`) of what a wider floor gains beside it, and `left`
@@ -29,14 +27,14 @@ from r2s2r_cli.errors import InputError
 LEAST_SETS = 12
 LEARNED = (
     "sharpness", "parity", "none", "equivalent", "gap", "unknown", "unknown_share", "left", "usual", "beside",
-    "marginal", "shown",
+    "marginal",
 )  # fmt: skip
 """Numbers beside the biases, in the order of the columns; all of them in the exponent."""
 AT = {name: k for k, name in enumerate(LEARNED)}
-BEFORE = (1.0, 0.7, 0.0, 0.0, 0.05, -1.0, 0.3, 0.05, 0.5, 0.8, 0.5, 0.3)
+BEFORE = (1.0, 0.7, 0.0, 0.0, 0.05, -1.0, 0.3, 0.05, 0.5, 0.8, 0.5)
 """What they are before anything is learned, gains in the unit of SHARPNESS."""
-BEFORE_SD = (2.0, 0.3, 2.0, 1.0, 0.1, 2.0, 0.3, 0.1, 0.5, 0.3, 0.5, 0.3)
-POSITIVE = ("sharpness", "parity", "gap", "unknown_share", "left", "usual", "beside", "marginal", "shown")
+BEFORE_SD = (2.0, 0.3, 2.0, 1.0, 0.1, 2.0, 0.3, 0.1, 0.5, 0.3, 0.5)
+POSITIVE = ("sharpness", "parity", "gap", "unknown_share", "left", "usual", "beside", "marginal")
 TURNS = 4
 """In which the numbers and the best effect of every set are found."""
 FOLDS = 10
@@ -77,9 +75,8 @@ class Case:
     """One set. names: what was ranked; score, parity, marginal (n,) [nats]: without the numbers that are learned,
     parity beyond BY_CHANCE, MOST at most where a replay tells, the marginal of verdicts that do not say it as much as
     the score. equivalent: the test found no gap. truth: the right name, not among
-    `names` where the screening had lost it. shown (n,) [nats]: what a size of its own costs, by how far the gaits would
-    show it; None: verdicts that do not say it. gap, left [nats]: what pieces cost beyond those of healthy runs, under
-    the refit model and under the best effect; 0 where they cost less."""
+    `names` where the screening had lost it. gap, left [nats]: what pieces cost beyond those of healthy runs, under the
+    refit model and under the best effect; 0 where they cost less."""
 
     names: tuple[str, ...]
     score: np.ndarray
@@ -89,7 +86,6 @@ class Case:
     truth: str
     gap: float = 0.0
     left: float = 0.0
-    shown: np.ndarray | None = None
 
 
 def case(truth: Truth, document: dict[str, Any]) -> Case | None:
@@ -112,11 +108,7 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
     ])  # fmt: skip
     gap, left = (max(float(document.get(key) or 0.0), 0.0) for key in ("gap_nats", "left_nats"))
     names = tuple(row["effect"] for row in rows)
-    seen = [row.get("seen_sd") for row in rows]
-    shown = np.array([0.0 if one is None else 0.5 * np.log1p(float(one) ** 2) for one in seen])
-    return Case(
-        names, score, parity, marginal, equivalent, truth.right, gap, left, shown if any(seen) else None
-    )  # fmt: skip
+    return Case(names, score, parity, marginal, equivalent, truth.right, gap, left)
 
 
 def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
@@ -151,7 +143,6 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
         "usual_share": learned["usual"] * SHARPNESS / sharp,
         "marginal": learned["marginal"] * SHARPNESS / sharp,
         "marginal_most": MARGINAL_MOST,
-        "shown": learned["shown"] / sharp,
         "luck": LUCK,
         "luck_times": LUCK_TIMES,
         "none": learned["none"] / sharp,
@@ -181,9 +172,8 @@ def _design(one: Case, effects: Sequence[str], known: np.ndarray) -> np.ndarray:
     """What multiplies LEARNED and the biases in the exponent of every name, (name, LEARNED + effect). known: LEARNED as
     far as they are, by which the best effect is found."""
     X = np.zeros((len(one.names), len(LEARNED) + len(effects)))
-    costs = np.zeros(len(one.names)) if one.shown is None else one.shown
-    told = zip(one.names, one.score, one.parity, one.marginal, costs, strict=True)
-    for row, (name, score, parity, marginal, shown) in zip(X, told, strict=True):
+    told = zip(one.names, one.score, one.parity, one.marginal, strict=True)
+    for row, (name, score, parity, marginal) in zip(X, told, strict=True):
         if name == UNKNOWN:
             row[AT["unknown"]] = 1.0
             row[AT["unknown_share"]], row[AT["left"]] = score * SHARPNESS, one.left * SHARPNESS
@@ -193,7 +183,6 @@ def _design(one: Case, effects: Sequence[str], known: np.ndarray) -> np.ndarray:
             row[AT["none"]], row[AT["equivalent"]], row[AT["gap"]] = 1.0, float(one.equivalent), -one.gap * SHARPNESS
         else:
             row[AT["parity"]], row[AT["marginal"]] = parity, marginal * SHARPNESS
-            row[AT["shown"]] = -shown
             row[len(LEARNED) + effects.index(name)] = 1.0
     worth = X[:, : len(LEARNED)] @ known[: len(LEARNED)]
     replayed = [w for w, name in zip(worth, one.names, strict=True) if name not in (NONE, UNKNOWN, *NO_REPLAY)]

@@ -22,17 +22,17 @@ class Calibration:
     """What turns evidence into probabilities.
 
     temperature [nats]: of the softmax over names. usual [nats]: about what chance gives to the best of a catalogue;
-    usual_share: what a nat below it counts. luck, luck_times: no gain counts beyond luck [nats] and so many times
-    what all data together say, since what was left out cannot gain what they do not show; marginal: what a nat of
-    that counts beside it, marginal_most [nats] at most, from where on the effect is beyond doubt. shown: what a
-    name loses for every nat that a size of its own costs (`own_size`). parity: nats of gain that a nat of the
-    parity stage is worth, which needs no simulator and errs far less, beyond by_chance [nats], which it says for
-    the best of a whole catalogue where nothing is wrong; most [nats]: of them that count, since a finding that
-    stands out says that something is wrong, and which of its look-alikes it is the replay tells better, where there
-    is one. none, equivalent [nats]: what `none` gains, and more where the equivalence test finds no gap; gap: what
-    it loses for every nat that the refit model costs more than in healthy runs. beside, unknown_share, left: what
-    `unknown` has of the best effect's score, of what a wider floor gains beside it, and of every nat that it
-    leaves; unknown [nats]: what that must exceed. bias [nats]: of a name, what its gains are short of.
+    usual_share: what a nat below it counts. luck, luck_times: no gain counts beyond luck [nats] and so many times what
+    all data together say, since what was left out cannot gain what they do not show; marginal: what a nat of that
+    counts beside it, marginal_most [nats] at most, from where on the effect is beyond doubt. parity: nats of gain that
+    a nat of the parity stage is worth, which needs no simulator and errs far less, beyond by_chance [nats], which it
+    says for the best of a whole catalogue where nothing is wrong; most [nats]: of them that count, since a finding that
+    stands out says that something is wrong, and which of its look-alikes it is the replay tells better, where there is
+    one. none, equivalent [nats]: what `none`
+    gains, and more where the equivalence test finds no gap; gap: what it loses for every nat that the refit model costs
+    more than in healthy runs. beside, unknown_share, left: what `unknown` has of the best effect's score, of what a
+    wider floor gains beside it, and of every nat that it leaves; unknown [nats]: what that must exceed. bias [nats]:
+    of a name, what its gains are short of.
     commit, commit_unknown: probability from which an effect or `unknown` is the verdict.
     conformal: names whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many
     it rests on, 0 for the defaults. lapse: how often the evidence says nothing of the truth, so that no name is ever
@@ -47,7 +47,6 @@ class Calibration:
     usual_share: float = 1.0
     marginal: float = 0.0
     marginal_most: float = float("inf")
-    shown: float = 0.0
     luck: float = float("inf")
     luck_times: float = 2.0
     none: float = 20.0
@@ -66,12 +65,11 @@ class Calibration:
     sets: int = 0
 
     def score(
-        self, name: str, gain: float, *, marginal: float = 0.0, parity: float = 0.0, seen: float = 0.0,
+        self, name: str, gain: float, *, marginal: float = 0.0, parity: float = 0.0,
         equivalent: bool = False, beyond: float = 0.0, best: float = 0.0,
     ) -> float:  # fmt: skip
         """What a name is worth without its bias [nats]. gain: held out; of `none` what chance reaches, of `unknown`
-        what a wider floor gains. marginal: of an effect, on all data. seen: how far the gaits would show it
-        [sd]. equivalent: the equivalence test found no gap.
+        what a wider floor gains. marginal: of an effect, on all data. equivalent: the equivalence test found no gap.
         beyond: what pieces cost more than those of healthy runs (`left.Left`): under the refit model for `none`, under
         the best effect for `unknown`. best: of `unknown`, the score of that effect: a stranger is told from it by what
         it leaves."""
@@ -83,7 +81,7 @@ class Calibration:
         if name == NONE:
             return gain + self.none + (self.equivalent if equivalent else 0.0) - self.gap * max(beyond, 0.0)
         most = float("inf") if name in NO_REPLAY else self.most
-        gain += self.marginal * min(max(marginal, 0.0), self.marginal_most) - self.shown * own_size(seen)
+        gain += self.marginal * min(max(marginal, 0.0), self.marginal_most)
         return gain + self.parity * min(max(parity - self.by_chance, 0.0), most)
 
     def absolute(self) -> Calibration:
@@ -109,12 +107,6 @@ class Calibration:
         order = sorted(probabilities, key=lambda name: -probabilities[name])
         kept = [name for name in order if probabilities[name] >= self.conformal]
         return tuple(kept or order[:1])
-
-
-def own_size(seen: float) -> float:
-    """What it costs an effect to have a size of its own, by how far gaits would show it at its largest [sd], in [nats]:
-    Occam's factor of a normal number. Nothing for one that they do not show."""
-    return 0.5 * float(np.log1p(seen**2)) if np.isfinite(seen) else 0.0
 
 
 def calibration() -> Calibration:

@@ -34,24 +34,17 @@ def concluded(m: Material) -> Which:
     calibration = m.calibration
     order = sorted(gains, key=lambda i: -gains[i])
     singles = [i for i in order if len(m.fits[i].hypothesis.parts) == 1]
-    shown = _shown(m.responses)
     worth = {
-        i: calibration.score(
-            (name := m.fits[i].hypothesis.effects[0]), gains[i], marginal=float(m.marginal[i]), parity=m.said(i),
-            seen=shown.get(name, np.nan),
-        )
+        i: calibration.score(m.fits[i].hypothesis.effects[0], gains[i], marginal=float(m.marginal[i]), parity=m.said(i))
         for i in singles
-    }  # fmt: skip
+    }
     best: dict[str, int] = {}
     for i in sorted(singles, key=lambda i: -worth[i]):
         best.setdefault(m.fits[i].hypothesis.effects[0], i)
     names = {name: gains[i] for name, i in best.items()}
     others = _not_fitted(m, names)
     table = {name: worth[i] for name, i in best.items()}
-    table |= {
-        one.effect: calibration.score(one.effect, one.gain, parity=one.parity, seen=shown.get(one.effect, np.nan))
-        for one in others
-    }
+    table |= {one.effect: calibration.score(one.effect, one.gain, parity=one.parity) for one in others}
     table[NONE] = calibration.score(NONE, m.chance, equivalent=m.no_gap.equivalent, beyond=m.left.refit)
     table[UNKNOWN] = calibration.score(UNKNOWN, m.unexplained, beyond=m.left.best, best=best_replayed(table))
     both = [_two(m, i, best, gains) for i in order if len(m.fits[i].hypothesis.parts) == 2]
@@ -71,6 +64,7 @@ def concluded(m: Material) -> Which:
         Ranked(NONE, 0.0, probability[NONE], rmse=m.no_gap.rmse, misfit=_misfit(m.refit)),
         Ranked(UNKNOWN, m.unexplained, probability[UNKNOWN]),
     ]
+    shown = _shown(m.responses)
     ranking = [replace(one, seen=shown.get(one.effect, np.nan)) for one in ranking]
     ranking.sort(key=lambda one: (-one.probability, -one.gain))
     verdict, effects, p = verdict_of(ranking, calibration, pair, m.chance, m.no_gap)

@@ -94,7 +94,7 @@ class Fits:
         self, fits: Sequence[Fit], *, iterations: int = ITERATIONS, told: Callable[[int, int], None] | None = None
     ) -> None:
         """Move all fits on until they gain nothing any more. All get the same number of iterations."""
-        self._secants(fits)
+        self.secants(fits)
         for iteration in range(iterations):
             going = [fit for fit in fits if not fit.ended]
             if not going:
@@ -222,7 +222,7 @@ class Fits:
         fit.damping = max(1e-6, fit.damping / 3.0 if best == 0 else fit.damping * 3.0)
         fit.ended = gain < LEAST_GAIN
 
-    def _secants(self, fits: Sequence[Fit]) -> None:
+    def secants(self, fits: Sequence[Fit]) -> None:
         """Derivatives by the effects' numbers where the fits are: secants away from the nearer bound."""
         points, where = [], []
         for fit in fits:

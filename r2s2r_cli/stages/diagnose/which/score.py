@@ -1,9 +1,11 @@
 """How well a hypothesis predicts gaits that it was not fitted to: leave-one-gait-out log predictive density.
 
 Without a gait the numbers are where one Gauss-Newton step leads from the whole fit; the gait is then really simulated
-with them. The predictive covariance has noise, floor, starts and what the other gaits leave unsure of the numbers.
-It is simulated at a few points close together (`rough`), and a piece's log density is the mean of theirs. A number of
-an effect that the data say nothing of near its fit stays where it is: its prior alone would lead it back to off, over
+with them. The step makes up for what the gait had pulled, and for what the nuisances still had before them; an
+effect's numbers stand where the fit could not make them better, on the edge of a cliff it may be, and no step is owed
+to them. The predictive covariance has noise, floor, starts and what the other gaits leave unsure of the numbers. It
+is simulated at a few points close together (`rough`), and a piece's log density is the mean of theirs. A number of an
+effect that the data say nothing of near its fit stays where it is: its prior alone would lead it back to off, over
 the cliff that it came by (motors that never turn do not tell how far beyond their drive the dead zone goes).
 """
 
@@ -112,7 +114,9 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: b
         own, ends = np.flatnonzero(groups == name), np.flatnonzero(of_whole == name)
         out = own if held_out else own[:0]
         left = [
-            _without(arena, fit, H - by[out].sum(axis=0), pull[out].sum(axis=0) - gradient, _silent(fit, by))
+            _without(
+                arena, fit, H - by[out].sum(axis=0), pull[out].sum(axis=0) - _owed(fit, gradient), _silent(fit, by)
+            )
             for fit, (by, pull, H, gradient) in zip(fits, normals, strict=True)
         ]
         values, z = _at(solver, fits, [one.points for one in left])
@@ -135,6 +139,11 @@ def _sd(H: np.ndarray, pulls: np.ndarray) -> np.ndarray:
     the cost smooth, all pulls (draw, n) would be the same."""
     covariance = np.linalg.pinv(H, hermitian=True)
     return np.sqrt(np.maximum(np.diag(covariance), 0.0) + (pulls @ covariance).var(axis=0, ddof=1))
+
+
+def _owed(fit: Fit, gradient: np.ndarray) -> np.ndarray:
+    """Of the gradient of a fit what it has not followed yet: that by the nuisances."""
+    return np.asarray(np.where(np.arange(len(gradient)) < len(fit.z), gradient, 0.0))
 
 
 def _silent(fit: Fit, by: np.ndarray) -> np.ndarray:

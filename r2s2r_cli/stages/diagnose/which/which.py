@@ -84,6 +84,8 @@ def compare_effects(
         arena.whiten(floor_m=wider * arena.floor_m)
         base, *fits = _again(arena, [base, *fits])
     told("left out", 0, 1)
+    # Where a fit came by a cliff, and went on in small steps, its derivative is still that of the cliff.
+    Fits(arena).secants(fits)
     refit, *own = scores(arena, [base, *fits], groups, held_out=ways.held_out)
     old = chronic(arena, healthy, fits)
     by_chance = chance(arena, responses, groups, seed=seed)
@@ -96,6 +98,7 @@ def compare_effects(
         if alone is not fits[first]:
             fits[first], own[first] = alone, scores(arena, [alone], groups, held_out=ways.held_out)[0]
             old[first] = chronic(arena, healthy, [alone])[0]
+        Fits(arena).secants(pairs)
         fits, own = [*fits, *pairs], [*own, *scores(arena, pairs, groups, held_out=ways.held_out)]
         old = np.concatenate([old, chronic(arena, healthy, pairs)])
     told("left out", 1, 1)

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
-from r2s2r_cli.commands.execute import _long, _require_fresh
+from r2s2r_cli.commands.execute import _ask, _long, _require_fresh
 from r2s2r_cli.commands.typed import typed_again
 from r2s2r_cli.console import Console
+from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.plan.view import far
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project, journal_of
@@ -149,6 +150,26 @@ def test_nobody_to_ask_is_told_the_command_as_typed(project: Path, monkeypatch: 
     assert refused.stderr.endswith("hint: r2s2r execute gait.toml --port socket://h:1 --force --yes\n")
     assert typed_again("execute", "--dry-run") == "r2s2r execute gait.toml --port socket://h:1 --force --dry-run"
     assert typed_again("record", "--yes") == "r2s2r record --yes"
+
+
+@pytest.mark.parametrize("answer", [True, False])
+def test_a_robot_moves_only_after_a_yes(answer: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Asked on stderr; no is exit code 2, with what shows the outcome again."""
+    asked: list[tuple[str, bool]] = []
+
+    def confirm(text: str, *, err: bool) -> bool:
+        asked.append((text, err))
+        return answer
+
+    monkeypatch.setattr("typer.confirm", confirm)
+    monkeypatch.setattr("sys.argv", ["r2s2r", "execute", "straight"])
+    if answer:
+        _ask(Console(quiet=True))
+    else:
+        with pytest.raises(UsageError, match="nothing moved") as caught:
+            _ask(Console(quiet=True))
+        assert caught.value.hint == "r2s2r execute straight --dry-run"
+    assert asked == [("run these policies on the robot?", True)]
 
 
 @pytest.mark.parametrize("cut_off", [False, True])

@@ -102,7 +102,7 @@ def sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr("r2s2r_cli.commands.stage.StageRun", computed)
     monkeypatch.setattr("r2s2r_cli.commands.record_run.carry_out", recorded)
     monkeypatch.setattr("r2s2r_cli.commands.plan_inputs.Asked.check", lambda *given: None)
-    monkeypatch.setattr("r2s2r_cli.commands.execute_outcome.expect", lambda *given: None)
+    monkeypatch.setattr("r2s2r_cli.commands.execute_outcome.expect", lambda *given, **named: None)
     monkeypatch.setattr(sys.modules["r2s2r_cli.commands.execute"], "_require_fresh", lambda *given: None)
     return root
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,6 +18,7 @@ from r2s2r_cli.stages.plan.groups import (
     primitives_group,
     symmetry_groups,
 )
+from r2s2r_cli.stages.plan.placement import wrapped
 from r2s2r_cli.stages.plan.robust import Primitive
 from r2s2r_cli.stages.plan.runs import played, policy_file, run_groups
 from r2s2r_cli.stages.plan.ways import Way
@@ -98,7 +100,9 @@ def _warnings(
                         "the camera may lose the robot")  # fmt: skip
         if one.goal is None:
             continue
-        missed = float(np.linalg.norm(one.reached.mean(axis=0)[:2] - np.array(one.goal.xy)))
-        if missed > 2 * one.goal.within_m:
-            said.append(f"{one.name}: simulated whole, it ends {missed:.2f} m from the goal")
+        x, y, turned = one.reached.mean(axis=0)
+        missed, turn = math.dist((x, y), one.goal.xy), abs(float(wrapped(turned - one.goal.heading)))
+        if missed > one.goal.within_m or turn > one.goal.within_rad:
+            said.append(f"{one.name}: simulated whole, it ends {missed:.2f} m and {math.degrees(turn):.0f} deg from the "
+                        "goal")  # fmt: skip
     return said

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import heapq
 import math
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +24,9 @@ NODES = 12_000
 NEARLY = 4.0
 """A way that misses the goal by so much (`Goal.miss`; 2 is the corner of what is near enough) is better than none."""
 
+ON_PAPER = 0.5
+"""Share of what is near enough that is asked of a way on paper: the robot ends elsewhere than on paper."""
+
 
 @dataclass(frozen=True)
 class Goal:
@@ -36,9 +40,30 @@ class Goal:
 
     def miss(self, paths: Paths) -> np.ndarray:
         """How far paths end from it, 1 each at the edge of what is near enough in place and in heading, (B,)."""
-        far = np.linalg.norm(paths.xy[:, -1] - np.array(self.xy), axis=1)
-        turn = np.abs(wrapped(paths.heading[:, -1] - self.heading))
+        far, turn = self.left(paths)
         return np.asarray(far / self.within_m + turn / self.within_rad)
+
+    def left(self, paths: Paths) -> tuple[np.ndarray, np.ndarray]:
+        """How far paths end from it [m], and how much is left to turn [rad], each (B,)."""
+        far = np.linalg.norm(paths.xy[:, -1] - np.array(self.xy), axis=1)
+        return far, np.abs(wrapped(paths.heading[:, -1] - self.heading))
+
+    def reached(self, paths: Paths) -> np.ndarray:
+        """Which paths end near enough, (B,)."""
+        far, turn = self.left(paths)
+        return np.asarray((far <= self.within_m) & (turn <= self.within_rad))
+
+
+def way_near(moves: Moves, goal: Goal) -> Paths:
+    """`way_to` a goal that is nearer on paper by ON_PAPER than what is near enough; where no way leads so near, the
+    better of that and of the way to what is near enough. Raises as `way_to`."""
+    path = None
+    with suppress(NumericalError):
+        path = way_to(moves, replace(goal, within_m=ON_PAPER * goal.within_m, within_rad=ON_PAPER * goal.within_rad))
+        if goal.reached(path)[0]:
+            return path
+    other = way_to(moves, goal)
+    return other if path is None else min(path, other, key=lambda one: float(goal.miss(one)[0]))
 
 
 def way_to(moves: Moves, goal: Goal) -> Paths:
@@ -52,18 +77,15 @@ def way_to(moves: Moves, goal: Goal) -> Paths:
     # Of a robot that cannot turn, or cannot travel, no time is foretold for that.
     speed = float((np.linalg.norm(moves.shift, axis=1) / moves.duration).max()) or math.inf
     rate = float((turn_by / moves.duration).max()) or math.inf
-    target = np.array(goal.xy)
 
-    def left(paths: Paths) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        far = np.linalg.norm(paths.xy[:, -1] - target, axis=1)
-        turn = np.abs(wrapped(paths.heading[:, -1] - goal.heading))
+    def time_left(paths: Paths) -> np.ndarray:
+        far, turn = goal.left(paths)
         time = np.maximum(np.maximum(far - goal.within_m, 0) / speed, np.maximum(turn - goal.within_rad, 0) / rate)
-        return far, turn, time
+        return np.asarray(time)
 
     begun = start_paths()
     count, best = 0, (math.inf, begun)
-    _, _, time = left(begun)
-    queue: list[tuple[float, int, float, Paths, int]] = [(GREED * float(time[0]), 0, 0.0, begun, 0)]
+    queue: list[tuple[float, int, float, Paths, int]] = [(GREED * float(time_left(begun)[0]), 0, 0.0, begun, 0)]
     done: set[tuple[int, ...]] = set()
     while queue and len(done) < NODES:
         _, _, spent, batch, row = heapq.heappop(queue)
@@ -72,12 +94,11 @@ def way_to(moves: Moves, goal: Goal) -> Paths:
         if key in done:
             continue
         done.add(key)
-        far, turn, _ = left(paths)
-        if far[0] <= goal.within_m and turn[0] <= goal.within_rad:
+        if goal.reached(paths)[0]:
             return paths
         best = min(best, (float(goal.miss(paths)[0]), paths), key=lambda pair: pair[0])
         after = extended(moves, paths)
-        _, _, time = left(after)
+        time = time_left(after)
         for k, cell in enumerate(_cells(after)):
             if cell not in done:
                 count += 1

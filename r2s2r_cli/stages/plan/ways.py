@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from r2s2r_cli.errors import NumericalError
-from r2s2r_cli.stages.plan.goal import Goal, way_to
+from r2s2r_cli.stages.plan.goal import Goal, way_near
 from r2s2r_cli.stages.plan.long import Walk, walks
 from r2s2r_cli.stages.plan.robust import Primitive, usual_ends
 from r2s2r_cli.stages.plan.route import (
@@ -62,7 +62,7 @@ def ways(
         best = partial(best_sequences, length=settings.cycles, value=value, reach=MARGIN * request.reach)
         tried += [(name, path) for path in different_sequences(moves, best, SEQUENCES)]
     for name, goal in request.goals.items():
-        way_to(moves, goal)  # raises where there is none at all
+        way_near(moves, goal)  # raises where there is none at all
         values[name] = partial(_near, goal)
         tried += [(name, path) for path in different_sequences(moves, partial(_way_or_none, goal), SEQUENCES)]
     longest = max((path.picks.shape[1] for _, path in tried), default=0)
@@ -113,6 +113,6 @@ def _near(goal: Goal, paths: Paths) -> np.ndarray:
 
 def _way_or_none(goal: Goal, moves: Moves) -> Paths | None:
     try:
-        return way_to(moves, goal)
+        return way_near(moves, goal)
     except NumericalError:
         return None

@@ -10,7 +10,7 @@ import pytest
 
 from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.plan.gaits import Gait
-from r2s2r_cli.stages.plan.goal import Goal, way_to
+from r2s2r_cli.stages.plan.goal import Goal, way_near, way_to
 from r2s2r_cli.stages.plan.placement import Reference, reference_of, turned, wrapped
 from r2s2r_cli.stages.plan.robust import Primitive
 from r2s2r_cli.stages.plan.route import (
@@ -134,6 +134,18 @@ def test_the_way_is_found_and_is_short() -> None:
     assert way_to(moves, Goal((0.0, 0.0), 0.0)).picks.shape[1] == 0
     with pytest.raises(NumericalError, match="no sequence"):
         way_to(simple((0.0, 0.0, 0.1)), Goal((1.0, 0.0), 0.0))
+
+
+def test_a_way_aims_nearer_than_what_is_near_enough() -> None:
+    """Steps of 0.09 m to a goal 0.18 m away, within 0.1 m: one step is near enough (0.09 m), and two are on it; what is
+    taken is the two, since the robot ends elsewhere than on paper. Steps of 0.12 m come no nearer than 0.06 m."""
+    goal = Goal((0.18, 0.0), 0.0, within_m=0.1)
+    assert way_to(simple((0.09, 0.0, 0.0)), goal).picks.shape[1] == 1
+    assert way_near(simple((0.09, 0.0, 0.0)), goal).picks.shape[1] == 2
+    path = way_near(simple((0.12, 0.0, 0.0)), goal)
+    assert np.allclose(goal.left(path)[0], 0.06) and goal.reached(path).all()
+    with pytest.raises(NumericalError, match="no sequence"):
+        way_near(simple((0.0, 0.0, 0.1)), Goal((1.0, 0.0), 0.0))
 
 
 def test_other_sequences_leave_out_what_was_used_most() -> None:

@@ -73,7 +73,7 @@ def chain(
 
 
 STAGE_VERSIONS: dict[str, int] = {
-    "import": 1, "calibrate": 1, "record": 1, "estimate": 2, "identify": 3, "simulate": 1, "floor": 2,
+    "import": 1, "calibrate": 1, "record": 1, "estimate": 2, "identify": 4, "simulate": 1, "floor": 2,
     "plan": 3, "execute": 1,
     "compare": 4, "diagnose": 14,
 }  # fmt: skip

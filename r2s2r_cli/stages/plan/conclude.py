@@ -103,6 +103,6 @@ def _warnings(
         x, y, turned = one.reached.mean(axis=0)
         missed, turn = math.dist((x, y), one.goal.xy), abs(float(wrapped(turned - one.goal.heading)))
         if missed > one.goal.within_m or turn > one.goal.within_rad:
-            said.append(f"{one.name}: simulated whole, it ends {missed:.2f} m and {math.degrees(turn):.0f} deg from the "
-                        "goal")  # fmt: skip
+            off = f"{missed:.2f} m and {math.degrees(turn):.0f} deg"
+            said.append(f"{one.name}: simulated whole, it ends {off} from the goal")
     return said

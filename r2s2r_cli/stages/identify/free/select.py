@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 from r2s2r_cli.errors import InputError, UsageError
@@ -54,6 +54,19 @@ def select(specs: Sequence[str], robot: Robot, effects: tuple[str, ...] = ()) ->
             found[name] = _with(known[name].free, spec, text)
     require_apart([known[name] for name in found])
     return tuple(found.values())
+
+
+def without_fixed(specs: Sequence[str], robot: Robot, fixed: Collection[str]) -> tuple[str, ...]:
+    """The specs, those of FAMILY.* without the elements that are fixed: all others are free, each as was asked for.
+    Raises UsageError as `select`."""
+    known = tuple(entries(robot))
+    found: list[str] = []
+    for text in specs:
+        name = parse(text).name
+        elements = _names(name, known) if name.endswith(".*") else []
+        others = [text.replace(name, one, 1) for one in elements if one not in fixed]
+        found += others if len(others) < len(elements) else [text]
+    return tuple(found)
 
 
 def parse(text: str) -> Spec:

@@ -1,7 +1,8 @@
 """Run every stage of a project again and compare with what is stored: `python again.py PROJECT` (minutes).
 
 For a lab's own CI as well: it needs nothing but r2s2r and the project's directory, of which it works on a copy. The
-robot is not moved: `execute` is run with --dry-run. Every stage gets the *stored* artifacts before it as its input, so
+robot is not moved: `record` (where the project has a virtual robot to look at: world.toml) and `execute` are run with
+--dry-run. Every stage gets the *stored* artifacts before it as its input, so
 that differences do not add up. Exit code 1 where a result is not what it was; how much may differ, and why, stands in
 RULES.
 """
@@ -9,6 +10,7 @@ RULES.
 from __future__ import annotations
 
 import argparse
+import json
 import re
 import shlex
 import shutil
@@ -18,6 +20,8 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
+from importlib.util import find_spec
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -104,6 +108,8 @@ def _again(project: Project, path: Path, say: Callable[[str], None]) -> Iterator
     made = read_header(path).provenance
     number = path.parent.name
     sources = [project.root / ref.path for ref in made.inputs]
+    if made.stage == "record":
+        yield _would_record(project.root, shlex.split(command_again(made, path, force=True))[1:], say)
     if made.stage in ("record", "execute", "collect") or (
         made.stage == "import" and not all(one.exists() for one in sources)
     ):
@@ -125,6 +131,26 @@ def _again(project: Project, path: Path, say: Callable[[str], None]) -> Iterator
     if made.stage == "plan" and (path.parent / "50-execute.h5").exists():
         yield _must(["execute", "--iteration", number, "--dry-run", "--force"], project.root, say)
     path.write_bytes(kept)
+
+
+def _would_record(root: Path, words: Sequence[str], say: Callable[[str], None]) -> str:
+    """The plan of a recording, and what the sensors of the virtual robot say, at the ports that it has this time."""
+    if not (root / "world.toml").exists() or find_spec("mujoco") is None:
+        say("record: no virtual robot to look at (world.toml and the extra rig make one)")
+        return ""
+    command = [sys.executable, "-m", "r2s2r_cli", "rig", "--fast", "--link", "tcp", "--world", "world.toml",
+               "--camera-port", "0", "--json"]  # fmt: skip
+    with subprocess.Popen(command, cwd=root, stdout=subprocess.PIPE, text=True) as rig:
+        try:
+            printed = [*takewhile(lambda line: line.rstrip() != "}", rig.stdout or ()), "}"]
+            where = json.loads("".join(printed)) if len(printed) > 1 else {}
+            if not where:
+                return "the virtual robot did not start"
+            given = {"--port": where["device"], "--camera": where["camera"]}
+            known = [given.get(before, word) for before, word in zip(["", *words], words, strict=False)]
+            return _must([*known, "--dry-run"], root, say)
+        finally:
+            rig.terminate()
 
 
 def _has_sightings(project: Project, recording: str) -> bool:

@@ -119,9 +119,10 @@ def test_the_second_comparison_holds_both_iterations() -> None:
 
 @pytest.mark.slow
 def test_every_stage_gives_again_what_is_stored() -> None:
-    """Each from the stored artifacts before it, within the tolerances; the robot is not moved (`execute --dry-run`)."""
+    """Each from the stored artifacts before it, within the tolerances; the robot is not moved (`--dry-run`)."""
     lines: list[str] = []
     assert again.main(SAMPLE, lines.append) == [], "\n".join(lines)
     done = [line for line in lines if line.endswith(("bit by bit", "within tolerance"))]
     assert len(done) >= 10, "\n".join(lines)
-    assert any("execute" in line and "--dry-run" in line for line in lines)
+    for stage in ("record", "execute"):
+        assert any(f"r2s2r {stage}" in line and "--dry-run" in line for line in lines)

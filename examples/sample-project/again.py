@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from importlib.util import find_spec
@@ -138,19 +139,28 @@ def _would_record(root: Path, words: Sequence[str], say: Callable[[str], None]) 
     if not (root / "world.toml").exists() or find_spec("mujoco") is None:
         say("record: no virtual robot to look at (world.toml and the extra rig make one)")
         return ""
-    command = [sys.executable, "-m", "r2s2r_cli", "rig", "--fast", "--link", "tcp", "--world", "world.toml",
-               "--camera-port", "0", "--json"]  # fmt: skip
-    with subprocess.Popen(command, cwd=root, stdout=subprocess.PIPE, text=True) as rig:
-        try:
-            printed = [*takewhile(lambda line: line.rstrip() != "}", rig.stdout or ()), "}"]
-            where = json.loads("".join(printed)) if len(printed) > 1 else {}
-            if not where:
-                return "the virtual robot did not start"
-            given = {"--port": where["device"], "--camera": where["camera"]}
+    try:
+        with virtual_robot(root) as given:
             known = [given.get(before, word) for before, word in zip(["", *words], words, strict=False)]
             return _must([*known, "--dry-run"], root, say)
+    except SystemExit as error:
+        return str(error)
+
+
+@contextmanager
+def virtual_robot(root: Path) -> Iterator[dict[str, str]]:
+    """The rig of a project in lock-step, in the world of its world.toml; the options that name it."""
+    command = [sys.executable, "-m", "r2s2r_cli", "rig", "--fast", "--link", "tcp", "--world", "world.toml",
+               "--camera-port", "0", "--json"]  # fmt: skip
+    with subprocess.Popen(command, cwd=root, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            printed = [*takewhile(lambda line: line.rstrip() != "}", process.stdout or ()), "}"]
+            where = json.loads("".join(printed)) if len(printed) > 1 else {}
+            if "device" not in where:  # nothing, or what is wrong
+                raise SystemExit("the rig did not start")
+            yield {"--port": where["device"], "--camera": where["camera"]}
         finally:
-            rig.terminate()
+            process.terminate()
 
 
 def _has_sightings(project: Project, recording: str) -> bool:

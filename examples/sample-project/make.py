@@ -10,7 +10,6 @@ README.md.
 from __future__ import annotations
 
 import argparse
-import json
 import shlex
 import shutil
 import subprocess
@@ -18,7 +17,10 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
+
+from again import virtual_robot
 
 FIRST = ("straight", "turn-counterclockwise")
 SECOND = ("arching", "turn-clockwise")
@@ -90,14 +92,8 @@ class Bench:
     def rig(self, camera: str) -> Iterator[tuple[str, ...]]:
         """The virtual robot in lock-step with this camera; options that name it."""
         (self.root / "world.toml").write_text(WORLD + camera)
-        command = [sys.executable, "-m", "r2s2r_cli", "rig", "--fast", "--link", "tcp", "--world", "world.toml",
-                   "--camera-port", "0", "--json"]  # fmt: skip
-        with subprocess.Popen(command, cwd=self.root, stdout=subprocess.PIPE, text=True) as process:
-            try:
-                where = _document(process)
-                yield ("--port", where["device"], "--camera", where["camera"])
-            finally:
-                process.terminate()
+        with virtual_robot(self.root) as options:
+            yield tuple(chain.from_iterable(options.items()))
 
     def execute(self, iteration: int, policies: tuple[str, ...]) -> None:
         """Executed, estimated, without its pictures."""
@@ -221,19 +217,6 @@ def without_pictures(path: Path) -> None:
     )
     made = header.provenance.model_copy(update={"migrations": (*header.provenance.migrations, note)})
     write_artifact(path, ArtifactData(data.kind, groups), made)
-
-
-def _document(process: subprocess.Popen[str]) -> dict[str, str]:
-    """The JSON document that the rig prints before it waits."""
-    text = ""
-    for line in process.stdout or ():
-        text += line
-        try:
-            found: dict[str, str] = json.loads(text)
-        except ValueError:
-            continue
-        return found
-    raise SystemExit("the rig did not start")
 
 
 if __name__ == "__main__":

@@ -64,8 +64,8 @@ def find_closed(task: Task) -> Found:
 def closed_predictor(task: Task) -> Predictor:
     """The engine with the free numbers of a request; where it names none, those of the loop as well."""
     default = (*default_free(task.robot, busy(task.robot, task.runs, task.request)), *OF_THE_LOOP)
-    specs = specs_asked(task.robot, task.request, task.settings, default)
-    return task.predictor(select(specs, task.robot, task.request.effects))
+    specs = specs_asked(task.request, task.settings, default)
+    return task.predictor(select(specs, task.robot, task.request.effects, task.request.fixed))
 
 
 def closed_problem(task: Task, predictor: Predictor | None = None) -> ClosedResiduals:

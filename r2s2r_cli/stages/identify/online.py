@@ -109,8 +109,8 @@ def first_free(task: Task) -> tuple[Free, ...]:
     before = task.request.before
     if before is None:
         return free_parameters(task.robot, task.runs, task.request, task.settings)
-    specs = specs_asked(task.robot, task.request, task.settings, tuple(specs_of(before).values()))
-    return select(specs, task.robot, task.request.effects)
+    specs = specs_asked(task.request, task.settings, tuple(specs_of(before).values()))
+    return select(specs, task.robot, task.request.effects, task.request.fixed)
 
 
 def specs_of(before: ArtifactData) -> dict[str, str]:

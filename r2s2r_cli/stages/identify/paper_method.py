@@ -41,9 +41,10 @@ def find_paper(task: Task) -> Found:
     from r2s2r_cli.stages.model import structure_of
 
     request, recipe, settings = task.request, task.recipe, task.settings
-    specs = specs_asked(task.robot, request, settings, PAPER_FREE)
+    specs = specs_asked(request, settings, PAPER_FREE)
     made = preset(
-        task.robot, select(specs, task.robot, request.effects), effects=request.effects, fixed=dict(request.fixed),
+        task.robot, select(specs, task.robot, request.effects, request.fixed),
+        effects=request.effects, fixed=dict(request.fixed),
         structure=replace(structure_of(task.robot), rod_contact=settings.rod_contact), step=recipe.step,
         cache_dir=task.cache_dir,
     )  # fmt: skip

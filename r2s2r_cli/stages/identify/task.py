@@ -14,7 +14,6 @@ from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.found import ParameterFound
 from r2s2r_cli.stages.identify.free import Free, Mapping, select
 from r2s2r_cli.stages.identify.free.extend import PLUS, extended, name_of
-from r2s2r_cli.stages.identify.free.select import without_fixed
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe, default_fixed, default_free, recipe_of
 from r2s2r_cli.stages.identify.request import Checkpoint, Progress, Request, silent
@@ -135,22 +134,19 @@ def free_parameters(
     robot: Robot, runs: Sequence[RunData], request: Request, settings: IdentifySettings
 ) -> tuple[Free, ...]:
     """Of --free, else of the settings, else the default set."""
-    return select(
-        specs_asked(robot, request, settings, default_free(robot, busy(robot, runs, request))), robot, request.effects
-    )
+    specs = specs_asked(request, settings, default_free(robot, busy(robot, runs, request)))
+    return select(specs, robot, request.effects, request.fixed)
 
 
-def specs_asked(robot: Robot, request: Request, settings: IdentifySettings, default: Sequence[str]) -> tuple[str, ...]:
+def specs_asked(request: Request, settings: IdentifySettings, default: Sequence[str]) -> tuple[str, ...]:
     """What is free, as after --free: of the request, else of the settings, else the default; where nothing was named
-    on the command line, without what is fixed there, and never an element that is fixed of a family that is free.
-    Numbers of the request's effects are free beside them, but for families of which one is named and for what is fixed.
-    Raises UsageError for a spec that cannot be read."""
+    on the command line, without what is fixed there. Numbers of the request's effects are free beside them, but for
+    families of which one is named and for what is fixed. Raises UsageError for a spec that cannot be read."""
     own = tuple(spec for spec in extended(settings.free, default) if name_of(spec) not in request.fixed)
     specs = extended(request.free, own)
     named = {_family(name_of(spec)) for spec in specs}
-    beside = (spec for spec in request.of_effects if _family(name_of(spec)) not in named)
-    others = (spec for spec in beside if name_of(spec) not in request.fixed)
-    return without_fixed((*specs, *others), robot, request.fixed)
+    beside = (spec for spec in request.of_effects if name_of(spec) not in request.fixed)
+    return (*specs, *(spec for spec in beside if _family(name_of(spec)) not in named))
 
 
 def _family(name: str) -> str:

@@ -18,7 +18,6 @@ from r2s2r_cli.stages.plan.groups import (
     primitives_group,
     symmetry_groups,
 )
-from r2s2r_cli.stages.plan.placement import wrapped
 from r2s2r_cli.stages.plan.robust import Primitive
 from r2s2r_cli.stages.plan.runs import played, policy_file, run_groups
 from r2s2r_cli.stages.plan.ways import Way
@@ -100,9 +99,9 @@ def _warnings(
                         "the camera may lose the robot")  # fmt: skip
         if one.goal is None:
             continue
-        x, y, turned = one.reached.mean(axis=0)
-        missed, turn = math.dist((x, y), one.goal.xy), abs(float(wrapped(turned - one.goal.heading)))
-        if missed > one.goal.within_m or turn > one.goal.within_rad:
+        mean = one.reached.mean(axis=0)
+        if not one.goal.reached(mean[:2], mean[2]):
+            missed, turn = map(float, one.goal.left(mean[:2], mean[2]))
             off = f"{missed:.2f} m and {math.degrees(turn):.0f} deg"
             said.append(f"{one.name}: simulated whole, it ends {off} from the goal")
     return said

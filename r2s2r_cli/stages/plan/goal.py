@@ -23,7 +23,6 @@ NODES = 12_000
 """Poses that are looked at."""
 NEARLY = 4.0
 """A way that misses the goal by so much (`Goal.miss`; 2 is the corner of what is near enough) is better than none."""
-
 ON_PAPER = 0.5
 """Share of what is near enough that is asked of a way on paper: the robot ends elsewhere than on paper."""
 
@@ -40,17 +39,17 @@ class Goal:
 
     def miss(self, paths: Paths) -> np.ndarray:
         """How far paths end from it, 1 each at the edge of what is near enough in place and in heading, (B,)."""
-        far, turn = self.left(paths)
+        far, turn = self.left(paths.xy[:, -1], paths.heading[:, -1])
         return np.asarray(far / self.within_m + turn / self.within_rad)
 
-    def left(self, paths: Paths) -> tuple[np.ndarray, np.ndarray]:
-        """How far paths end from it [m], and how much is left to turn [rad], each (B,)."""
-        far = np.linalg.norm(paths.xy[:, -1] - np.array(self.xy), axis=1)
-        return far, np.abs(wrapped(paths.heading[:, -1] - self.heading))
+    def left(self, xy: np.ndarray, heading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far it is from places (..., 2) [m], and how much is left to turn from headings (...) [rad]."""
+        far = np.linalg.norm(xy - np.array(self.xy), axis=-1)
+        return far, np.abs(wrapped(heading - self.heading))
 
-    def reached(self, paths: Paths) -> np.ndarray:
-        """Which paths end near enough, (B,)."""
-        far, turn = self.left(paths)
+    def reached(self, xy: np.ndarray, heading: np.ndarray) -> np.ndarray:
+        """Which of these places and headings are near enough, (...)."""
+        far, turn = self.left(xy, heading)
         return np.asarray((far <= self.within_m) & (turn <= self.within_rad))
 
 
@@ -60,7 +59,7 @@ def way_near(moves: Moves, goal: Goal) -> Paths:
     path = None
     with suppress(NumericalError):
         path = way_to(moves, replace(goal, within_m=ON_PAPER * goal.within_m, within_rad=ON_PAPER * goal.within_rad))
-        if goal.reached(path)[0]:
+        if goal.reached(path.xy[0, -1], path.heading[0, -1]):
             return path
     other = way_to(moves, goal)
     return other if path is None else min(path, other, key=lambda one: float(goal.miss(one)[0]))
@@ -79,7 +78,7 @@ def way_to(moves: Moves, goal: Goal) -> Paths:
     rate = float((turn_by / moves.duration).max()) or math.inf
 
     def time_left(paths: Paths) -> np.ndarray:
-        far, turn = goal.left(paths)
+        far, turn = goal.left(paths.xy[:, -1], paths.heading[:, -1])
         time = np.maximum(np.maximum(far - goal.within_m, 0) / speed, np.maximum(turn - goal.within_rad, 0) / rate)
         return np.asarray(time)
 
@@ -94,7 +93,7 @@ def way_to(moves: Moves, goal: Goal) -> Paths:
         if key in done:
             continue
         done.add(key)
-        if goal.reached(paths)[0]:
+        if goal.reached(paths.xy[0, -1], paths.heading[0, -1]):
             return paths
         best = min(best, (float(goal.miss(paths)[0]), paths), key=lambda pair: pair[0])
         after = extended(moves, paths)

@@ -62,9 +62,11 @@ def ways(
         best = partial(best_sequences, length=settings.cycles, value=value, reach=MARGIN * request.reach)
         tried += [(name, path) for path in different_sequences(moves, best, SEQUENCES)]
     for name, goal in request.goals.items():
-        way_near(moves, goal)  # raises where there is none at all
         values[name] = partial(_near, goal)
-        tried += [(name, path) for path in different_sequences(moves, partial(_way_or_none, goal), SEQUENCES)]
+        found = different_sequences(moves, partial(_way_or_none, goal), SEQUENCES)
+        if not found:
+            way_near(moves, goal)  # raises where there is none at all
+        tried += [(name, path) for path in found]
     longest = max((path.picks.shape[1] for _, path in tried), default=0)
 
     def walked_along(paths: list[tuple[str, Paths]], start: Standing, *, smooth: bool, part: str) -> list[Walk]:

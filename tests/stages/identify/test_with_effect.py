@@ -74,7 +74,7 @@ def test_numbers_that_are_named_or_fixed_stay_as_they_are_asked_for() -> None:
         TRAIN, free=("friction", "motor_lag.tau_s=0.1"), fixed={"payload.place_m.0": 0.1}, effects=asked.ids,
         of_effects=asked.specs,
     )  # fmt: skip
-    specs = specs_asked(threebar(), request, IdentifySettings(), ("mass",))
+    specs = specs_asked(request, IdentifySettings(), ("mass",))
     assert specs == ("friction", "motor_lag.tau_s=0.1", "payload.mass_kg.0")
 
 
@@ -85,7 +85,7 @@ def test_elements_that_are_fixed_leave_the_others_of_their_family_free(free: tup
     asked = effects_asked(["motor_speed_mismatch"], threebar())
     still = {f"motor_speed_mismatch.factor.{k}": 1.0 for k in (2, 5)}
     request = Request(TRAIN, free=free, fixed=still, effects=asked.ids, of_effects=asked.specs)
-    frees = select(specs_asked(threebar(), request, IdentifySettings(), ("mass",)), threebar(), asked.ids)
+    frees = select(specs_asked(request, IdentifySettings(), ("mass",)), threebar(), asked.ids, still)
     found = {one.name: one for one in frees if one.name.startswith("motor_speed_mismatch")}
     assert list(found) == [f"motor_speed_mismatch.factor.{k}" for k in (0, 1, 3, 4)]
     assert all(one.prior_sd == 0.2 for one in found.values()) == ("~0.2" in " ".join(free))

@@ -143,7 +143,8 @@ def test_a_way_aims_nearer_than_what_is_near_enough() -> None:
     assert way_to(simple((0.09, 0.0, 0.0)), goal).picks.shape[1] == 1
     assert way_near(simple((0.09, 0.0, 0.0)), goal).picks.shape[1] == 2
     path = way_near(simple((0.12, 0.0, 0.0)), goal)
-    assert np.allclose(goal.left(path)[0], 0.06) and goal.reached(path).all()
+    end = path.xy[:, -1], path.heading[:, -1]
+    assert np.allclose(goal.left(*end)[0], 0.06) and goal.reached(*end).all()
     with pytest.raises(NumericalError, match="no sequence"):
         way_near(simple((0.0, 0.0, 0.1)), Goal((1.0, 0.0), 0.0))
 

@@ -35,8 +35,10 @@ class Spec:
     prior_sd: float | None = None
 
 
-def select(specs: Sequence[str], robot: Robot, effects: tuple[str, ...] = ()) -> tuple[Free, ...]:
-    """The free numbers that the specs ask for, in their order.
+def select(
+    specs: Sequence[str], robot: Robot, effects: tuple[str, ...] = (), fixed: Collection[str] = ()
+) -> tuple[Free, ...]:
+    """The free numbers that the specs ask for, in their order; FAMILY.* without the elements that are fixed.
 
     Raises UsageError for a spec that cannot be read, an unknown name, a name twice, or two that set the same number
     (motor_speed and motor_speed.2: no number is a factor on another); InputError for bounds that contradict each
@@ -48,25 +50,14 @@ def select(specs: Sequence[str], robot: Robot, effects: tuple[str, ...] = ()) ->
     for text in specs:
         spec = parse(text)
         for name in _names(spec.name, tuple(known)):
+            if name != spec.name and name in fixed:
+                continue
             if name in found:
                 raise UsageError(f"{name} is asked for twice", where="--free", expected="each once", received=text,
                                  hint=f"r2s2r identify --free {name}")  # fmt: skip
             found[name] = _with(known[name].free, spec, text)
     require_apart([known[name] for name in found])
     return tuple(found.values())
-
-
-def without_fixed(specs: Sequence[str], robot: Robot, fixed: Collection[str]) -> tuple[str, ...]:
-    """The specs, those of FAMILY.* without the elements that are fixed: all others are free, each as was asked for.
-    Raises UsageError as `select`."""
-    known = tuple(entries(robot))
-    found: list[str] = []
-    for text in specs:
-        name = parse(text).name
-        elements = _names(name, known) if name.endswith(".*") else []
-        others = [text.replace(name, one, 1) for one in elements if one not in fixed]
-        found += others if len(others) < len(elements) else [text]
-    return tuple(found)
 
 
 def parse(text: str) -> Spec:

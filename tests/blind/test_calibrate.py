@@ -165,3 +165,18 @@ def test_too_few_sets_teach_nothing() -> None:
     """Eleven are refused."""
     with pytest.raises(InputError, match="too few"):
         calibrated(planted(11), words="test")
+
+
+def test_what_only_strangers_leave_is_learned() -> None:
+    """Half-way between the most that any other set leaves and the least beyond, with the odds of as many strangers;
+    nothing where a set that the catalogue explains leaves the most."""
+    sets = [replace(one, left_sd=min(0.1 * k, 3.0)) for k, one in enumerate(planted(60))]
+    sets[7] = replace(sets[7], truth="unknown", left_sd=5.0)
+    sets[8] = replace(sets[8], truth="unknown", left_sd=4.0)
+    sets[9] = replace(sets[9], truth="payload", left_sd=3.0)
+    found = calibrated(sets, words="test")
+    assert found["unfit"] == pytest.approx(3.5)
+    assert found["unfit_share"] == pytest.approx(0.75)
+    assert Calibration(**{key: found[key] for key in ("unfit", "unfit_share")}).refuses(3.6)
+    sets[9] = replace(sets[9], left_sd=6.0)
+    assert "unfit" not in calibrated(sets, words="test")

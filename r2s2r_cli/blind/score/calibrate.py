@@ -86,6 +86,7 @@ class Case:
     truth: str
     gap: float = 0.0
     left: float = 0.0
+    left_sd: float = 0.0
 
 
 def case(truth: Truth, document: dict[str, Any]) -> Case | None:
@@ -108,7 +109,8 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
     ])  # fmt: skip
     gap, left = (max(float(document.get(key) or 0.0), 0.0) for key in ("gap_nats", "left_nats"))
     names = tuple(row["effect"] for row in rows)
-    return Case(names, score, parity, marginal, equivalent, truth.right, gap, left)
+    left_sd = left / float(document.get("left_sd_nats") or np.inf)
+    return Case(names, score, parity, marginal, equivalent, truth.right, gap, left, left_sd)
 
 
 def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
@@ -157,6 +159,7 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
             key: _commit(sure[of], right[of], wanted)
             for (key, wanted), of in zip(PRECISION.items(), _claims(first, apart), strict=True)
         },
+        **_unfit(cases),
         "conformal": float(held[k - 1]) if k else 0.0,
         "lapse": LAPSE,
         "words": words,
@@ -166,6 +169,14 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
             "log_loss": float(np.mean([-np.log(max(p.get(one.truth, 0.0), 1e-6)) for one, p in apart])),
         },
     }
+
+
+def _unfit(cases: Sequence[Case]) -> dict[str, float]:
+    """What the best effect leaves [sd] in strangers alone, half-way between the most that it leaves in any other set
+    and the least beyond, and how probable a stranger is there (Laplace's rule of succession); empty for none."""
+    most = max((one.left_sd for one in cases if one.truth != UNKNOWN), default=0.0)
+    beyond = [one.left_sd for one in cases if one.truth == UNKNOWN and one.left_sd > most]
+    return {"unfit": (most + min(beyond)) / 2, "unfit_share": (len(beyond) + 1) / (len(beyond) + 2)} if beyond else {}
 
 
 def _design(one: Case, effects: Sequence[str], known: np.ndarray) -> np.ndarray:

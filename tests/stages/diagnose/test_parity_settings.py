@@ -139,3 +139,32 @@ def test_a_single_motor_that_stands_is_named() -> None:
 
     assert found(0.0, 0.0) == ["motor 3 does not turn at full command, either way"]
     assert found(1.0, 0.0) == found(0.2, 0.2) == found(1.0, 1.0) == []
+
+
+def _turned(u: np.ndarray, h: float) -> np.ndarray:
+    return np.asarray(np.cumsum(SPEED * h * u, axis=0))
+
+
+def test_commands_of_another_run_are_named() -> None:
+    """The log of one run with the commands of another: the winches turn, and no order, sign or delay makes them follow.
+    Late by 0.3 s they still follow: that is for the diagnosis to name."""
+    runs = [wound(f"g{k}", k, _turned) for k in range(2)]
+    others = [wound(f"g{k}", 40 + k, _turned) for k in range(2)]
+    swapped = [with_caps(a, control=np.roll(b.caps.control, 70, axis=0)) for a, b in zip(runs, others, strict=True)]
+    (found,) = mismatches(swapped, threebar(), SPEED)[0]
+    assert found.kind == "commands"
+    assert "not when the commands say so" in found.what
+    late = [with_caps(one, control=np.roll(one.caps.control, -15, axis=0)) for one in runs]
+    assert mismatches(late, threebar(), SPEED)[0] == []
+    deaf = [replace(one, lengths=None) for one in swapped]
+    settings, missing = mismatches(deaf, threebar(), SPEED)
+    assert not any(one.kind == "commands" for one in settings)
+    assert any("commands belong to the motion" in one for one in missing)
+
+
+def test_exchanged_commands_of_winches_that_stand_are_no_mismatch() -> None:
+    """Nothing follows commands where no winch turns, whosever they are: a dead zone is for the diagnosis to name."""
+    still = [wound(f"g{k}", k, lambda u, h: np.zeros_like(u)) for k in range(2)]
+    assert mismatches(still, threebar(), SPEED)[0] == []
+    swapped = [with_caps(one, control=np.roll(one.caps.control, 70, axis=0)) for one in still]
+    assert mismatches(swapped, threebar(), SPEED)[0] == []

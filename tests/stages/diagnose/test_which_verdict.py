@@ -12,6 +12,7 @@ from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.found import Ranked
+from r2s2r_cli.stages.diagnose.which.left import Left
 from r2s2r_cli.stages.diagnose.which.pair_share import LEAST, SHARE, TwoCauses, with_pairs
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score
@@ -45,6 +46,30 @@ def test_no_gap_is_a_claim_about_size() -> None:
     assert verdict_of(ranking("payload", 0.51, 30.0), BY, None, CHANCE, NO_GAP) == ("ambiguous", (), 0.51)
     assert verdict_of(ranking("payload", 0.7, 30.0), BY, None, CHANCE, NO_GAP)[0] == "effect"
     assert verdict_of(ranking("sensor_bias", 0.7, CHANCE), BY, None, CHANCE, NO_GAP)[0] == "no_gap"
+
+
+def test_no_name_where_the_best_effect_leaves_too_much() -> None:
+    """An effect that gains most and is far the likeliest is not named where what it leaves stands out from the healthy
+    runs, as it did in strangers only; without healthy runs nobody knows what may be left."""
+    by = replace(BY, temperature=5.0, unfit=4.4, unfit_share=0.75)
+    worth = {"payload": 100.0, "backlash": 10.0, "none": 0.0, "unknown": 0.0}
+    usual, beyond = by.probabilities(worth, left_sd=4.3), by.probabilities(worth, left_sd=4.5)
+    assert usual == by.probabilities(worth)
+    assert sum(beyond.values()) == pytest.approx(1.0)
+    assert beyond["unknown"] == pytest.approx(0.75 + 0.25 * usual["unknown"])
+    assert beyond["payload"] == pytest.approx(0.25 * usual["payload"])
+    likely = [Ranked("unknown", 0.0, by.unfit_share), Ranked("payload", 100.0, 0.2)]
+    strict = replace(by, commit_unknown=0.95)
+    assert verdict_of(likely, strict, None, CHANCE, NO_GAP, left_sd=4.5) == ("unknown", (), 0.75)
+    assert verdict_of(likely, strict, None, CHANCE, GAP, left_sd=4.3)[0] == "ambiguous"
+    assert by.absolute().probabilities(worth, left_sd=99.0) == by.absolute().probabilities(worth)
+    assert not by.absolute().refuses(99.0)
+
+
+def test_what_is_left_is_told_in_its_sd() -> None:
+    """0 where nothing is known of how healthy pieces differ."""
+    assert Left(50.0, 30.0, 10.0).beyond == 3.0
+    assert Left(50.0, 30.0, float("nan")).beyond == 0.0
 
 
 def test_a_stranger_competes_with_what_it_looks_like() -> None:

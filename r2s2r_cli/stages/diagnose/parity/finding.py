@@ -81,7 +81,8 @@ class Finding:
 @dataclass(frozen=True)
 class Mismatch:
     """A setting that contradicts the data, so that no effect can be told before it is set right. kind: sign | order |
-    unit | rate | gain | robot | motor. what: plainly; expected, received; hint: one line that can be pasted."""
+    unit | rate | gain | robot | motor | commands. what: plainly; expected, received; hint: one line that can be
+    pasted."""
 
     kind: str
     what: str

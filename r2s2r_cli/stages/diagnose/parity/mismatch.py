@@ -1,4 +1,5 @@
-"""Settings that contradict the data, named before any physics: units, order of caps and cables, signs, rate, gain."""
+"""Settings that contradict the data, named before any physics: units, order of caps and cables, signs, commands of
+another run, rate, gain."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Run
 from r2s2r_cli.stages.diagnose.parity.finding import Mismatch
+from r2s2r_cli.stages.diagnose.parity.mismatch_commands import of_another_run
 from r2s2r_cli.stages.diagnose.parity.mismatch_drive import order_of_motors, rate, signs, standing
 from r2s2r_cli.stages.diagnose.parity.mismatch_order import order_of_caps, order_of_sensors
 from r2s2r_cli.stages.diagnose.parity.series import Series, series
@@ -39,7 +41,7 @@ def _in_stages(runs: Sequence[Run], robot: Robot, speed: float) -> tuple[list[Mi
     many = tuple(series(run, robot) for run in runs)
     missing: list[str] = []
     stages: tuple[Callable[[Sequence[Series], Robot, float, list[str]], list[Mismatch]], ...] = (
-        _units, order_of_caps, order_of_sensors, order_of_motors, signs, standing, rate,
+        _units, order_of_caps, order_of_sensors, order_of_motors, signs, of_another_run, standing, rate,
     )  # fmt: skip
     for stage in stages:
         found = stage(many, robot, speed, missing)

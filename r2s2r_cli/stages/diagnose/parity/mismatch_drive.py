@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.parity.finding import Mismatch
+from r2s2r_cli.stages.diagnose.parity.mismatch_commands import FOLLOWS
 from r2s2r_cli.stages.diagnose.parity.mismatch_words import LEAST_ROWS, columns, listed
+from r2s2r_cli.stages.diagnose.parity.responses import readings, responses
 from r2s2r_cli.stages.diagnose.parity.series import GAP_S, Series
 from r2s2r_cli.stages.identify.commands import CommandLog
 from schemas.robot import Robot
@@ -29,16 +31,18 @@ TURNS = 0.3
 def order_of_motors(runs: Sequence[Series], robot: Robot, speed: float, missing: list[str]) -> list[Mismatch]:
     """Exchanged motors: the command of one moves the cable of another."""
     del speed
-    response = _responses(runs, robot)
+    response = responses(runs, robot)
     if response is None:
         missing.append("order and sign of the motors: too few commands")
         return []
     from scipy.optimize import linear_sum_assignment
 
-    size = np.abs(response)
+    size = np.abs(response.correlation)
     row, column = linear_sum_assignment(-size)
     moved = [k for k in range(len(row)) if column[k] != k]
     if not moved or np.mean([size[k, column[k]] - size[k, k] for k in moved]) < CLEARER:
+        return []
+    if size[row, column].mean() < FOLLOWS:  # no order makes the cables follow
         return []
     order = {robot.actuated[k]: robot.actuated[int(column[k])] for k in moved}
     return [columns("motors", order, "the rates of the cables")]
@@ -47,10 +51,10 @@ def order_of_motors(runs: Sequence[Series], robot: Robot, speed: float, missing:
 def signs(runs: Sequence[Series], robot: Robot, speed: float, missing: list[str]) -> list[Mismatch]:
     """Motors that lengthen their cable where the log says that they shorten it."""
     del speed, missing
-    response = _responses(runs, robot)
+    response = responses(runs, robot)
     if response is None:
         return []
-    own = np.diag(response)
+    own = np.diag(response.correlation)
     every = bool(np.median(own) < -SURE)
     wrong = [robot.actuated[k] for k in range(len(own)) if every or own[k] < -SURE]
     if not wrong:
@@ -105,7 +109,7 @@ def _full_rates(runs: Sequence[Series], robot: Robot) -> dict[int, dict[float, f
     for k, cable in enumerate(robot.actuated):
         moved, took, rows = dict.fromkeys(WAYS, 0.0), dict.fromkeys(WAYS, 0.0), dict.fromkeys(WAYS, 0)
         for one, log in logs:
-            t, length = _readings(one, cable)
+            t, length = readings(one, cable)
             u, past = log.at(t)[:, k], np.diff(t)
             for way in WAYS:
                 inside = way * u > 0.9
@@ -117,36 +121,3 @@ def _full_rates(runs: Sequence[Series], robot: Robot) -> dict[int, dict[float, f
         if own:
             found[k] = own
     return found
-
-
-def _readings(one: Series, cable: int) -> tuple[np.ndarray, np.ndarray]:
-    """Times of the readings of a cable and what they were [m], (row,): of its sensor, else of the caps. Each sensor has
-    times of its own: boards of wireless robots take turns, so a row of the log has the cables of one board."""
-    t, length = one.heard if one.has_sensors else (one.t, one.seen)
-    good = np.isfinite(length[:, cable])
-    return t[good], length[good, cable]
-
-
-def _responses(runs: Sequence[Series], robot: Robot) -> np.ndarray | None:
-    """Correlation about zero of every command with the shortening of every winched cable, (cable, command)."""
-    n = len(robot.actuated)
-    products, u2, v2 = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
-    rows = np.zeros(n, dtype=int)
-    for one in runs:
-        log = CommandLog(one.run.caps)
-        for i, cable in enumerate(robot.actuated):
-            t, length = _readings(one, cable)
-            span = max(1, round(0.1 / max(float(np.median(np.diff(t))), 1e-3))) if len(t) > 2 else 1
-            if len(t) <= span + LEAST_ROWS:
-                continue
-            past = t[span:] - t[:-span]
-            whole = past > 0
-            v = -(length[span:] - length[:-span])[whole] / past[whole]
-            u = log.at(((t[span:] + t[:-span]) / 2)[whole])
-            products[i] += v @ u
-            u2[i] += (u**2).sum(axis=0)
-            v2[i] += v @ v
-            rows[i] += len(v)
-    if rows.min() < LEAST_ROWS or not (u2 > 0).all():
-        return None
-    return np.asarray(products / np.sqrt(np.maximum(u2 * v2[:, None], 1e-30)))

@@ -34,6 +34,8 @@ class Calibration:
     wider floor gains beside it, and of every nat that it leaves; unknown [nats]: what that must exceed. bias [nats]:
     of a name, what its gains are short of.
     commit, commit_unknown: probability from which an effect or `unknown` is the verdict.
+    unfit: how far beyond those of healthy runs pieces may lie under the best effect of each [sd]: farther, no effect of
+    the catalogue is enough, and `unknown` has at least unfit_share.
     conformal: names whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many
     it rests on, 0 for the defaults. lapse: how often the evidence says nothing of the truth, so that no name is ever
     certain.
@@ -58,6 +60,8 @@ class Calibration:
     beside: float = 0.0
     commit: float = 0.5
     commit_unknown: float = 0.5
+    unfit: float = float("inf")
+    unfit_share: float = 0.0
     conformal: float = 0.05
     lapse: float = 0.0
     bias: Mapping[str, float] = field(default_factory=dict)
@@ -87,19 +91,26 @@ class Calibration:
     def absolute(self) -> Calibration:
         """For a diagnosis without healthy runs."""
         words = f"{self.words}; those had healthy runs, here are none: findings of the parity stage count for less"
-        return replace(self, parity=ABSOLUTE * self.parity, words=words)
+        return replace(self, parity=ABSOLUTE * self.parity, unfit=float("inf"), words=words)
+
+    def refuses(self, left_sd: float) -> bool:
+        """Whether what the best effect leaves [sd of healthy pieces] is too much for any effect of the catalogue."""
+        return left_sd > self.unfit
 
     def commits(self, name: str, probability: float) -> bool:
         """Whether a first guess of this probability is a verdict."""
         return probability >= (self.commit_unknown if name == UNKNOWN else self.commit)
 
-    def probabilities(self, scores: Mapping[str, float]) -> dict[str, float]:
-        """Softmax of scores [nats] by name; a share `lapse` of it goes to all names alike."""
+    def probabilities(self, scores: Mapping[str, float], *, left_sd: float = 0.0) -> dict[str, float]:
+        """Softmax of scores [nats] by name; a share `lapse` of it goes to all names alike, and `unfit_share` to
+        `unknown` where the catalogue does not fit. left_sd: what the best effect leaves [sd of healthy pieces]."""
         names = list(scores)
         x = np.array([scores[name] + self.bias.get(name, 0.0) for name in names]) / self.temperature
         x = np.where(np.isfinite(x), x, -1e9)
         p = np.exp(x - x.max())
         p = (1.0 - self.lapse) * p / p.sum() + self.lapse / len(p)
+        if self.refuses(left_sd):
+            p = (1.0 - self.unfit_share) * p + self.unfit_share * np.array([name == UNKNOWN for name in names])
         return dict(zip(names, p.tolist(), strict=True))
 
     def within(self, probabilities: Mapping[str, float]) -> tuple[str, ...]:

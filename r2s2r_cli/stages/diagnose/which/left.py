@@ -21,17 +21,24 @@ from r2s2r_cli.stages.diagnose.which.score import Score
 
 PIECE = 10.0
 """[nats]"""
+PIECE_SD = 1.0
+"""[nats] Two healthy pieces that happen to cost alike say no more than that."""
 
 
 @dataclass(frozen=True)
 class Left:
     """Nats that the pieces cost beyond what as many of the healthy runs do. refit: under the refit nominal model; best:
-    each under the hypothesis that predicts it best. sd: of both, from how much pieces differ; nan for fewer than two
-    pieces."""
+    each under the hypothesis that predicts it best. sd: of both, from how much pieces differ, PIECE_SD a piece at
+    least; nan for fewer than two pieces."""
 
     refit: float
     best: float
     sd: float
+
+    @property
+    def beyond(self) -> float:
+        """What is left under the best hypotheses in its sd; 0 where nothing is known of that."""
+        return self.best / self.sd if self.sd > 0 else 0.0
 
 
 def expected(arena: Arena) -> np.ndarray:
@@ -56,6 +63,7 @@ def left(
     if healthy is not None:
         usually = float(then.mean())
         sd = count * float(np.std(then, ddof=1)) * np.sqrt(1 / count + 1 / len(then)) if len(then) > 1 else float("nan")
+    sd = max(sd, PIECE_SD * np.sqrt(count)) if np.isfinite(sd) else sd
     return Left(float(own.sum()) - count * usually, float(best.sum()) - count * usually, float(sd))
 
 

@@ -48,7 +48,8 @@ def concluded(m: Material) -> Which:
     table[NONE] = calibration.score(NONE, m.chance, equivalent=m.no_gap.equivalent, beyond=m.left.refit)
     table[UNKNOWN] = calibration.score(UNKNOWN, m.unexplained, beyond=m.left.best, best=best_replayed(table))
     both = [_two(m, i, best, gains) for i in order if len(m.fits[i].hypothesis.parts) == 2]
-    probability, pair = with_pairs(calibration.probabilities(table), both, names, m.chance, calibration.temperature)
+    alone = calibration.probabilities(table, left_sd=m.left.beyond)
+    probability, pair = with_pairs(alone, both, names, m.chance, calibration.temperature)
     sds = gain_sds(m.refit, m.scores, m.groups).tolist() if m.scores else []
     ranking = [
         replace(
@@ -67,7 +68,7 @@ def concluded(m: Material) -> Which:
     shown = _shown(m.responses)
     ranking = [replace(one, seen=shown.get(one.effect, np.nan)) for one in ranking]
     ranking.sort(key=lambda one: (-one.probability, -one.gain))
-    verdict, effects, p = verdict_of(ranking, calibration, pair, m.chance, m.no_gap)
+    verdict, effects, p = verdict_of(ranking, calibration, pair, m.chance, m.no_gap, left_sd=m.left.beyond)
     top = best.get(effects[0]) if effects else None
     return Which(
         verdict=verdict, effects=effects, probability=p, set90=calibration.within(probability), ranking=tuple(ranking),
@@ -124,11 +125,14 @@ def _channel(name: str) -> str:
 
 
 def verdict_of(
-    ranking: list[Ranked], calibration: Calibration, pair: tuple[str, ...] | None, chance: float, gap: NoGap
-) -> tuple[str, tuple[str, ...], float]:
-    """What the first of the ranking is worth. A cause predicts: an effect that gains no more in the replay than the
-    best of the catalogue does by chance is not named, whatever the parity stage says. Where no cause is named, that
-    there is no gap is a claim about its size (design.md, Measures), not about causes that hide below the floor."""
+    ranking: list[Ranked], calibration: Calibration, pair: tuple[str, ...] | None, chance: float, gap: NoGap,
+    *, left_sd: float = 0.0,
+) -> tuple[str, tuple[str, ...], float]:  # fmt: skip
+    """What the first of the ranking is worth. Where the best effect leaves too much (left_sd, `Calibration.refuses`)
+    that is a verdict of its own: no effect of the catalogue is enough. A cause predicts: an effect that gains no more
+    in the replay than the best of the catalogue does by chance is not named, whatever parity says. Where no
+    cause is named, that there is no gap is a claim about its size (design.md, Measures), not about causes that hide
+    below the floor."""
     first = ranking[0]
     predicts = first.gain > chance or first.effect in (NONE, UNKNOWN, *NO_REPLAY)
     if pair is not None and first.effect in pair:
@@ -136,6 +140,8 @@ def verdict_of(
         p = sum(one.probability for one in ranking if one.effect in pair)
         if calibration.commits(first.effect, p):
             return "pair", pair, p
+    if first.effect == UNKNOWN and calibration.refuses(left_sd):
+        return "unknown", (), first.probability
     if not (predicts and first.effect != NONE and calibration.commits(first.effect, first.probability)):
         likely = predicts and first.effect not in (NONE, UNKNOWN) and first.probability >= LIKELY
         if gap.equivalent and not likely:

@@ -10,6 +10,7 @@ import typer
 
 from r2s2r_cli.commands.blind_follow import follow
 from r2s2r_cli.commands.blind_score import calibrate, publish, score
+from r2s2r_cli.commands.blind_worth import worth
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.options import JsonOption, QuietOption
@@ -181,6 +182,7 @@ blind_app.command("follow")(follow)
 blind_app.command("score")(score)
 blind_app.command("publish")(publish)
 blind_app.command("calibrate")(calibrate)
+blind_app.command("worth")(worth)
 
 
 def _check_first(first: int, count: int, bank: BankName, console: Console) -> None:

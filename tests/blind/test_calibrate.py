@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from r2s2r_cli.blind.score.calibrate import Case, calibrated, case
+from r2s2r_cli.blind.score.calibrate import calibrated
+from r2s2r_cli.blind.score.cases import Case, case
 from r2s2r_cli.blind.score.facts import truth_of
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration

@@ -1,5 +1,5 @@
-"""`blind score`, `publish` and `calibrate`: open the labels, check what was committed to, and say how good the verdicts
-were.
+"""`blind score`, `publish`, `calibrate`, `worth`: open the labels, check what was committed to, and say how good the
+verdicts were.
 
 Nothing here diagnoses or simulates; only this is given the key, and a published file needs none.
 """
@@ -13,7 +13,8 @@ from typing import Any
 
 from r2s2r_cli.blind.code import code
 from r2s2r_cli.blind.score.again import same
-from r2s2r_cli.blind.score.calibrate import calibrated, case
+from r2s2r_cli.blind.score.calibrate import calibrated
+from r2s2r_cli.blind.score.cases import Case, case
 from r2s2r_cli.blind.score.facts import Said, Truth, said_of, truth_of
 from r2s2r_cli.blind.score.follow import resolved
 from r2s2r_cli.blind.score.pool import Pool, pooled
@@ -21,11 +22,13 @@ from r2s2r_cli.blind.score.published import published, read_published
 from r2s2r_cli.blind.score.rows import WITHOUT, row
 from r2s2r_cli.blind.score.shard import Judged, Shard, followed, opened
 from r2s2r_cli.blind.score.table import score_of
+from r2s2r_cli.blind.score.worth import worth
 from r2s2r_cli.blind.split import Bank
 from r2s2r_cli.errors import InputError
 from schemas.results_blind import BlindScoreResult
+from schemas.results_blind_worth import BlindWorthResult
 
-__all__ = ["calibration", "calibration_published", "publish", "score", "score_of", "score_published"]
+__all__ = ["calibration", "calibration_published", "publish", "score", "score_of", "score_published", "worth_published"]
 
 
 def score(
@@ -71,13 +74,39 @@ def calibration_published(files: Sequence[Path]) -> dict[str, Any]:
     return _calibration(pooled([read_published(path) for path in files]), ", ".join(map(str, files)))
 
 
-def _calibration(pool: Pool, where: str) -> dict[str, Any]:
+def worth_published(learned: Sequence[Path], judged: Sequence[Path]) -> BlindWorthResult:
+    """What each kind of evidence is worth on published files of the blind bank, learned on those of the calibration
+    bank. Raises InputError as `calibration_published` does, and where one bank would teach and judge."""
+    teaching, pool = (
+        pooled([read_published(path) for path in learned]),
+        pooled([read_published(path) for path in judged]),
+    )
+    _must_teach(teaching, ", ".join(map(str, learned)))
+    if pool.bank == Bank.CALIBRATION or pool.shuffled:
+        raise InputError("what teaches may not judge", where=", ".join(map(str, judged)), expected="the blind bank",
+                         received=f"{pool.bank}{', commands exchanged' * pool.shuffled}",
+                         hint="r2s2r blind worth docs/blind/blind-b-6.json.gz --learned FILE")  # fmt: skip
+    cases = [one for _, one in _cases(teaching)]
+    found = _cases(pool)
+    return BlindWorthResult(learned=len(cases), judged=len(found), rows=worth(cases, found), warnings=pool.warnings)
+
+
+def _must_teach(pool: Pool, where: str) -> None:
     if pool.bank != Bank.CALIBRATION or pool.shuffled:
         raise InputError("only a calibration bank may teach anything", where=where, expected="calibration",
                          received=f"{pool.bank}, commands exchanged" if pool.shuffled else pool.bank,
                          hint="r2s2r blind make --bank calibration --count 120 --key cal.key cal")  # fmt: skip
+
+
+def _cases(pool: Pool) -> list[tuple[Truth, Case]]:
     told = [(truth_of(one.label), one.verdict) for one in pool.sets if not one.verdict["failed"]]
-    cases = [one for one in (case(truth, verdict["diagnosis"]) for truth, verdict in told) if one is not None]
+    found = [(truth, case(truth, verdict["diagnosis"])) for truth, verdict in told]
+    return [(truth, one) for truth, one in found if one is not None]
+
+
+def _calibration(pool: Pool, where: str) -> dict[str, Any]:
+    _must_teach(pool, where)
+    cases = [one for _, one in _cases(pool)]
     banks = " + ".join(one.index_sha256[:12] for one in pool.shards)
     return calibrated(cases, words=f"{len(cases)} sets of the calibration bank {banks}")
 

@@ -21,7 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from r2s2r_cli.blind.score.facts import NO_GAP_FACTOR, NO_REPLAY, NONE, UNKNOWN, Truth
+from r2s2r_cli.blind.score.cases import BY_CHANCE, LUCK, LUCK_TIMES, MARGINAL_MOST, MOST, Case
+from r2s2r_cli.blind.score.facts import NO_REPLAY, NONE, UNKNOWN
 from r2s2r_cli.errors import InputError
 
 LEAST_SETS = 12
@@ -55,62 +56,47 @@ SHARPNESS = 1.0 / 15.0
 """The unit in which 1 / temperature is fitted [1/nats]."""
 USUAL = 8.0
 """[nats] About what the best of a catalogue gains where nothing is wrong."""
-BY_CHANCE = 4.0
-"""[nats] That the parity stage says for the best of a whole catalogue where nothing is wrong: less than that says
-nothing, and weighed like more it outdoes gains that are real."""
-
-LUCK, LUCK_TIMES = 10.0, 2.0
-"""What gains on left-out gaits count at most: so many nats and so many times what all data say. In a set with nothing
-wrong a cap's grip gained 75 nats left out and 9 in all: without a gait the refit model was led astray, not the effect
-right."""
-MARGINAL_MOST = 30.0
-"""[nats] of the marginal likelihood that count: beyond, an effect is there, and gains on left-out gaits say which."""
-MOST = 8.0
-"""[nats] beyond that which count: look-alikes share a finding, and 48 nats for one with 36 for the other, weighed
-several times, outvoted the replay, which tells them apart."""
+Apart = list[tuple[Case, dict[str, float]]]
+"""Sets with probabilities by numbers that other sets taught."""
 
 
 @dataclass(frozen=True)
-class Case:
-    """One set. names: what was ranked; score, parity, marginal (n,) [nats]: without the numbers that are learned,
-    parity beyond BY_CHANCE, MOST at most where a replay tells, the marginal of verdicts that do not say it as much as
-    the score. equivalent: the test found no gap. truth: the right name, not among
-    `names` where the screening had lost it. gap, left [nats]: what pieces cost beyond those of healthy runs, under the
-    refit model and under the best effect; 0 where they cost less."""
+class Learned:
+    """What sets teach. numbers: LEARNED and the biases of `effects`, (LEARNED + effect,). commit: by the keys of
+    PRECISION. unfit, unfit_share: as in `Calibration`."""
 
-    names: tuple[str, ...]
-    score: np.ndarray
-    parity: np.ndarray
-    marginal: np.ndarray
-    equivalent: bool
-    truth: str
-    gap: float = 0.0
-    left: float = 0.0
-    left_sd: float = 0.0
+    numbers: np.ndarray
+    effects: tuple[str, ...]
+    commit: dict[str, float]
+    unfit: float
+    unfit_share: float
+
+    def probabilities(self, one: Case) -> dict[str, float]:
+        """Of every name of a set."""
+        p = _softmax(_design(one, self.effects, self.numbers) @ self.numbers)
+        if one.left_sd > self.unfit:
+            p = (1.0 - self.unfit_share) * p + self.unfit_share * np.array([name == UNKNOWN for name in one.names])
+        return dict(zip(one.names, p.tolist(), strict=True))
 
 
-def case(truth: Truth, document: dict[str, Any]) -> Case | None:
-    """Of a label and a verdict's document; None for pairs, which have two right names."""
-    if truth.right is None:
-        return None
-    rows = [row for row in document["ranking"] if row["elpd_gain"] > -1e8]
-    chance = float(document["chance_nats"])
-    told = any(row.get("marginal_nats") is not None for row in rows)
-    said = np.array([float((row.get("marginal_nats") if told else row["elpd_gain"]) or 0.0) for row in rows])
-    marginal = np.clip(said, 0.0, MARGINAL_MOST)
-    gain = np.array([chance if row["effect"] == NONE else float(row["elpd_gain"]) for row in rows])
-    rival = np.array([row["effect"] in (NONE, UNKNOWN) for row in rows])
-    score = np.where(rival, gain, np.minimum(gain, LUCK + LUCK_TIMES * np.maximum(said, 0.0)))
-    upper, floor = document.get("refit_upper_m"), document["floor_m"]
-    equivalent = upper is not None and float(upper) < NO_GAP_FACTOR * float(floor)
-    parity = np.array([
-        min(max(float(row.get("parity_nats", 0.0)) - BY_CHANCE, 0.0), np.inf if row["effect"] in NO_REPLAY else MOST)
-        for row in rows
-    ])  # fmt: skip
-    gap, left = (max(float(document.get(key) or 0.0), 0.0) for key in ("gap_nats", "left_nats"))
-    names = tuple(row["effect"] for row in rows)
-    left_sd = left / float(document.get("left_sd_nats") or np.inf)
-    return Case(names, score, parity, marginal, equivalent, truth.right, gap, left, left_sd)
+def learn(cases: Sequence[Case], *, known: Sequence[str] = ()) -> tuple[Learned, Apart]:
+    """The numbers, and every set with probabilities by those of nine tenths of the others. known: effects that no set
+    need have. Raises InputError for too few sets."""
+    if len(cases) < LEAST_SETS:
+        raise InputError(
+            "there are too few sets to calibrate with", where="r2s2r blind calibrate",
+            expected=f"at least {LEAST_SETS}", received=str(len(cases)),
+            hint="r2s2r blind make --bank calibration --count 120 --key cal.key cal",
+        )  # fmt: skip
+    effects = tuple(sorted({*known, *(name for one in cases for name in one.names)} - {NONE, UNKNOWN}))
+    apart = [pair for fold in range(FOLDS) for pair in _left_out(cases, effects, fold)]
+    first, right, sure = _first(apart)
+    commit = {
+        key: _commit(sure[of], right[of], wanted)
+        for (key, wanted), of in zip(PRECISION.items(), _claims(first, apart), strict=True)
+    }
+    unfit = {"unfit": float("inf"), "unfit_share": 0.0} | _unfit(cases)
+    return Learned(_fit(cases, effects), effects, commit, **unfit), apart
 
 
 def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
@@ -118,24 +104,13 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
 
     Raises InputError for too few sets.
     """
-    if len(cases) < LEAST_SETS:
-        raise InputError(
-            "there are too few sets to calibrate with", where="r2s2r blind calibrate",
-            expected=f"at least {LEAST_SETS}", received=str(len(cases)),
-            hint="r2s2r blind make --bank calibration --count 120 --key cal.key cal",
-        )  # fmt: skip
-    effects = sorted({name for one in cases for name in one.names} - {NONE, UNKNOWN})
-    whole = _fit(cases, effects)
-    out = [_left_out(cases, effects, fold) for fold in range(FOLDS)]
-    apart = [pair for fold in out for pair in fold]
+    own, apart = learn(cases)
+    _, right, _ = _first(apart)
     held = np.sort([p.get(one.truth, 0.0) for one, p in apart])
     # Split conformal: with the k-th smallest as threshold at least COVER of new sets keep their truth.
     k = int(np.floor((len(held) + 1) * (1.0 - COVER)))
-    learned = dict(zip(LEARNED, whole.tolist(), strict=False))
+    learned = dict(zip(LEARNED, own.numbers.tolist(), strict=False))
     sharp = max(learned["sharpness"] * SHARPNESS, 1e-6)
-    first = [max(p, key=lambda name: p[name]) for _, p in apart]
-    right = np.array([name == one.truth for name, (one, _) in zip(first, apart, strict=True)])
-    sure = np.array([p[name] for name, (_, p) in zip(first, apart, strict=True)])
     return {
         "temperature": 1.0 / sharp,
         "parity": learned["parity"] / sharp,
@@ -154,11 +129,8 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
         "unknown_share": learned["unknown_share"] * SHARPNESS / sharp,
         "left": learned["left"] * SHARPNESS / sharp,
         "beside": learned["beside"],
-        "bias": {name: float(b) / sharp for name, b in zip(effects, whole[len(LEARNED) :], strict=True)},
-        **{
-            key: _commit(sure[of], right[of], wanted)
-            for (key, wanted), of in zip(PRECISION.items(), _claims(first, apart), strict=True)
-        },
+        "bias": {name: float(b) / sharp for name, b in zip(own.effects, own.numbers[len(LEARNED) :], strict=True)},
+        **own.commit,
         **_unfit(cases),
         "conformal": float(held[k - 1]) if k else 0.0,
         "lapse": LAPSE,
@@ -240,7 +212,14 @@ def _fit_with(cases: Sequence[Case], effects: Sequence[str], so_far: np.ndarray)
     return np.asarray(minimize(cost, mean, jac=True, bounds=bounds, method="L-BFGS-B").x)
 
 
-def _left_out(cases: Sequence[Case], effects: Sequence[str], fold: int) -> list[tuple[Case, dict[str, float]]]:
+def _first(apart: Apart) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """First guesses, whether each is right, and its probability, (set,) each."""
+    first = [max(p, key=lambda name: p[name]) for _, p in apart]
+    right = np.array([name == one.truth for name, (one, _) in zip(first, apart, strict=True)])
+    return first, right, np.array([p[name] for name, (_, p) in zip(first, apart, strict=True)])
+
+
+def _left_out(cases: Sequence[Case], effects: Sequence[str], fold: int) -> Apart:
     """Sets of one fold with probabilities by the numbers that the others teach."""
     held = [one for i, one in enumerate(cases) if i % FOLDS == fold]
     w = _fit([one for i, one in enumerate(cases) if i % FOLDS != fold], effects)
@@ -249,9 +228,7 @@ def _left_out(cases: Sequence[Case], effects: Sequence[str], fold: int) -> list[
     ]  # fmt: skip
 
 
-def _claims(
-    first: Sequence[str], apart: Sequence[tuple[Case, dict[str, float]]]
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+def _claims(first: Sequence[str], apart: Apart) -> tuple[np.ndarray, np.ndarray]:
     """Which first guesses are an effect where no stranger is the cause, `unknown`, in the order of PRECISION, (set,)
     each."""
     none, unknown = (np.array([one == name for one in first], dtype=bool) for name in (NONE, UNKNOWN))

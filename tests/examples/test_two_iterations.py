@@ -8,6 +8,7 @@ import math
 import shutil
 import subprocess
 import sys
+import tomllib
 from contextlib import nullcontext
 from pathlib import Path
 from types import ModuleType
@@ -148,6 +149,38 @@ def test_prior_and_truth_are_apart_by_so_many_floors() -> None:
     assert "median 45 mm, 5.0 floors (4.0 .. 6.0)" in whole
     blind = [shown.Apart("seed-0", 1, "straight", 0.06, 0.1, 0.2, dict.fromkeys(floors))]
     assert len(list(shown.lines(blind))) == 2
+
+
+def test_the_limit_has_the_true_numbers_and_the_calibrated_sensors(tmp_path: Path) -> None:
+    """Of what was drawn nothing is left to learn, of robot.toml nothing else is changed, and the loop's own files stay
+    as they are; its simulators are told beside the true numbers, median over seeds."""
+    limit, world = loaded("limit"), loaded("world")
+    project = tmp_path / "seed-3"
+    (project / "iterations" / "002").mkdir(parents=True)
+    for name in ("30-identify.h5", "51-estimate.h5"):
+        (project / "iterations" / "002" / name).write_bytes(b"")
+    (project / "robot.toml").write_text(robot_toml("threebar").replace("tolerance = 0.12", "tolerance = 0.09"))
+    (project / "project.toml").write_text("[identify]\nfree = []\n")
+    world.unknown(project, 3)
+    before = (project / "robot.toml").read_text()
+    copy = limit.with_the_truth(project)
+    assert (project / "robot.toml").read_text() == before
+    assert [path.name for path in (copy / "iterations" / "002").iterdir()] == ["51-estimate.h5"]
+    found, true, told = (load_model(at, Robot) for at in
+                         (copy / "robot.toml", project / "truth.toml", project / "robot.toml"))  # fmt: skip
+    assert found.contact.friction == true.contact.friction != told.contact.friction
+    assert found.motors == true.motors and found.cables == true.cables
+    assert found.pid == told.pid and found.pid.tolerance == 0.09
+    free = tomllib.loads((copy / "project.toml").read_text())["identify"]["free"]
+    assert [one.partition("=")[0] for one in free] == ["command_delay", "soft_ground.creep_m_per_ns"]
+    lines = list(
+        limit.lines(
+            [report(0.04, 0.0), report(0.06, 0.0)],
+            [{"history": [{"iteration": 1, "model": limit.TRUE, "runs": {"com_end_m": {"rms": 0.05}}}]}],
+        )
+    )
+    assert "iteration 2            40.00   60.00   median 50.00" in lines[2]
+    assert "true numbers           50.00   median 50.00" in lines[3]
 
 
 def test_nothing_learns_from_the_new_policies() -> None:

@@ -27,15 +27,18 @@ from table import MEASURES, RUNS  # noqa: E402
 from world import COMMAND, r2s2r  # noqa: E402
 
 TRUE = "true numbers"
+FOUND = Path("iterations") / "002" / "30-identify.h5"
 DRAWN = ("friction", "motor_speed", "rest_length", "stiffness")
 """What truth.toml says of UNKNOWN."""
 
 
 def with_the_truth(project: Path) -> Path:
-    """A copy of a finished seed whose robot.toml has the drawn numbers, and calibrated sensors as before."""
+    """A copy of a finished seed whose robot.toml has the drawn numbers, and calibrated sensors as before; one whose
+    identification is finished stays."""
     copy = project.parent / f"{project.name}-limit"
-    if copy.exists():
+    if (copy / FOUND).exists():
         return copy
+    shutil.rmtree(copy, ignore_errors=True)
     left_out = shutil.ignore_patterns("30-identify*", "40-plan*", "60-compare*", "comparison.json", "prior", "shown")
     shutil.copytree(project, copy, ignore=left_out)
     told, true = (tomlkit.parse((project / f"{name}.toml").read_text("utf-8")) for name in ("robot", "truth"))
@@ -55,12 +58,12 @@ def with_the_truth(project: Path) -> Path:
 def reached(project: Path) -> Mapping[str, Any]:
     """The comparison of the true numbers with the executed runs of both iterations."""
     copy = with_the_truth(project)
-    found = copy / "iterations" / "002" / "30-identify.h5"
-    if not found.exists():
+    if not (copy / FOUND).exists():
         r2s2r(copy, "identify", "--iteration", "2", "--no-draw")
-    words = ["compare", "--iteration", "2", "--of", "execute", "--model", f"{TRUE}={found}", "--no-draw", "--json"]
-    done = subprocess.run([*COMMAND, *words, "--quiet", "--force"], cwd=copy, check=True, stdout=subprocess.PIPE,
-                          text=True)  # fmt: skip
+    words = ["compare", "--iteration", "2", "--of", "execute", "--model", f"{TRUE}={FOUND}", "--no-draw", "--json"]
+    done = subprocess.run([*COMMAND, *words, "--quiet", "--force"], cwd=copy, capture_output=True, text=True)
+    if done.returncode:
+        raise SystemExit(done.stderr)
     report: Mapping[str, Any] = json.loads(done.stdout)["report"]
     return report
 
@@ -91,6 +94,8 @@ if __name__ == "__main__":
     parser.add_argument("out", type=Path)
     given = parser.parse_args()
     projects = [path.parent for path in sorted(given.out.resolve().glob("seed-*/comparison.json"))]
+    if not projects:
+        raise SystemExit(f"{given.out}: no finished seed; run.py --out {given.out} makes them")
     loops = [json.loads((one / "comparison.json").read_text("utf-8")) for one in projects]
     for line in lines(loops, [reached(one) for one in projects]):
         print(line)

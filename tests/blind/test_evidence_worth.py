@@ -75,6 +75,27 @@ def test_what_misleads_is_better_left_out() -> None:
     assert found["the parity stage"].log_loss < found["nothing"].log_loss
 
 
+def test_a_name_that_predicts_nothing_is_not_committed_to() -> None:
+    """As in a verdict: what gains no more in the replay than chance gives is first, and no name."""
+    cases = [one for _, one in sets(100, 1, replay=0.0, parity=8.0)]
+    judged = sets(50, 2, replay=0.0, parity=8.0)
+    silent = [(t, replace(one, predicts=one.rival)) for t, one in judged]
+    (told, *_), (untold, *_) = worth(cases, judged), worth(cases, silent)
+    assert told.named > 30 and untold.named == 0 and told.top1 == untold.top1
+
+
+def test_bounds_of_one_kind_of_evidence_go_with_it() -> None:
+    """Left-out gains that all data together hold to be luck count in full where those are left out, and what all data
+    say counts in full where it stands alone."""
+    truth, one = sets(5, 3, replay=60.0, parity=0.0)[1]
+    bounded = replace(one, score=np.minimum(one.score, 20.0), gain=one.score, said=np.full(6, 90.0))
+    assert KINDS["all data together (left-out gaits alone)"](bounded).score == pytest.approx(one.score)
+    assert KINDS["gaits left out (scored in sample)"](bounded).score[:4] == pytest.approx(90.0)
+    alone = KINDS["the replay (parity alone)"](replace(bounded, equivalent=True, gap=5.0, left=5.0, left_sd=9.0))
+    assert not alone.score.any() and not alone.equivalent and alone.gap == alone.left == alone.left_sd == 0.0
+    assert truth.kind == "single"
+
+
 def test_what_teaches_may_not_judge() -> None:
     """Nor may a blind shard teach; and without a clear single effect there is nothing to judge by."""
     with pytest.raises(InputError, match="only a calibration bank"):

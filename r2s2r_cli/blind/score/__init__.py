@@ -86,9 +86,20 @@ def worth_published(learned: Sequence[Path], judged: Sequence[Path]) -> BlindWor
         raise InputError("what teaches may not judge", where=", ".join(map(str, judged)), expected="the blind bank",
                          received=f"{pool.bank}{', commands exchanged' * pool.shuffled}",
                          hint="r2s2r blind worth docs/blind/blind-b-6.json.gz --learned FILE")  # fmt: skip
+    for what in ("tier", "kept"):
+        own, other = (getattr(one, what) for one in (pool, teaching))
+        if own != other:
+            raise InputError("what teaches and what is judged are different trials", where="--learned",
+                             expected=f"{what} {_told(own)}", received=f"{what} {_told(other)}",
+                             hint="r2s2r blind worth docs/blind/blind-b-6.json.gz --learned FILE")  # fmt: skip
     cases = [one for _, one in _cases(teaching)]
     found = _cases(pool)
-    return BlindWorthResult(learned=len(cases), judged=len(found), rows=worth(cases, found), warnings=pool.warnings)
+    return BlindWorthResult(learned=len(cases), judged=len(found), rows=worth(cases, found),
+                            warnings=(*teaching.warnings, *pool.warnings))  # fmt: skip
+
+
+def _told(value: object) -> str:
+    return ", ".join(sorted(value)) if isinstance(value, frozenset) else str(value or "(the whole catalogue)")
 
 
 def _must_teach(pool: Pool, where: str) -> None:

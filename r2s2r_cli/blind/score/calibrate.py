@@ -79,12 +79,12 @@ class Learned:
         return dict(zip(one.names, p.tolist(), strict=True))
 
 
-def learn(cases: Sequence[Case], *, known: Sequence[str] = ()) -> tuple[Learned, Apart]:
-    """The numbers, and every set with probabilities by those of nine tenths of the others. known: effects that no set
-    need have. Raises InputError for too few sets."""
+def learn(cases: Sequence[Case], *, known: Sequence[str] = (), where: str = "BANK") -> tuple[Learned, Apart]:
+    """The numbers, and every set with probabilities by those of nine tenths of the others, without what is learned of
+    `unfit`. known: effects that no set need have. where: in the error. Raises InputError for too few sets."""
     if len(cases) < LEAST_SETS:
         raise InputError(
-            "there are too few sets to calibrate with", where="r2s2r blind calibrate",
+            "there are too few sets to calibrate with", where=where,
             expected=f"at least {LEAST_SETS}", received=str(len(cases)),
             hint="r2s2r blind make --bank calibration --count 120 --key cal.key cal",
         )  # fmt: skip
@@ -100,7 +100,8 @@ def learn(cases: Sequence[Case], *, known: Sequence[str] = ()) -> tuple[Learned,
 
 
 def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
-    """The numbers of `stages/diagnose/which/calibration.json`, with what they reach on sets that were left out.
+    """The numbers of `stages/diagnose/which/calibration.json`, with what they reach on sets that were left out (but for
+    `unfit`, which few sets teach: all of them).
 
     Raises InputError for too few sets.
     """

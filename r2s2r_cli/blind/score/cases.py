@@ -29,7 +29,9 @@ class Case:
     parity beyond BY_CHANCE, MOST at most where a replay tells, the marginal of verdicts that do not say it as much as
     the score. equivalent: the test found no gap. truth: the right name, not among
     `names` where the screening had lost it. gap, left [nats]: what pieces cost beyond those of healthy runs, under the
-    refit model and under the best effect; 0 where they cost less. left_sd: the latter in its sd."""
+    refit model and under the best effect; 0 where they cost less. left_sd: the latter in its sd. gain, said: what score
+    and marginal are before LUCK and MARGINAL_MOST bound them; predicts: names that gain more in the replay than chance
+    gives, or need none, (n,); None: as if nothing was bounded, and all of them."""
 
     names: tuple[str, ...]
     score: np.ndarray
@@ -40,6 +42,14 @@ class Case:
     gap: float = 0.0
     left: float = 0.0
     left_sd: float = 0.0
+    gain: np.ndarray | None = None
+    said: np.ndarray | None = None
+    predicts: np.ndarray | None = None
+
+    @property
+    def rival(self) -> np.ndarray:
+        """Which names are no effects, (n,)."""
+        return np.array([name in (NONE, UNKNOWN) for name in self.names])
 
 
 def case(truth: Truth, document: dict[str, Any]) -> Case | None:
@@ -47,12 +57,13 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
     if truth.right is None:
         return None
     rows = [row for row in document["ranking"] if row["elpd_gain"] > -1e8]
+    names = tuple(row["effect"] for row in rows)
     chance = float(document["chance_nats"])
     told = any(row.get("marginal_nats") is not None for row in rows)
     said = np.array([float((row.get("marginal_nats") if told else row["elpd_gain"]) or 0.0) for row in rows])
-    marginal = np.clip(said, 0.0, MARGINAL_MOST)
     gain = np.array([chance if row["effect"] == NONE else float(row["elpd_gain"]) for row in rows])
-    rival = np.array([row["effect"] in (NONE, UNKNOWN) for row in rows])
+    rival = np.array([name in (NONE, UNKNOWN) for name in names])
+    needless = np.array([name in (NONE, UNKNOWN, *NO_REPLAY) for name in names])
     score = np.where(rival, gain, np.minimum(gain, LUCK + LUCK_TIMES * np.maximum(said, 0.0)))
     upper, floor = document.get("refit_upper_m"), document["floor_m"]
     equivalent = upper is not None and float(upper) < NO_GAP_FACTOR * float(floor)
@@ -61,6 +72,8 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
         for row in rows
     ])  # fmt: skip
     gap, left = (max(float(document.get(key) or 0.0), 0.0) for key in ("gap_nats", "left_nats"))
-    names = tuple(row["effect"] for row in rows)
     left_sd = left / float(document.get("left_sd_nats") or np.inf)
-    return Case(names, score, parity, marginal, equivalent, truth.right, gap, left, left_sd)
+    return Case(
+        names, score, parity, np.clip(said, 0.0, MARGINAL_MOST), equivalent, truth.right, gap, left, left_sd,
+        gain=gain, said=said, predicts=needless | (gain > chance),
+    )  # fmt: skip

@@ -14,7 +14,7 @@ import numpy as np
 
 from r2s2r_cli.blind.score.calibrate import Learned, learn
 from r2s2r_cli.blind.score.cases import Case
-from r2s2r_cli.blind.score.facts import NONE, UNKNOWN, Truth
+from r2s2r_cli.blind.score.facts import UNKNOWN, Truth
 from r2s2r_cli.errors import InputError
 from schemas.results_blind_worth import BlindWorthRow
 
@@ -50,10 +50,10 @@ def worth(cases: Sequence[Case], judged: Sequence[tuple[Truth, Case]]) -> tuple[
     everything: list[Ranked] = []
     rows = []
     for what, without in KINDS.items():
-        own, _ = learn([without(one) for one in cases], known=tuple(known))
+        own, _ = learn([without(one) for one in cases], known=tuple(known), where="--learned")
         found = [_ranked(truth, without(one), own) for truth, one in judged]
         if not any(one.clear for one in found):
-            raise InputError("there is no clear single effect to judge by", where="--judged", expected="at least one",
+            raise InputError("there is no clear single effect to judge by", where="FILE...", expected="at least one",
                              received=f"{len(judged)} sets", hint="r2s2r blind score --published FILE...")  # fmt: skip
         everything = everything or found
         rows.append(_row(what, found, everything))
@@ -63,7 +63,9 @@ def worth(cases: Sequence[Case], judged: Sequence[tuple[Truth, Case]]) -> tuple[
 def _ranked(truth: Truth, one: Case, own: Learned) -> Ranked:
     p = own.probabilities(one)
     order = tuple(sorted(p, key=lambda name: -p[name]))
-    name = order[0] not in (NONE, UNKNOWN) and p[order[0]] >= own.commit["commit"]
+    first = one.names.index(order[0])
+    predicts = one.predicts is None or bool(one.predicts[first])
+    name = predicts and not one.rival[first] and p[order[0]] >= own.commit["commit"]
     return Ranked(truth, one, order, p, order[0] if name else None)
 
 
@@ -86,31 +88,33 @@ def _row(what: str, found: Sequence[Ranked], everything: Sequence[Ranked]) -> Bl
     )  # fmt: skip
 
 
-def _rival(one: Case) -> np.ndarray:
-    return np.array([name in (NONE, UNKNOWN) for name in one.names])
-
-
 def _no_parity(one: Case) -> Case:
     return replace(one, parity=np.zeros_like(one.parity))
 
 
 def _in_sample(one: Case) -> Case:
-    return replace(one, score=np.where(_rival(one), one.score, one.marginal), marginal=np.zeros_like(one.marginal))
+    said = one.marginal if one.said is None else one.said
+    return replace(one, score=np.where(one.rival, one.score, said), marginal=np.zeros_like(one.marginal))
 
 
 def _left_out_only(one: Case) -> Case:
-    return replace(one, marginal=np.zeros_like(one.marginal))
+    return replace(one, score=one.score if one.gain is None else one.gain, marginal=np.zeros_like(one.marginal))
 
 
 def _no_replay(one: Case) -> Case:
-    return replace(one, score=np.where(_rival(one), one.score, 0.0), marginal=np.zeros_like(one.marginal))
+    nothing = np.zeros_like(one.score)
+    return replace(one, score=nothing, marginal=nothing, equivalent=False, gap=0.0, left=0.0, left_sd=0.0)
 
 
 def _no_unknown(one: Case) -> Case:
     keep = np.array([name != UNKNOWN for name in one.names])
-    names = tuple(name for name in one.names if name != UNKNOWN)
+
+    def kept(values: np.ndarray | None) -> np.ndarray | None:
+        return None if values is None else values[keep]
+
     return replace(
-        one, names=names, score=one.score[keep], parity=one.parity[keep], marginal=one.marginal[keep], left=0.0,
+        one, names=tuple(name for name in one.names if name != UNKNOWN), score=one.score[keep], parity=one.parity[keep],
+        marginal=one.marginal[keep], gain=kept(one.gain), said=kept(one.said), predicts=kept(one.predicts), left=0.0,
         left_sd=0.0,
     )  # fmt: skip
 
@@ -121,7 +125,7 @@ KINDS: dict[str, Without] = {
     "gaits left out (scored in sample)": _in_sample,
     "all data together (left-out gaits alone)": _left_out_only,
     "the replay (parity alone)": _no_replay,
-    "the rival unknown": _no_unknown,
+    "the rival `unknown`": _no_unknown,
     "what is left beyond healthy runs": lambda one: replace(one, gap=0.0, left=0.0, left_sd=0.0),
     "the equivalence test in `none`": lambda one: replace(one, equivalent=False),
 }

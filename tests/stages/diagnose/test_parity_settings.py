@@ -11,7 +11,7 @@ import pytest
 from r2s2r_cli.stages.diagnose.evidence import Run
 from r2s2r_cli.stages.diagnose.parity import parity
 from r2s2r_cli.stages.diagnose.parity.mismatch import mismatches
-from r2s2r_cli.stages.diagnose.which.stretches import noise_of
+from r2s2r_cli.stages.diagnose.sensor_noise import noise_of
 from tests.support.engine import threebar
 from tests.support.parity_log import SPEED, evidence_of, swaying, with_caps, wound
 
@@ -168,3 +168,30 @@ def test_exchanged_commands_of_winches_that_stand_are_no_mismatch() -> None:
     assert mismatches(still, threebar(), SPEED)[0] == []
     swapped = [with_caps(one, control=np.roll(one.caps.control, 70, axis=0)) for one in still]
     assert mismatches(swapped, threebar(), SPEED)[0] == []
+
+
+@pytest.mark.parametrize("noise_m", [1e-3, 2e-3, 4e-3])
+@pytest.mark.parametrize(("share", "kinds"), [(0.0, []), (0.3, ["rate"]), (1.0, [])])
+def test_noisy_sensors_are_no_mismatch(noise_m: float, share: float, kinds: list[str]) -> None:
+    """Readings that scatter move as fast as a winch does over a tenth of a second, and follow no command: what stands
+    still stands, slow winches are slow, and good ones good."""
+
+    def noisy(run: Run) -> Run:
+        assert run.lengths is not None
+        rng = np.random.default_rng(7)
+        length = run.lengths.length + noise_m * rng.standard_normal(run.lengths.length.shape)
+        return replace(run, lengths=replace(run.lengths, length=length))
+
+    runs = [noisy(wound(f"g{k}", k, lambda u, h: share * _turned(u, h))) for k in range(2)]
+    assert [one.kind for one in mismatches(runs, threebar(), SPEED)[0]] == kinds
+
+
+@pytest.mark.parametrize("standing", [(3,), (1, 3), (1, 3, 4)])
+def test_motors_that_stand_are_not_taken_for_another_log(standing: tuple[int, ...]) -> None:
+    """Up to half of the motors without a plug: the others follow their commands."""
+    turns = 1.0 - np.isin(np.arange(6), standing)
+    runs = [wound(f"g{k}", k, lambda u, h: _turned(u, h) * turns) for k in range(2)]
+    found = mismatches(runs, threebar(), SPEED)[0]
+    assert not any(one.kind == "commands" for one in found)
+    if len(standing) < 3:
+        assert [one.kind for one in found] == ["motor"]

@@ -9,7 +9,7 @@ import pytest
 
 from r2s2r_cli.blind.score import facts
 from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
-from r2s2r_cli.stages.diagnose.which.calibration import Calibration
+from r2s2r_cli.stages.diagnose.which.calibration import Calibration, calibration
 from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.found import Ranked
 from r2s2r_cli.stages.diagnose.which.left import Left
@@ -50,20 +50,31 @@ def test_no_gap_is_a_claim_about_size() -> None:
 
 def test_no_name_where_the_best_effect_leaves_too_much() -> None:
     """An effect that gains most and is far the likeliest is not named where what it leaves stands out from the healthy
-    runs, as it did in strangers only; without healthy runs nobody knows what may be left."""
+    runs, as it did in strangers only, nor is a pair; without healthy runs nobody knows what may be left."""
     by = replace(BY, temperature=5.0, unfit=4.4, unfit_share=0.75)
-    worth = {"payload": 100.0, "backlash": 10.0, "none": 0.0, "unknown": 0.0}
-    usual, beyond = by.probabilities(worth, left_sd=4.3), by.probabilities(worth, left_sd=4.5)
-    assert usual == by.probabilities(worth)
+    usual = by.probabilities({"payload": 100.0, "backlash": 10.0, "none": 0.0, "unknown": 0.0})
+    assert by.doubted(usual, 4.3) == usual
+    beyond = by.doubted(usual, 4.5)
     assert sum(beyond.values()) == pytest.approx(1.0)
     assert beyond["unknown"] == pytest.approx(0.75 + 0.25 * usual["unknown"])
     assert beyond["payload"] == pytest.approx(0.25 * usual["payload"])
     likely = [Ranked("unknown", 0.0, by.unfit_share), Ranked("payload", 100.0, 0.2)]
     strict = replace(by, commit_unknown=0.95)
-    assert verdict_of(likely, strict, None, CHANCE, NO_GAP, left_sd=4.5) == ("unknown", (), 0.75)
+    for pair in (None, ("payload", "backlash"), ("unknown", "backlash")):
+        assert verdict_of(likely, strict, pair, CHANCE, NO_GAP, left_sd=4.5) == ("unknown", (), 0.75)
     assert verdict_of(likely, strict, None, CHANCE, GAP, left_sd=4.3)[0] == "ambiguous"
-    assert by.absolute().probabilities(worth, left_sd=99.0) == by.absolute().probabilities(worth)
-    assert not by.absolute().refuses(99.0)
+    assert by.absolute().doubted(usual, 99.0) == usual
+
+
+def test_the_rule_of_the_package_names_a_stranger() -> None:
+    """What is shipped: a certain effect, and a certain pair, that leave five sd are `unknown` by its own threshold."""
+    by = calibration()
+    certain = {"payload": 0.97, "none": 0.01, "unknown": 0.01, "backlash": 0.01}
+    found = by.doubted(certain, 5.0)
+    ranks = [Ranked(name, 100.0, p) for name, p in sorted(found.items(), key=lambda item: -item[1])]
+    assert verdict_of(ranks, by, ("payload", "backlash"), CHANCE, GAP, left_sd=5.0)[0] == "unknown"
+    ranks = [Ranked(name, 100.0, p) for name, p in certain.items()]
+    assert verdict_of(ranks, by, None, CHANCE, GAP, left_sd=4.0)[:2] == ("effect", ("payload",))
 
 
 def test_what_is_left_is_told_in_its_sd() -> None:

@@ -41,7 +41,7 @@ def _in_stages(runs: Sequence[Run], robot: Robot, speed: float) -> tuple[list[Mi
     many = tuple(series(run, robot) for run in runs)
     missing: list[str] = []
     stages: tuple[Callable[[Sequence[Series], Robot, float, list[str]], list[Mismatch]], ...] = (
-        _units, order_of_caps, order_of_sensors, order_of_motors, signs, of_another_run, standing, rate,
+        _units, order_of_caps, order_of_sensors, order_of_motors, signs, standing, of_another_run, rate,
     )  # fmt: skip
     for stage in stages:
         found = stage(many, robot, speed, missing)

@@ -14,24 +14,28 @@ from schemas.robot import Robot
 LATE_S = np.arange(0.0, 0.51, 0.05)
 """[s] Cables may answer so late: a slow link or motor is an effect."""
 FOLLOWS = 0.5
-"""Mean correlation of commands with the rates of their cables from which they belong together: in 110 calibration sets
-with effects of every kind it is 0.63 to 0.98, with commands exchanged between the target intervals 0.39 at most."""
+"""Mean correlation of commands with the rates of their cables from which they belong together. Noise of the readings
+aside it is SEEN in calibration sets with effects of every kind, and with commands exchanged between target intervals
+EXCHANGED at most."""
 TURNS = 0.5
-"""Of the commanded rate, RMS: winches that hardly turn follow no command either, and have no wrong log."""
+"""Of the commanded rate, RMS: a winch that hardly turns follows no command either, and has no wrong log."""
+LEAST = 2
+"""Winches that turn."""
 
 
 def of_another_run(runs: Sequence[Series], robot: Robot, speed: float, missing: list[str]) -> list[Mismatch]:
-    """Commands and cable lengths that have nothing to do with each other although the cables move as much as the
-    commands ask for. speed: nominal, of the winches [m/s]. Only sensors are steady enough to tell."""
+    """Commands and cable lengths that have nothing to do with each other although cables move as much as the commands
+    ask for. speed: nominal, of the winches [m/s]. Only sensors are steady enough to tell."""
     heard = [one for one in runs if one.has_sensors]
-    if not heard:
-        missing.append("whether the commands belong to the motion: no cable lengths were logged")
+    now = responses(heard, robot) if heard else None
+    if now is None:
+        missing.append("whether the commands belong to the motion: too few cable lengths were logged")
         return []
-    now = responses(heard, robot)
-    if now is None or now.rate < TURNS * speed * now.command:
+    turn = now.rate >= TURNS * speed * now.command
+    if turn.sum() < LEAST:
         return []
     every = [responses(heard, robot, lag=float(lag)) for lag in LATE_S]
-    best = max(float(np.diag(one.correlation).mean()) for one in every if one is not None)
+    best = max(float(one.own[turn].mean()) for one in every if one is not None)
     if best >= FOLLOWS:
         return []
     return [Mismatch(

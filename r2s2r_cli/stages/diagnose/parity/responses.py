@@ -9,6 +9,7 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.parity.mismatch_words import LEAST_ROWS
 from r2s2r_cli.stages.diagnose.parity.series import Series
+from r2s2r_cli.stages.diagnose.sensor_noise import noise_of
 from r2s2r_cli.stages.identify.commands import CommandLog
 from schemas.robot import Robot
 
@@ -18,18 +19,20 @@ SPAN_S = 0.1
 
 @dataclass(frozen=True)
 class Responses:
-    """correlation: about zero, of every command with the shortening of every winched cable, (cable, command). rate: RMS
-    of the cables [m/s], of those that are heard only; command: RMS of the shares of full speed [1]."""
+    """Of all winched cables. correlation: about zero, of every command with the shortening of every cable, (cable,
+    command); own: of each with its own command, had its readings no noise, (cable,). rate: RMS [m/s], less what noise
+    makes of it, (cable,); command: RMS of its shares of full speed [1], (cable,)."""
 
     correlation: np.ndarray
-    rate: float
-    command: float
+    own: np.ndarray
+    rate: np.ndarray
+    command: np.ndarray
 
 
 def responses(runs: Sequence[Series], robot: Robot, *, lag: float = 0.0) -> Responses | None:
     """Of all runs together; None where there is too little to tell from. lag [s]: by which cables may answer late."""
     n = len(robot.actuated)
-    products, u2, v2 = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
+    products, u2, v2, noise2 = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n), np.zeros(n)
     rows = np.zeros(n, dtype=int)
     for one in runs:
         log = CommandLog(one.run.caps)
@@ -45,13 +48,17 @@ def responses(runs: Sequence[Series], robot: Robot, *, lag: float = 0.0) -> Resp
             products[i] += v @ u
             u2[i] += (u**2).sum(axis=0)
             v2[i] += v @ v
+            noise2[i] += float(np.sum(2.0 * noise_of(length[:, None])[0] ** 2 / past[whole] ** 2))
             rows[i] += len(v)
     if rows.min() < LEAST_ROWS or not (u2 > 0).all():
         return None
+    moved2 = np.maximum(v2 - noise2, 0.0)
+    told2 = np.diag(u2)
     return Responses(
         np.asarray(products / np.sqrt(np.maximum(u2 * v2[:, None], 1e-30))),
-        float(np.sqrt(v2.sum() / rows.sum())),
-        float(np.sqrt(np.diag(u2).sum() / rows.sum())),
+        np.asarray(np.diag(products) / np.sqrt(np.maximum(told2 * moved2, 1e-30))),
+        np.sqrt(moved2 / rows),
+        np.sqrt(told2 / rows),
     )
 
 

@@ -101,17 +101,22 @@ class Calibration:
         """Whether a first guess of this probability is a verdict."""
         return probability >= (self.commit_unknown if name == UNKNOWN else self.commit)
 
-    def probabilities(self, scores: Mapping[str, float], *, left_sd: float = 0.0) -> dict[str, float]:
-        """Softmax of scores [nats] by name; a share `lapse` of it goes to all names alike, and `unfit_share` to
-        `unknown` where the catalogue does not fit. left_sd: what the best effect leaves [sd of healthy pieces]."""
+    def probabilities(self, scores: Mapping[str, float]) -> dict[str, float]:
+        """Softmax of scores [nats] by name; a share `lapse` of it goes to all names alike."""
         names = list(scores)
         x = np.array([scores[name] + self.bias.get(name, 0.0) for name in names]) / self.temperature
         x = np.where(np.isfinite(x), x, -1e9)
         p = np.exp(x - x.max())
         p = (1.0 - self.lapse) * p / p.sum() + self.lapse / len(p)
-        if self.refuses(left_sd):
-            p = (1.0 - self.unfit_share) * p + self.unfit_share * np.array([name == UNKNOWN for name in names])
         return dict(zip(names, p.tolist(), strict=True))
+
+    def doubted(self, probabilities: Mapping[str, float], left_sd: float) -> dict[str, float]:
+        """Probabilities by name, of which `unfit_share` goes to `unknown` where the catalogue does not fit (`refuses`),
+        pairs of its effects included."""
+        if not self.refuses(left_sd):
+            return dict(probabilities)
+        share = {name: (1.0 - self.unfit_share) * p for name, p in probabilities.items()}
+        return share | {UNKNOWN: share.get(UNKNOWN, 0.0) + self.unfit_share}
 
     def within(self, probabilities: Mapping[str, float]) -> tuple[str, ...]:
         """The 90 % set, most probable first; never empty."""

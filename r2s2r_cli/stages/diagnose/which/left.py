@@ -21,15 +21,16 @@ from r2s2r_cli.stages.diagnose.which.score import Score
 
 PIECE = 10.0
 """[nats]"""
-PIECE_SD = 1.0
-"""[nats] Two healthy pieces that happen to cost alike say no more than that."""
+PIECE_SD = 2.0
+"""[nats] By so much pieces of a healthy robot differ, even where the few that there are happen to cost alike (2.5 to 10
+in the calibration sets)."""
 
 
 @dataclass(frozen=True)
 class Left:
     """Nats that the pieces cost beyond what as many of the healthy runs do. refit: under the refit nominal model; best:
-    each under the hypothesis that predicts it best. sd: of both, from how much pieces differ, PIECE_SD a piece at
-    least; nan for fewer than two pieces."""
+    each under the hypothesis that predicts it best. sd: of both, from how much pieces differ, by
+    PIECE_SD at least; nan for fewer than two pieces."""
 
     refit: float
     best: float
@@ -59,12 +60,14 @@ def left(
     own = _bounded(-refit.elpd - at_least)
     best = _bounded(-np.max([refit.elpd, *(one.elpd for one in others)], axis=0) - at_least)
     count = len(own)
-    usually, sd = 0.0, float(np.std(own, ddof=1)) * np.sqrt(count) if count > 1 else float("nan")
+    usually, sd = 0.0, _differ(own) * np.sqrt(count)
     if healthy is not None:
-        usually = float(then.mean())
-        sd = count * float(np.std(then, ddof=1)) * np.sqrt(1 / count + 1 / len(then)) if len(then) > 1 else float("nan")
-    sd = max(sd, PIECE_SD * np.sqrt(count)) if np.isfinite(sd) else sd
+        usually, sd = float(then.mean()), _differ(then) * count * np.sqrt(1 / count + 1 / len(then))
     return Left(float(own.sum()) - count * usually, float(best.sum()) - count * usually, float(sd))
+
+
+def _differ(pieces: np.ndarray) -> float:
+    return max(float(np.std(pieces, ddof=1)), PIECE_SD) if len(pieces) > 1 else float("nan")
 
 
 def healthy_excess(healthy: Healthy) -> np.ndarray:

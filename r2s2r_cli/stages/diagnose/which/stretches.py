@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Run
+from r2s2r_cli.stages.diagnose.sensor_noise import LENGTH_NOISE_M, noise_of
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.identify.windows import Window, window
 
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
 APART_S = 0.08
 """Frames nearer than this are averaged: errors of a simulator last longer, and half the frames say as much."""
 LEAST_NOISE_M = 5e-4
-LENGTH_NOISE_M = 2e-3
-"""Least noise of a length sensor: its calibration and its own delay are no better."""
 
 
 @dataclass(frozen=True)
@@ -151,15 +150,3 @@ def _lengths(run: Run, t: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, n
         total = np.where(seen, sensed.length[near], 0.0).sum(axis=0)
         mean[row] = np.where(count[row] > 0, total / np.maximum(count[row], 1), np.nan)
     return mean, np.maximum(sd / np.sqrt(np.maximum(count, 1)), LENGTH_NOISE_M)
-
-
-def noise_of(length: np.ndarray) -> np.ndarray:
-    """Sd of a sensor's readings (sensor,) [m], from second differences of its own rows: what moves smoothly drops out
-    of them. Boards of a wireless robot take turns, so that a row of the log need not have all sensors."""
-    return np.array([_noise_of(one[np.isfinite(one)]) for one in length.T])
-
-
-def _noise_of(length: np.ndarray) -> float:
-    bend = length[2:] - 2 * length[1:-1] + length[:-2]
-    size = float(np.median(np.abs(bend))) / 0.6745 / np.sqrt(6.0) if len(bend) else np.nan
-    return size if np.isfinite(size) else LENGTH_NOISE_M

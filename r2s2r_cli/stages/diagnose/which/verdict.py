@@ -48,8 +48,8 @@ def concluded(m: Material) -> Which:
     table[NONE] = calibration.score(NONE, m.chance, equivalent=m.no_gap.equivalent, beyond=m.left.refit)
     table[UNKNOWN] = calibration.score(UNKNOWN, m.unexplained, beyond=m.left.best, best=best_replayed(table))
     both = [_two(m, i, best, gains) for i in order if len(m.fits[i].hypothesis.parts) == 2]
-    alone = calibration.probabilities(table, left_sd=m.left.beyond)
-    probability, pair = with_pairs(alone, both, names, m.chance, calibration.temperature)
+    probability, pair = with_pairs(calibration.probabilities(table), both, names, m.chance, calibration.temperature)
+    probability = calibration.doubted(probability, m.left.beyond)
     sds = gain_sds(m.refit, m.scores, m.groups).tolist() if m.scores else []
     ranking = [
         replace(
@@ -135,13 +135,13 @@ def verdict_of(
     below the floor."""
     first = ranking[0]
     predicts = first.gain > chance or first.effect in (NONE, UNKNOWN, *NO_REPLAY)
+    if first.effect == UNKNOWN and calibration.refuses(left_sd):
+        return "unknown", (), first.probability
     if pair is not None and first.effect in pair:
         # What speaks for both together is shared between their names.
         p = sum(one.probability for one in ranking if one.effect in pair)
         if calibration.commits(first.effect, p):
             return "pair", pair, p
-    if first.effect == UNKNOWN and calibration.refuses(left_sd):
-        return "unknown", (), first.probability
     if not (predicts and first.effect != NONE and calibration.commits(first.effect, first.probability)):
         likely = predicts and first.effect not in (NONE, UNKNOWN) and first.probability >= LIKELY
         if gap.equivalent and not likely:

@@ -14,9 +14,9 @@ from schemas.robot import Robot
 LATE_S = np.arange(0.0, 0.51, 0.05)
 """[s] Cables may answer so late: a slow link or motor is an effect."""
 FOLLOWS = 0.5
-"""Mean correlation of commands with the rates of their cables from which they belong together. Noise of the readings
-aside it is SEEN in calibration sets with effects of every kind, and with commands exchanged between target intervals
-EXCHANGED at most."""
+"""Mean correlation of commands with the rates of their cables from which they belong together: in 107 calibration sets
+with effects of every kind it is 0.65 or more, with commands exchanged between target intervals 0.40 at most (three
+times each; in three more sets no winch turns)."""
 TURNS = 0.5
 """Of the commanded rate, RMS: a winch that hardly turns follows no command either, and has no wrong log."""
 LEAST = 2

@@ -86,20 +86,18 @@ def worth_published(learned: Sequence[Path], judged: Sequence[Path]) -> BlindWor
         raise InputError("what teaches may not judge", where=", ".join(map(str, judged)), expected="the blind bank",
                          received=f"{pool.bank}{', commands exchanged' * pool.shuffled}",
                          hint="r2s2r blind worth docs/blind/blind-b-6.json.gz --learned FILE")  # fmt: skip
-    for what in ("tier", "kept"):
-        own, other = (getattr(one, what) for one in (pool, teaching))
-        if own != other:
-            raise InputError("what teaches and what is judged are different trials", where="--learned",
-                             expected=f"{what} {_told(own)}", received=f"{what} {_told(other)}",
-                             hint="r2s2r blind worth docs/blind/blind-b-6.json.gz --learned FILE")  # fmt: skip
+    if pool.kept != teaching.kept:
+        raise InputError("what teaches and what is judged have different catalogues", where="--learned",
+                         expected=_catalogue(pool), received=_catalogue(teaching),
+                         hint="r2s2r blind worth docs/blind/blind-b-6.json.gz --learned FILE")  # fmt: skip
     cases = [one for _, one in _cases(teaching)]
     found = _cases(pool)
     return BlindWorthResult(learned=len(cases), judged=len(found), rows=worth(cases, found),
                             warnings=(*teaching.warnings, *pool.warnings))  # fmt: skip
 
 
-def _told(value: object) -> str:
-    return ", ".join(sorted(value)) if isinstance(value, frozenset) else str(value or "(the whole catalogue)")
+def _catalogue(pool: Pool) -> str:
+    return "the whole catalogue" if pool.kept is None else ", ".join(sorted(pool.kept))
 
 
 def _must_teach(pool: Pool, where: str) -> None:

@@ -117,12 +117,9 @@ class BlindBaseline(Frozen):
     """By the name of the row; rows that it cannot have are left out."""
 
 
-class BlindSplit(Frozen):
-    """The sets with one value of noise, gaits or rate: counts, no targets."""
+class BlindCounts(Frozen):
+    """How often sets are told: counts, no targets."""
 
-    by: Literal["noise", "gaits", "rate"]
-    value: str
-    sets: int
     clear: int
     """Clear single effects; the next four count among them."""
     top1: int
@@ -132,6 +129,14 @@ class BlindSplit(Frozen):
     """Of the named ones."""
     none: int
     """Sets with nothing wrong."""
+
+
+class BlindSplit(BlindCounts):
+    """The sets with one value of noise, gaits or rate."""
+
+    by: Literal["noise", "gaits", "rate"]
+    value: str
+    sets: int
     alarms: int
     """Of these, anything but `no_gap`."""
     cpu_median_s: float | None

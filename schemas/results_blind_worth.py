@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 from schemas.base import Frozen
+from schemas.results_blind import BlindCounts
 
 
-class BlindWorthRow(Frozen):
-    """What the first guesses are without one kind of evidence. Counts are of sets."""
+class BlindWorthRow(BlindCounts):
+    """What the first guesses are without one kind of evidence."""
 
     without: str
-    clear: int
-    """Single effects that can be told."""
-    top1: int
-    top3: int
-    named: int
-    """Of the clear ones, those with a name that is committed to."""
-    right: int
-    none: int
-    """Nothing is wrong in them."""
     alarms: int
-    """Of those, with a name that is committed to."""
+    """Of those with nothing wrong, the sets with a name that is committed to."""
     strangers: int
     """Outside of every catalogue, clear or weak."""
     strangers_named: int

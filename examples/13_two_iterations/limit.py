@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
-import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -22,9 +21,9 @@ import tomlkit
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
-from run import UNKNOWN  # noqa: E402 - beside this file
+from run import UNKNOWN, compared  # noqa: E402 - beside this file
 from table import MEASURES, RUNS  # noqa: E402
-from world import COMMAND, r2s2r  # noqa: E402
+from world import r2s2r  # noqa: E402
 
 TRUE = "true numbers"
 FOUND = Path("iterations") / "002" / "30-identify.h5"
@@ -35,7 +34,7 @@ DRAWN = ("friction", "motor_speed", "rest_length", "stiffness")
 def with_the_truth(project: Path) -> Path:
     """A copy of a finished seed whose robot.toml has the drawn numbers, and calibrated sensors as before; one whose
     identification is finished stays."""
-    copy = project.parent / f"{project.name}-limit"
+    copy = project.parent / f"limit-{project.name}"
     if (copy / FOUND).exists():
         return copy
     shutil.rmtree(copy, ignore_errors=True)
@@ -60,16 +59,13 @@ def reached(project: Path) -> Mapping[str, Any]:
     copy = with_the_truth(project)
     if not (copy / FOUND).exists():
         r2s2r(copy, "identify", "--iteration", "2", "--no-draw")
-    words = ["compare", "--iteration", "2", "--of", "execute", "--model", f"{TRUE}={FOUND}", "--no-draw", "--json"]
-    done = subprocess.run([*COMMAND, *words, "--quiet", "--force"], cwd=copy, capture_output=True, text=True)
-    if done.returncode:
-        raise SystemExit(done.stderr)
-    report: Mapping[str, Any] = json.loads(done.stdout)["report"]
+    compared(copy, {TRUE: FOUND}, draw=False)
+    report: Mapping[str, Any] = json.loads((copy / "comparison.json").read_text("utf-8"))
     return report
 
 
 def errors(reports: Sequence[Mapping[str, Any]], number: int, measure: str) -> dict[str, list[float]]:
-    """Of the runs of an iteration, by simulator: one root mean square a seed, and its floor."""
+    """Of the runs of an iteration, by simulator: one root mean square a seed."""
     found: dict[str, list[float]] = {}
     for report in reports:
         for one in report["history"]:

@@ -63,19 +63,19 @@ Apart = list[tuple[Case, dict[str, float]]]
 @dataclass(frozen=True)
 class Learned:
     """What sets teach. numbers: LEARNED and the biases of `effects`, (LEARNED + effect,). commit: by the keys of
-    PRECISION. unfit, unfit_share: as in `Calibration`."""
+    PRECISION. unfit: `unfit` and `unfit_share` of `Calibration`, empty where no set teaches them."""
 
     numbers: np.ndarray
     effects: tuple[str, ...]
     commit: dict[str, float]
-    unfit: float
-    unfit_share: float
+    unfit: dict[str, float]
 
     def probabilities(self, one: Case) -> dict[str, float]:
         """Of every name of a set."""
         p = _softmax(_design(one, self.effects, self.numbers) @ self.numbers)
-        if one.left_sd > self.unfit:
-            p = (1.0 - self.unfit_share) * p + self.unfit_share * np.array([name == UNKNOWN for name in one.names])
+        if one.left_sd > self.unfit.get("unfit", np.inf):
+            share = self.unfit["unfit_share"]
+            p = (1.0 - share) * p + share * np.array([name == UNKNOWN for name in one.names])
         return dict(zip(one.names, p.tolist(), strict=True))
 
 
@@ -95,8 +95,7 @@ def learn(cases: Sequence[Case], *, known: Sequence[str] = (), where: str = "BAN
         key: _commit(sure[of], right[of], wanted)
         for (key, wanted), of in zip(PRECISION.items(), _claims(first, apart), strict=True)
     }
-    unfit = {"unfit": float("inf"), "unfit_share": 0.0} | _unfit(cases)
-    return Learned(_fit(cases, effects), effects, commit, **unfit), apart
+    return Learned(_fit(cases, effects), effects, commit, _unfit(cases)), apart
 
 
 def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
@@ -132,7 +131,7 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
         "beside": learned["beside"],
         "bias": {name: float(b) / sharp for name, b in zip(own.effects, own.numbers[len(LEARNED) :], strict=True)},
         **own.commit,
-        **_unfit(cases),
+        **own.unfit,
         "conformal": float(held[k - 1]) if k else 0.0,
         "lapse": LAPSE,
         "words": words,

@@ -24,15 +24,14 @@ def sets(count: int, seed: int, *, replay: float, parity: float) -> list[tuple[T
     """Clear single effects, one in five with nothing wrong. replay, parity [nats]: what each says for the right name
     beyond what it says for the others, all of it noise of 1 nat where 0."""
     rng = np.random.default_rng(seed)
-    names, found = (*EFFECTS, "none", "unknown"), []
+    names, found = (*EFFECTS, "none"), []
     for k in range(count):
         nothing = k % 5 == 0
         right = "none" if nothing else str(rng.choice(EFFECTS))
         there = np.array([name == right for name in names])
-        score = np.abs(rng.normal(0.0, 1.0, 6)) + 8.0 + replay * there
-        score[4:] = 8.0, 0.0
-        said = np.where(np.arange(6) < 4, np.abs(rng.normal(0.0, 0.1, 6)) + parity * there, 0.0)
-        one = Case(names, score, said, np.where(there, replay, 0.0), nothing, right)
+        said = np.where(np.arange(5) < 4, np.abs(rng.normal(0.0, 1.0, 5)) + replay * there, 0.0)
+        told = np.where(np.arange(5) < 4, np.abs(rng.normal(0.0, 0.1, 5)) + parity * there, 0.0)
+        one = Case(names, said, told, right)
         kind = "none" if nothing else "single"
         found.append((Truth(kind, () if nothing else (right,), 0.0 if nothing else 20.0, (), None, None, None, None,
                             right), one))  # fmt: skip
@@ -68,32 +67,26 @@ def test_what_alone_tells_is_worth_everything() -> None:
 def test_what_misleads_is_better_left_out() -> None:
     """Parity findings speak for a wrong name in the judged sets alone: the truth is among three without them."""
     cases = [one for _, one in sets(100, 1, replay=60.0, parity=8.0)]
-    judged = [(truth, replace(one, parity=np.r_[np.roll(one.parity[:4], 1), 0.0, 0.0]))
+    judged = [(truth, replace(one, parity=np.r_[np.roll(one.parity[:4], 1), 0.0]))
               for truth, one in sets(50, 2, replay=10.0, parity=8.0)]  # fmt: skip
     found = {one.without: one for one in worth(cases, judged)}
     assert found["nothing"].top3 < 10 and found["the parity stage"].top3 == 40
     assert found["the parity stage"].log_loss < found["nothing"].log_loss
 
 
-def test_a_name_that_predicts_nothing_is_not_committed_to() -> None:
-    """As in a verdict: what gains no more in the replay than chance gives is first, and no name."""
-    cases = [one for _, one in sets(100, 1, replay=0.0, parity=8.0)]
-    judged = sets(50, 2, replay=0.0, parity=8.0)
-    silent = [(t, replace(one, predicts=one.rival)) for t, one in judged]
-    (told, *_), (untold, *_) = worth(cases, judged), worth(cases, silent)
-    assert told.named > 30 and untold.named == 0 and told.top1 == untold.top1
-
-
-def test_bounds_of_one_kind_of_evidence_go_with_it() -> None:
-    """Left-out gains that all data together hold to be luck count in full where those are left out, and what all data
-    say counts in full where it stands alone."""
-    truth, one = sets(5, 3, replay=60.0, parity=0.0)[1]
-    bounded = replace(one, score=np.minimum(one.score, 20.0), gain=one.score, said=np.full(6, 90.0))
-    assert KINDS["all data together (left-out gaits alone)"](bounded).score == pytest.approx(one.score)
-    assert KINDS["gaits left out (scored in sample)"](bounded).score[:4] == pytest.approx(90.0)
-    alone = KINDS["the replay (parity alone)"](replace(bounded, equivalent=True, gap=5.0, left=5.0, left_sd=9.0))
-    assert not alone.score.any() and not alone.equivalent and alone.gap == alone.left == alone.left_sd == 0.0
-    assert truth.kind == "single"
+def test_each_kind_is_left_out_and_nothing_else() -> None:
+    """Left-out gaits take the place of what all data say, losses as nothing; sets that do not say them stay as they
+    are."""
+    one = replace(sets(5, 3, replay=60.0, parity=8.0)[1][1], strange=2.0, left_sd=9.0)
+    other = np.array([-5.0, 1.0, 2.0, 3.0, 0.0])
+    left_out = KINDS["all data together (left-out gaits instead)"]
+    assert left_out(replace(one, left_out=other)).said.tolist() == [0.0, 1.0, 2.0, 3.0, 0.0]
+    assert left_out(one) is one
+    alone = KINDS["the replay (parity alone)"](one)
+    assert not alone.said.any() and alone.strange == alone.left_sd == 0.0 and alone.parity is one.parity
+    assert not KINDS["the parity stage"](one).parity.any() and KINDS["the parity stage"](one).said is one.said
+    assert KINDS["what a wider floor explains"](one).strange == 0.0
+    assert KINDS["what is left beyond healthy runs"](one).left_sd == 0.0
 
 
 def test_what_teaches_may_not_judge() -> None:

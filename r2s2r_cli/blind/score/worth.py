@@ -14,7 +14,7 @@ import numpy as np
 
 from r2s2r_cli.blind.score.calibrate import Learned, learn
 from r2s2r_cli.blind.score.cases import Case
-from r2s2r_cli.blind.score.facts import UNKNOWN, Truth
+from r2s2r_cli.blind.score.facts import NONE, UNKNOWN, Truth
 from r2s2r_cli.errors import InputError
 from schemas.results_blind_worth import BlindWorthRow
 
@@ -46,11 +46,10 @@ class Ranked:
 
 def worth(cases: Sequence[Case], judged: Sequence[tuple[Truth, Case]]) -> tuple[BlindWorthRow, ...]:
     """All evidence first, then without each kind. Raises InputError for too few sets to learn from, or no clear set."""
-    known = {name for _, one in judged for name in one.names}
     everything: list[Ranked] = []
     rows = []
     for what, without in KINDS.items():
-        own, _ = learn([without(one) for one in cases], known=tuple(known), where="--learned")
+        own, _ = learn([without(one) for one in cases], where="--learned")
         found = [_ranked(truth, without(one), own) for truth, one in judged]
         if not any(one.clear for one in found):
             raise InputError("there is no clear single effect to judge by", where="FILE...", expected="at least one",
@@ -63,17 +62,15 @@ def worth(cases: Sequence[Case], judged: Sequence[tuple[Truth, Case]]) -> tuple[
 def _ranked(truth: Truth, one: Case, own: Learned) -> Ranked:
     p = own.probabilities(one)
     order = tuple(sorted(p, key=lambda name: -p[name]))
-    first = one.names.index(order[0])
-    predicts = one.predicts is None or bool(one.predicts[first])
-    name = predicts and not one.rival[first] and p[order[0]] >= own.commit["commit"]
-    return Ranked(truth, one, order, p, order[0] if name else None)
+    first = order[0]
+    named = first not in (NONE, UNKNOWN) and p[first] >= own.commit
+    return Ranked(truth, one, order, p, first if named else None)
 
 
 def _row(what: str, found: Sequence[Ranked], everything: Sequence[Ranked]) -> BlindWorthRow:
     clear = [one for one in found if one.clear]
     named = [one for one in clear if one.named is not None]
     before = [one.right for one in everything if one.clear]
-    told = [one for one in found if one.case.truth != UNKNOWN]
     return BlindWorthRow(
         without=what, clear=len(clear), top1=sum(one.right for one in clear),
         top3=sum(one.case.truth in one.order[:3] for one in clear), named=len(named),
@@ -84,49 +81,20 @@ def _row(what: str, found: Sequence[Ranked], everything: Sequence[Ranked]) -> Bl
         strangers_named=sum(one.case.truth == UNKNOWN and one.named is not None for one in found),
         lost=sum(b and not one.right for b, one in zip(before, clear, strict=True)),
         won=sum(one.right and not b for b, one in zip(before, clear, strict=True)),
-        log_loss=float(np.mean([-np.log(max(one.probability.get(one.case.truth, 0.0), LEAST_P)) for one in told])),
+        log_loss=float(np.mean([-np.log(max(one.probability.get(one.case.truth, 0.0), LEAST_P)) for one in found])),
     )  # fmt: skip
 
 
-def _no_parity(one: Case) -> Case:
-    return replace(one, parity=np.zeros_like(one.parity))
-
-
-def _in_sample(one: Case) -> Case:
-    said = one.marginal if one.said is None else one.said
-    return replace(one, score=np.where(one.rival, one.score, said), marginal=np.zeros_like(one.marginal))
-
-
-def _left_out_only(one: Case) -> Case:
-    return replace(one, score=one.score if one.gain is None else one.gain, marginal=np.zeros_like(one.marginal))
-
-
-def _no_replay(one: Case) -> Case:
-    nothing = np.zeros_like(one.score)
-    return replace(one, score=nothing, marginal=nothing, equivalent=False, gap=0.0, left=0.0, left_sd=0.0)
-
-
-def _no_unknown(one: Case) -> Case:
-    keep = np.array([name != UNKNOWN for name in one.names])
-
-    def kept(values: np.ndarray | None) -> np.ndarray | None:
-        return None if values is None else values[keep]
-
-    return replace(
-        one, names=tuple(name for name in one.names if name != UNKNOWN), score=one.score[keep], parity=one.parity[keep],
-        marginal=one.marginal[keep], gain=kept(one.gain), said=kept(one.said), predicts=kept(one.predicts), left=0.0,
-        left_sd=0.0,
-    )  # fmt: skip
+def _left_out(one: Case) -> Case:
+    return one if one.left_out is None else replace(one, said=np.maximum(one.left_out, 0.0))
 
 
 KINDS: dict[str, Without] = {
     "nothing": lambda one: one,
-    "the parity stage": _no_parity,
-    "gaits left out (scored in sample)": _in_sample,
-    "all data together (left-out gaits alone)": _left_out_only,
-    "the replay (parity alone)": _no_replay,
-    "the rival `unknown`": _no_unknown,
-    "what is left beyond healthy runs": lambda one: replace(one, gap=0.0, left=0.0, left_sd=0.0),
-    "the equivalence test in `none`": lambda one: replace(one, equivalent=False),
+    "the parity stage": lambda one: replace(one, parity=np.zeros_like(one.parity)),
+    "the replay (parity alone)": lambda one: replace(one, said=np.zeros_like(one.said), strange=0.0, left_sd=0.0),
+    "all data together (left-out gaits instead)": _left_out,
+    "what a wider floor explains": lambda one: replace(one, strange=0.0),
+    "what is left beyond healthy runs": lambda one: replace(one, left_sd=0.0),
 }
 """By what they leave out."""

@@ -24,7 +24,7 @@ from r2s2r_cli.stages.diagnose.which.calibration import Calibration, calibration
 from r2s2r_cli.stages.diagnose.which.numbers import SENSOR_LAG, Model
 from r2s2r_cli.stages.diagnose.which.remembered import Checkpoint, Remembered
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
-from r2s2r_cli.stages.diagnose.which.which import Compared, Ways, compare_effects
+from r2s2r_cli.stages.diagnose.which.which import Compared, compare_effects
 from r2s2r_cli.stages.identify.belief import Filter
 
 FALSE = 0.05
@@ -38,9 +38,9 @@ Told = Callable[[str, int, int], None]
 class Settings:
     """How a diagnosis is made. effects: only these are considered; None: the whole catalogue. step [s]: of the engine.
     members: of the filter that makes start states. seed: of all that is drawn. with_parity, with_where, with_much:
-    parts that can be left out. refit_baseline: nuisances are fitted again; held_out: scores are of gaits that were
-    left out; with_floor: the covariance has one; with_unknown: an error without a name is a rival (all four: what an
-    ablation switches off). calibration: None, that of the package."""
+    parts that can be left out. refit_baseline: nuisances are fitted again; with_floor: the covariance has one;
+    with_unknown: an error without a name is possible (all three: what an ablation switches off). calibration: None,
+    that of the package."""
 
     effects: tuple[str, ...] | None = None
     step: float = 2e-3
@@ -50,7 +50,6 @@ class Settings:
     with_where: bool = True
     with_much: bool = True
     refit_baseline: bool = True
-    held_out: bool = True
     with_floor: bool = True
     with_unknown: bool = True
     calibration: Calibration | None = None
@@ -94,7 +93,7 @@ def diagnose(
         calibration=settings.calibration or calibration(),
         sizes={} if said is None else said.starts(), told_by=None if said is None else said.nats(),
         effects=settings.effects, seed=settings.seed, told=progress,
-        ways=Ways(settings.held_out, settings.with_unknown), healthy=fitted.healthy,
+        strangers=settings.with_unknown, healthy=fitted.healthy,
     )  # fmt: skip
     found: Where | None = None
     if settings.with_where:

@@ -131,8 +131,8 @@ def test_the_black_box_takes_what_commands_predict_and_nothing_of_noise() -> Non
 
 
 def test_probabilities_are_a_softmax_and_the_set_is_never_empty() -> None:
-    """Scores a temperature apart differ by e; a bias counts like nats; a high threshold leaves the best name."""
-    p = Calibration(temperature=5.0, bias={"b": 5.0}).probabilities({"a": 10.0, "b": 0.0, "c": -np.inf})
+    """Scores a temperature apart differ by e; a high threshold leaves the best name."""
+    p = Calibration(temperature=5.0).probabilities({"a": 10.0, "b": 5.0, "c": -np.inf})
     assert p["a"] / p["b"] == pytest.approx(np.e)
     assert p["c"] == 0.0 and sum(p.values()) == pytest.approx(1.0)
     assert Calibration(conformal=0.99).within(p) == ("a",)

@@ -1,4 +1,4 @@
-"""What is committed to: a probable first guess, whose effect predicts, by the threshold of what it claims."""
+"""What is committed to: a probable first guess, and `unknown` where no effect of the catalogue is enough."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from r2s2r_cli.stages.diagnose.which.left import Left
 from r2s2r_cli.stages.diagnose.which.pair_share import LEAST, SHARE, TwoCauses, with_pairs
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score
-from r2s2r_cli.stages.diagnose.which.verdict import best_replayed, verdict_of
+from r2s2r_cli.stages.diagnose.which.verdict import verdict_of
 from r2s2r_cli.stages.measures.gap import NO_GAP_FACTOR
 
-BY = Calibration(commit=0.6, commit_unknown=0.7)
+BY = Calibration(commit=0.6)
 CHANCE = 5.0
 GAP, NO_GAP = NoGap(0.02, 0.03, 0.01, 0.0), NoGap(0.009, 0.011, 0.01, 0.95)
 """A refit error of twice the floor, and one at the floor."""
@@ -30,71 +30,71 @@ def ranking(first: str, probability: float, gain: float) -> list[Ranked]:
     return [Ranked(first, gain, probability), Ranked("backlash", 0.0, 1.0 - probability)]
 
 
-@pytest.mark.parametrize(("first", "kind", "at"), [("payload", "effect", 0.6), ("unknown", "unknown", 0.7)])
-def test_each_claim_has_its_threshold(first: str, kind: str, at: float) -> None:
-    """From it on, and not below."""
-    assert verdict_of(ranking(first, at, 30.0), BY, None, CHANCE, GAP)[0] == kind
-    assert verdict_of(ranking(first, at - 0.01, 30.0), BY, None, CHANCE, GAP) == ("ambiguous", (), at - 0.01)
+def test_a_name_has_its_threshold() -> None:
+    """From it on, and not below; that the cause has no name is never a verdict for being probable alone."""
+    assert verdict_of(ranking("payload", 0.6, 30.0), BY, None, GAP)[:2] == ("effect", ("payload",))
+    assert verdict_of(ranking("payload", 0.59, 30.0), BY, None, GAP) == ("ambiguous", (), 0.59)
+    assert verdict_of(ranking("unknown", 0.99, 30.0), BY, None, GAP) == ("ambiguous", (), 0.99)
 
 
 def test_no_gap_is_a_claim_about_size() -> None:
     """Said where the error is at the floor and no cause is likelier than not, and never where the error is larger,
     however probable it is that nothing is wrong."""
-    assert verdict_of(ranking("none", 0.99, 0.0), BY, None, CHANCE, GAP) == ("ambiguous", (), 0.99)
-    assert verdict_of(ranking("none", 0.3, 0.0), BY, None, CHANCE, NO_GAP) == ("no_gap", (), 0.95)
-    assert verdict_of(ranking("payload", 0.49, 30.0), BY, None, CHANCE, NO_GAP) == ("no_gap", (), 0.95)
-    assert verdict_of(ranking("payload", 0.51, 30.0), BY, None, CHANCE, NO_GAP) == ("ambiguous", (), 0.51)
-    assert verdict_of(ranking("payload", 0.7, 30.0), BY, None, CHANCE, NO_GAP)[0] == "effect"
-    assert verdict_of(ranking("sensor_bias", 0.7, CHANCE), BY, None, CHANCE, NO_GAP)[0] == "no_gap"
+    assert verdict_of(ranking("none", 0.99, 0.0), BY, None, GAP) == ("ambiguous", (), 0.99)
+    assert verdict_of(ranking("none", 0.3, 0.0), BY, None, NO_GAP) == ("no_gap", (), 0.95)
+    assert verdict_of(ranking("unknown", 0.7, 0.0), BY, None, NO_GAP) == ("no_gap", (), 0.95)
+    assert verdict_of(ranking("payload", 0.49, 30.0), BY, None, NO_GAP) == ("no_gap", (), 0.95)
+    assert verdict_of(ranking("payload", 0.51, 30.0), BY, None, NO_GAP) == ("ambiguous", (), 0.51)
+    assert verdict_of(ranking("payload", 0.7, 30.0), BY, None, NO_GAP)[0] == "effect"
 
 
 def test_no_name_where_the_best_effect_leaves_too_much() -> None:
     """An effect that gains most and is far the likeliest is not named where what it leaves stands out from the healthy
     runs, as it did in strangers only, nor is a pair; without healthy runs nobody knows what may be left."""
     by = replace(BY, temperature=5.0, unfit=4.4, unfit_share=0.75)
-    usual = by.probabilities({"payload": 100.0, "backlash": 10.0, "none": 0.0, "unknown": 0.0})
-    assert by.doubted(usual, 4.3) == usual
-    beyond = by.doubted(usual, 4.5)
-    assert sum(beyond.values()) == pytest.approx(1.0)
-    assert beyond["unknown"] == pytest.approx(0.75 + 0.25 * usual["unknown"])
-    assert beyond["payload"] == pytest.approx(0.25 * usual["payload"])
+    names = by.probabilities({"payload": 100.0, "backlash": 10.0, "none": 0.0})
+    usual, beyond = by.with_unknown(names, 0.0, 4.3), by.with_unknown(names, 0.0, 4.5)
+    assert usual["unknown"] == pytest.approx(1.0 / (1.0 + np.exp(2.0)))
+    assert beyond["unknown"] == 0.75 and beyond["payload"] == pytest.approx(0.25 * names["payload"])
+    for found in (usual, beyond):
+        assert sum(found.values()) == pytest.approx(1.0)
     likely = [Ranked("unknown", 0.0, by.unfit_share), Ranked("payload", 100.0, 0.2)]
-    strict = replace(by, commit_unknown=0.95)
     for pair in (None, ("payload", "backlash"), ("unknown", "backlash")):
-        assert verdict_of(likely, strict, pair, CHANCE, NO_GAP, left_sd=4.5) == ("unknown", (), 0.75)
-    assert verdict_of(likely, strict, None, CHANCE, GAP, left_sd=4.3)[0] == "ambiguous"
-    assert by.absolute().doubted(usual, 99.0) == usual
+        assert verdict_of(likely, by, pair, NO_GAP, left_sd=4.5) == ("unknown", (), 0.75)
+    assert verdict_of(likely, by, None, GAP, left_sd=4.3)[0] == "ambiguous"
+    assert by.absolute().with_unknown(names, 0.0, 99.0) == usual
+
+
+def test_a_stranger_is_as_probable_as_what_a_wider_floor_explains() -> None:
+    """Log odds grow with the logarithm of what that gains, and nothing is gained by a loss; where it was not asked
+    there is none. Names keep their proportions."""
+    by = replace(BY, stranger=-2.0, wider=0.7, few=10.0)
+    names = {"payload": 0.6, "none": 0.4}
+    share = [by.with_unknown(names, nats, 0.0)["unknown"] for nats in (-5.0, 0.0, 10.0, 30.0, 310.0)]
+    odds = np.log(np.array(share) / (1.0 - np.array(share)))
+    assert odds == pytest.approx(-2.0 + 0.7 * np.log([1.0, 1.0, 2.0, 4.0, 32.0]))
+    assert by.with_unknown(names, -np.inf, 0.0) == {**names, "unknown": 0.0}
+    found = by.with_unknown(names, 100.0, 0.0)
+    assert found["payload"] / found["none"] == pytest.approx(1.5)
 
 
 def test_the_rule_of_the_package_names_a_stranger() -> None:
     """What is shipped: a certain effect, and a certain pair, that leave five sd are `unknown` by its own threshold."""
     by = calibration()
-    certain = {"payload": 0.97, "none": 0.01, "unknown": 0.01, "backlash": 0.01}
-    found = by.doubted(certain, 5.0)
+    certain = {"payload": 0.97, "none": 0.01, "backlash": 0.02}
+    for left, verdict in ((5.0, ("unknown", ())), (4.0, ("effect", ("payload",)))):
+        found = by.with_unknown(certain, 0.0, left)
+        ranks = [Ranked(name, 100.0, p) for name, p in sorted(found.items(), key=lambda item: -item[1])]
+        assert verdict_of(ranks, by, None, GAP, left_sd=left)[:2] == verdict
+    found = by.with_unknown(certain, 0.0, 5.0)
     ranks = [Ranked(name, 100.0, p) for name, p in sorted(found.items(), key=lambda item: -item[1])]
-    assert verdict_of(ranks, by, ("payload", "backlash"), CHANCE, GAP, left_sd=5.0)[0] == "unknown"
-    ranks = [Ranked(name, 100.0, p) for name, p in certain.items()]
-    assert verdict_of(ranks, by, None, CHANCE, GAP, left_sd=4.0)[:2] == ("effect", ("payload",))
+    assert verdict_of(ranks, by, ("payload", "backlash"), GAP, left_sd=5.0)[0] == "unknown"
 
 
 def test_what_is_left_is_told_in_its_sd() -> None:
     """0 where nothing is known of how healthy pieces differ."""
     assert Left(50.0, 30.0, 10.0).beyond == 3.0
     assert Left(50.0, 30.0, float("nan")).beyond == 0.0
-
-
-def test_a_stranger_competes_with_what_it_looks_like() -> None:
-    """An effect that gains much is the first guess where it explains all, and not where it leaves as much as it gains:
-    what looks a little like a name is none. What only the logs show is nothing that a stranger could look like."""
-    by = replace(BY, temperature=5.0, beside=0.7, unknown_share=0.5, unknown=5.0)
-    gains = {"payload": 100.0, "backlash": 10.0}
-    for left, first in ((0.0, "payload"), (100.0, "unknown")):
-        worth = {name: by.score(name, gain) for name, gain in gains.items()}
-        worth["unknown"] = by.score("unknown", left, best=best_replayed(worth))
-        p = by.probabilities(worth)
-        assert max(p, key=lambda name: p[name]) == first
-    assert best_replayed({"dropout": 300.0, "none": 200.0, "payload": 3.0}) == 3.0
-    assert best_replayed({"payload": -9.0}) == -9.0 and best_replayed({}) == 0.0
 
 
 def test_the_bound_and_its_confidence_agree() -> None:
@@ -109,20 +109,20 @@ def test_the_bound_and_its_confidence_agree() -> None:
     assert seen == {True, False}
 
 
-def test_a_cause_predicts() -> None:
-    """However probable the parity stage makes it: what gains no more than chance in the replay is not the cause. What
-    changes no prediction at all needs none."""
-    assert verdict_of(ranking("sensor_bias", 0.99, 30.0), BY, None, CHANCE, GAP)[:2] == ("effect", ("sensor_bias",))
-    assert verdict_of(ranking("sensor_bias", 0.99, CHANCE), BY, None, CHANCE, GAP)[0] == "ambiguous"
-    assert verdict_of(ranking("dropout", 0.99, 0.0), BY, None, CHANCE, GAP)[:2] == ("effect", ("dropout",))
+def test_an_effect_that_harms_is_not_there_and_no_less_than_that() -> None:
+    """What it gains counts in full, and a loss as nothing: one that breaks everything is as improbable as one that
+    changes nothing. What `none` is worth depends on no evidence."""
+    assert BY.score("payload", 30.0) - BY.score("payload", 10.0) == pytest.approx(20.0)
+    assert BY.score("payload", -500.0) == BY.score("payload", 0.0) == 0.0
+    assert BY.score("none", 99.0, parity=99.0) == BY.none
 
 
 def test_a_pair_is_as_probable_as_both_its_names() -> None:
     """What speaks for both is shared between them, so that neither alone need reach the threshold."""
     pair = [Ranked("payload", 30.0, 0.4), Ranked("motor_lag", 8.0, 0.3), Ranked("none", 0.0, 0.3)]
-    assert verdict_of(pair, BY, ("payload", "motor_lag"), CHANCE, GAP) == ("pair", ("payload", "motor_lag"), 0.7)
-    assert verdict_of(pair, BY, None, CHANCE, GAP)[0] == "ambiguous"
-    assert verdict_of(ranking("payload", 0.9, 30.0), BY, ("motor_lag", "none"), CHANCE, GAP)[0] == "effect"
+    assert verdict_of(pair, BY, ("payload", "motor_lag"), GAP) == ("pair", ("payload", "motor_lag"), 0.7)
+    assert verdict_of(pair, BY, None, GAP)[0] == "ambiguous"
+    assert verdict_of(ranking("payload", 0.9, 30.0), BY, ("motor_lag", "none"), GAP)[0] == "effect"
 
 
 ALONE = {"payload": 40.0, "motor_lag": 10.0, "backlash": 2.0}

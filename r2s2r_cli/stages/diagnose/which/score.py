@@ -96,7 +96,7 @@ class _Left:
 
 
 def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: bool = True) -> list[Score]:
-    """Of every fit; all hypotheses in one batch for each group. held_out: False, nothing is left out (an ablation)."""
+    """Of every fit; all hypotheses in one batch for each group. held_out: False, nothing is left out."""
     solver = Fits(arena)
     names = np.unique(groups)
     place = {(one.run, one.interval): groups[k] for k, one in enumerate(arena.many)}

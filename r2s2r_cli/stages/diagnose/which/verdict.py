@@ -20,10 +20,10 @@ from r2s2r_cli.stages.diagnose.which.score import Score, gain_sds, gains as gain
 from r2s2r_cli.stages.diagnose.which.screen import Response
 
 NINETY = 1.645
-INDISTINCT = 3.0
-"""[nats] Two hypotheses nearer than this cannot be told apart."""
 LIKELY = 0.5
 """Probability from which an effect is likelier than not: then there is something to be found, however small."""
+ALIKE = 4
+"""Effects, the best, that are looked at for predicting the same."""
 SHIFTED = 1.0
 """Posterior sd by which an effect moves a nuisance before it is worth saying."""
 
@@ -32,11 +32,10 @@ def concluded(m: Material) -> Which:
     """The verdict."""
     gains = dict(enumerate((gains_of(m.refit, m.scores) - m.chronic).tolist()))
     calibration = m.calibration
-    order = sorted(gains, key=lambda i: -gains[i])
+    order = sorted(gains, key=lambda i: -float(m.marginal[i]))
     singles = [i for i in order if len(m.fits[i].hypothesis.parts) == 1]
     worth = {
-        i: calibration.score(m.fits[i].hypothesis.effects[0], gains[i], marginal=float(m.marginal[i]), parity=m.said(i))
-        for i in singles
+        i: calibration.score(m.fits[i].hypothesis.effects[0], float(m.marginal[i]), parity=m.said(i)) for i in singles
     }
     best: dict[str, int] = {}
     for i in sorted(singles, key=lambda i: -worth[i]):
@@ -44,12 +43,11 @@ def concluded(m: Material) -> Which:
     names = {name: gains[i] for name, i in best.items()}
     others = _not_fitted(m, names)
     table = {name: worth[i] for name, i in best.items()}
-    table |= {one.effect: calibration.score(one.effect, one.gain, parity=one.parity) for one in others}
-    table[NONE] = calibration.score(NONE, m.chance, equivalent=m.no_gap.equivalent, beyond=m.left.refit)
-    table[UNKNOWN] = calibration.score(UNKNOWN, m.unexplained, beyond=m.left.best, best=best_replayed(table))
+    table |= {one.effect: calibration.score(one.effect, parity=one.parity) for one in others}
+    table[NONE] = calibration.score(NONE)
     both = [_two(m, i, best, gains) for i in order if len(m.fits[i].hypothesis.parts) == 2]
     probability, pair = with_pairs(calibration.probabilities(table), both, names, m.chance, calibration.temperature)
-    probability = calibration.doubted(probability, m.left.beyond)
+    probability = calibration.with_unknown(probability, m.unexplained, m.left.beyond)
     sds = gain_sds(m.refit, m.scores, m.groups).tolist() if m.scores else []
     ranking = [
         replace(
@@ -67,8 +65,8 @@ def concluded(m: Material) -> Which:
     ]
     shown = _shown(m.responses)
     ranking = [replace(one, seen=shown.get(one.effect, np.nan)) for one in ranking]
-    ranking.sort(key=lambda one: (-one.probability, -one.gain))
-    verdict, effects, p = verdict_of(ranking, calibration, pair, m.chance, m.no_gap, left_sd=m.left.beyond)
+    ranking.sort(key=lambda one: (-one.probability, -one.marginal))
+    verdict, effects, p = verdict_of(ranking, calibration, pair, m.no_gap, left_sd=m.left.beyond)
     top = best.get(effects[0]) if effects else None
     return Which(
         verdict=verdict, effects=effects, probability=p, set90=calibration.within(probability), ranking=tuple(ranking),
@@ -76,7 +74,7 @@ def concluded(m: Material) -> Which:
             Screened(r.candidate.effect, r.candidate.element, r.gain, r.absorbed, r.seen) for r in m.responses
         ),
         no_gap=m.no_gap, chance=m.chance, wider=m.wider, unexplained=m.unexplained, left=m.left,
-        confusable=confusable(m, [best[name] for name in sorted(names, key=lambda n: -names[n])[:4]]),
+        confusable=confusable(m, list(best.values())[:ALIKE]),
         not_testable=_not_testable(m.responses), shifts=() if top is None else _shifts(m, m.fits[top]),
         within=_left_out(m), calibrated=calibration.words, warnings=_warnings(m, [best[name] for name in names]),
         pairs=tuple(both),
@@ -89,11 +87,6 @@ def _two(m: Material, i: int, best: Mapping[str, int], gains: Mapping[int, float
     alone = best[first]
     added = min(gains[i] - gains[alone], float(m.marginal[i] - m.marginal[alone]))
     return TwoCauses((first, second), gains[i], float(m.marginal[i]), added)
-
-
-def best_replayed(worth: Mapping[str, float]) -> float:
-    """Of the scores of effects and `none` the best of an effect that changes a prediction [nats]."""
-    return max((nats for name, nats in worth.items() if name != NONE and name not in NO_REPLAY), default=0.0)
 
 
 def _not_fitted(m: Material, fitted: Mapping[str, float]) -> list[Ranked]:
@@ -125,31 +118,25 @@ def _channel(name: str) -> str:
 
 
 def verdict_of(
-    ranking: list[Ranked], calibration: Calibration, pair: tuple[str, ...] | None, chance: float, gap: NoGap,
-    *, left_sd: float = 0.0,
+    ranking: list[Ranked], calibration: Calibration, pair: tuple[str, ...] | None, gap: NoGap, *, left_sd: float = 0.0,
 ) -> tuple[str, tuple[str, ...], float]:  # fmt: skip
     """What the first of the ranking is worth. Where the best effect leaves too much (left_sd, `Calibration.refuses`)
-    that is a verdict of its own: no effect of the catalogue is enough. A cause predicts: an effect that gains no more
-    in the replay than the best of the catalogue does by chance is not named, whatever parity says. Where no
-    cause is named, that there is no gap is a claim about its size (design.md, Measures), not about causes that hide
-    below the floor."""
+    that is a verdict of its own: no effect of the catalogue is enough. Where no cause is named, that there is no gap is
+    a claim about its size (design.md, Measures), not about causes that hide below the floor."""
     first = ranking[0]
-    predicts = first.gain > chance or first.effect in (NONE, UNKNOWN, *NO_REPLAY)
+    named = first.effect not in (NONE, UNKNOWN)
     if first.effect == UNKNOWN and calibration.refuses(left_sd):
         return "unknown", (), first.probability
     if pair is not None and first.effect in pair:
         # What speaks for both together is shared between their names.
         p = sum(one.probability for one in ranking if one.effect in pair)
-        if calibration.commits(first.effect, p):
+        if calibration.commits(p):
             return "pair", pair, p
-    if not (predicts and first.effect != NONE and calibration.commits(first.effect, first.probability)):
-        likely = predicts and first.effect not in (NONE, UNKNOWN) and first.probability >= LIKELY
-        if gap.equivalent and not likely:
-            return "no_gap", (), gap.sure
-        return "ambiguous", (), first.probability
-    if first.effect == UNKNOWN:
-        return "unknown", (), first.probability
-    return "effect", (first.effect,), first.probability
+    if named and calibration.commits(first.probability):
+        return "effect", (first.effect,), first.probability
+    if gap.equivalent and not (named and first.probability >= LIKELY):
+        return "no_gap", (), gap.sure
+    return "ambiguous", (), first.probability
 
 
 def _ranked(

@@ -1,4 +1,5 @@
-"""Stage 2 of a diagnosis: which effect. Refit nominal + effect against refit nominal, on gaits that were left out."""
+"""Stage 2 of a diagnosis: which effect. Refit nominal + effect against refit nominal: on all data together, which rank
+effects, and on gaits that were left out, which say what a claim is worth."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ from r2s2r_cli.stages.diagnose.which.marginal import marginal_gains
 from r2s2r_cli.stages.diagnose.which.material import Material
 from r2s2r_cli.stages.diagnose.which.pairs import ITERATIONS, pairs_of
 from r2s2r_cli.stages.diagnose.which.rivals import WIDER, chance, no_gap
-from r2s2r_cli.stages.diagnose.which.score import ENOUGH, Score, gains, groups_of, scores
+from r2s2r_cli.stages.diagnose.which.score import ENOUGH, Score, groups_of, scores
 from r2s2r_cli.stages.diagnose.which.screen import screen
 from r2s2r_cli.stages.diagnose.which.search import Said, Told, fitted, led, picked_of
 from r2s2r_cli.stages.diagnose.which.verdict import concluded
@@ -30,15 +31,6 @@ LOOKED_AT = 4
 """Fits that the size of an error without a name is learned from."""
 SECOND = 3
 """Iterations after the floor was widened."""
-
-
-@dataclass(frozen=True)
-class Ways:
-    """What an ablation leaves out. held_out: scores are of gaits left out of the fit; unknown: an error without a name
-    is a rival."""
-
-    held_out: bool = True
-    unknown: bool = True
 
 
 @dataclass(frozen=True)
@@ -58,17 +50,16 @@ def compare_effects(
     arena: Arena, base: Fit, *, floor_m: float, kept: float = 1.0, calibration: Calibration,
     sizes: Mapping[str, Mapping[str, float]], told_by: Said | None = None,
     effects: Sequence[str] | None = None, seed: int = 0, told: Told,
-    ways: Ways | None = None, healthy: Healthy | None = None,
+    strangers: bool = True, healthy: Healthy | None = None,
 ) -> Compared:  # fmt: skip
     """All effects against the refit nominal model `base` of this arena. floor_m: key-frame RMSE with nothing wrong, of
     the share `kept` of the intervals.
     healthy: the runs of before; an effect that helps there as well makes up for the simulator.
 
     sizes, told_by: of the parity stage: sizes to begin with, and the nats that it says for an effect at an element: the
-    first SUSPECTED are fitted whatever the screening says. effects: only these. Raises NumericalError where nothing
-    can be simulated.
+    first SUSPECTED are fitted whatever the screening says. effects: only these. strangers: an error without a name is
+    possible; False in an ablation. Raises NumericalError where nothing can be simulated.
     """
-    ways = ways or Ways()
     calibration = calibration if healthy is not None else calibration.absolute()
     made = candidates(arena.model, sizes, touched(arena), arena.values(base.z[None])[0])
     known = [one for one in made if effects is None or one.effect in effects]
@@ -79,43 +70,43 @@ def compare_effects(
     picked = picked_of(responses, told_by or {})
     base, fits = fitted(arena, base, picked, told_by or {}, told)
     at_least = expected(arena)
-    wider, unexplained = _widened(arena, [base, *fits[:LOOKED_AT]]) if ways.unknown else (1.0, 0.0)
+    wider, unexplained = _widened(arena, [base, *fits[:LOOKED_AT]]) if strangers else (1.0, -np.inf)
     if wider > 1.0:
         arena.whiten(floor_m=wider * arena.floor_m)
         base, *fits = _again(arena, [base, *fits])
     told("left out", 0, 1)
     # Where a fit came by a cliff, and went on in small steps, its derivative is still that of the cliff.
     Fits(arena).secants(fits)
-    refit, *own = scores(arena, [base, *fits], groups, held_out=ways.held_out)
+    refit, *own = scores(arena, [base, *fits], groups)
     old = chronic(arena, healthy, fits)
     by_chance = chance(arena, responses, groups, seed=seed)
-    gained = gains(refit, own) - old
+    said = marginal_gains(arena, base, fits) - old
     # Beside an effect that gains no more than chance does, a second one is no second cause.
-    pairs = pairs_of(arena, base, fits, gained, responses, told_by or {}) if gained.max(initial=0.0) > by_chance else []
+    pairs = pairs_of(arena, base, fits, said, responses, told_by or {}) if said.max(initial=0.0) > by_chance else []
     if pairs:
-        first = int(gained.argmax())
+        first = int(said.argmax())
         alone = led(Fits(arena), fits[first], pairs, iterations=ITERATIONS)
         if alone is not fits[first]:
-            fits[first], own[first] = alone, scores(arena, [alone], groups, held_out=ways.held_out)[0]
+            fits[first], own[first] = alone, scores(arena, [alone], groups)[0]
             old[first] = chronic(arena, healthy, [alone])[0]
         Fits(arena).secants(pairs)
-        fits, own = [*fits, *pairs], [*own, *scores(arena, pairs, groups, held_out=ways.held_out)]
+        fits, own = [*fits, *pairs], [*own, *scores(arena, pairs, groups)]
         old = np.concatenate([old, chronic(arena, healthy, pairs)])
+        said = marginal_gains(arena, base, fits) - old
     told("left out", 1, 1)
     material = Material(
         arena=arena, base=base, refit=refit, fits=tuple(fits), scores=tuple(own), responses=responses,
         chance=by_chance, no_gap=no_gap(refit, floor_m, kept=kept), wider=wider,
         left=left(at_least, arena.sizes, refit, own, healthy),
-        unexplained=unexplained if ways.unknown else -np.inf, groups=groups, calibration=calibration,
-        chronic=old, marginal=marginal_gains(arena, base, fits) - old,
+        unexplained=unexplained, groups=groups, calibration=calibration, chronic=old, marginal=said,
         asked=None if effects is None else tuple(effects), parity=told_by or {},
     )  # fmt: skip
     which = concluded(material)
-    order = _in_order(which, fits, gains(refit, own) - old)
+    order = _in_order(which, fits, said)
     return Compared(arena, base, tuple(fits[i] for i in order), refit, tuple(own[i] for i in order), which)
 
 
-def _in_order(which: Which, fits: Sequence[Fit], gained: np.ndarray) -> list[int]:
+def _in_order(which: Which, fits: Sequence[Fit], said: np.ndarray) -> list[int]:
     """Places of the fits: what is committed to, then as the ranking has it with its elements, two effects after the
     better of them."""
     place = {one.effect: k for k, one in enumerate(which.ranking)}
@@ -124,7 +115,7 @@ def _in_order(which: Which, fits: Sequence[Fit], gained: np.ndarray) -> list[int
     def key(i: int) -> tuple[bool, int, int, bool, float]:
         parts, own = fits[i].hypothesis.parts, fits[i].hypothesis.effects
         elsewhere = any(one.element not in (None, seats[one.effect]) for one in parts)
-        return own != which.effects, min(place[name] for name in own), len(own), elsewhere, -float(gained[i])
+        return own != which.effects, min(place[name] for name in own), len(own), elsewhere, -float(said[i])
 
     return sorted(range(len(fits)), key=key)
 

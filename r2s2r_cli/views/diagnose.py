@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 GUILTY = RED
 PLAIN = "#8792a2"
 NINETY = 1.645
+NOWHERE = -1e8
+"""[nats] Below which a gain stands for a simulation that broke off."""
 """Sd to either side of a 90 % interval."""
 LABELS = 60
 """Letters that fit below an axis side by side."""
@@ -145,18 +147,21 @@ def _drawn(axes: Axes, group: Group, p: np.ndarray, element: object) -> None:
 
 
 def _ranking(data: ArtifactData, report: DiagnoseReport) -> bytes:
-    """Gains over the refit nominal model with their probabilities; what chance reaches is marked."""
+    """Gains over the refit nominal model on all data, beside them those on gaits left out, and probabilities."""
     del data
     rows = [one for one in report.ranking if one.effect not in ("none", "unknown")][:10]
     others = [one for one in report.ranking if one.effect in ("none", "unknown")]
     figure = new_figure(10.5, 1.4 + 0.36 * (len(rows) + len(others)))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=[1.6, 1])
-    names = []
+    names, told = [], False
     for y, one in enumerate([*rows, *others]):
         color = GUILTY if one.effect in report.effects else "#444f5e" if one in others else BEFORE
-        if one not in others:
+        if one not in others and one.fitted and one.elpd_gain > NOWHERE:
             wide = None if one.elpd_gain_sd is None else NINETY * one.elpd_gain_sd
-            left.barh(y, one.elpd_gain, xerr=wide, color=color, height=0.6, ecolor="#111111", capsize=3)
+            left.barh(y, one.marginal_nats or 0.0, color=color, height=0.6)
+            left.errorbar(one.elpd_gain, y, xerr=wide, fmt="D", ms=4, mfc="white", color="#111111", capsize=3, lw=1,
+                          label=None if told else "on gaits left out, with 90 % interval")  # fmt: skip
+            told = True
         right.barh(y, one.probability, color=color, height=0.6)
         right.annotate(f"{one.probability:.2f}", (one.probability, y), xytext=(4, 0), textcoords="offset points",
                        va="center", fontsize=8)  # fmt: skip
@@ -166,7 +171,7 @@ def _ranking(data: ArtifactData, report: DiagnoseReport) -> bytes:
     left.axvline(0.0, color="#111111", lw=0.8)
     left.set_yticks(range(len(names)), names, fontsize=8)
     left.invert_yaxis()
-    left.set_xlabel("gain on what was left out, with 90 % interval [nats]", fontsize=8)
+    left.set_xlabel("gain on all data [nats]", fontsize=8)
     handles, labels = left.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", fontsize=8, frameon=False)
     right.set(xlim=(0, 1.15))

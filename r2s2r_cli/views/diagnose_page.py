@@ -27,8 +27,8 @@ def diagnose_tables(report: DiagnoseReport) -> Iterator[PageTable]:
         [
             "name",
             "where",
-            "left out: gain +- sd [nats]",
             "all data: gain [nats]",
+            "left out: gain +- sd [nats]",
             "probability",
             "size",
             "90 % interval",
@@ -114,7 +114,7 @@ def _ranked(one: RankedName) -> list[str]:
         else f"{one.elpd_gain:.1f}" + ("" if one.elpd_gain_sd is None else f" +- {one.elpd_gain_sd:.1f}")
     )
     whole = f"{one.marginal_nats:.1f}" if one.fitted and one.size and one.marginal_nats is not None else ""
-    return [one.effect, where, gain, whole, f"{one.probability:.2f}", "; ".join(sizes), "; ".join(wide),
+    return [one.effect, where, whole, gain, f"{one.probability:.2f}", "; ".join(sizes), "; ".join(wide),
             rmse, "; ".join(remarks)]  # fmt: skip
 
 

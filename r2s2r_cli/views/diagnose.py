@@ -160,7 +160,7 @@ def _ranking(data: ArtifactData, report: DiagnoseReport) -> bytes:
             wide = None if one.elpd_gain_sd is None else NINETY * one.elpd_gain_sd
             left.barh(y, one.marginal_nats or 0.0, color=color, height=0.6)
             left.errorbar(one.elpd_gain, y, xerr=wide, fmt="D", ms=4, mfc="white", color="#111111", capsize=3, lw=1,
-                          label=None if told else "on gaits left out, with 90 % interval")  # fmt: skip
+                          label=None if told else "on what was left out, with 90 % interval")  # fmt: skip
             told = True
         right.barh(y, one.probability, color=color, height=0.6)
         right.annotate(f"{one.probability:.2f}", (one.probability, y), xytext=(4, 0), textcoords="offset points",

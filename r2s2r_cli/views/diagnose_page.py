@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 INDISTINCT = 3.0
 """[nats] Below, two effects cannot be told apart."""
 _RIVALS = {
-    "none": "the refit nominal model; counts with what chance gains",
-    "unknown": "gain if errors may be larger than the floor; counts less, since that explains anything",
+    "none": "the refit nominal model; counts as much in every diagnosis",
+    "unknown": "gain if errors may be larger than the floor: the more that is, the likelier a cause without a name",
 }
 
 

@@ -155,13 +155,16 @@ def test_pairs_share_without_adding() -> None:
     assert with_pairs(NAMES, [], ALONE, CHANCE, 6.0) == (NAMES, None)
 
 
-def test_without_healthy_runs_the_parity_stage_counts_for_less() -> None:
-    """And whoever reads the probabilities is told."""
+def test_without_healthy_runs_less_counts() -> None:
+    """The parity stage for less, and no gain that left-out data do not confirm; whoever reads the probabilities is
+    told."""
     own = BY.absolute()
-    assert own.score("payload", 7.0, parity=8.0) - 7.0 == pytest.approx(
+    assert own.score("payload", 7.0, left_out=9.0, parity=8.0) - 7.0 == pytest.approx(
         ABSOLUTE * (BY.score("payload", 7.0, parity=8.0) - 7.0)
     )
-    assert own.score("payload", 7.0) == BY.score("payload", 7.0)
+    assert own.score("payload", 7.0, left_out=9.0) == BY.score("payload", 7.0) == 7.0
+    assert own.score("payload", 95.0, left_out=9.0) == 9.0 and own.score("payload", 95.0, left_out=-3.0) == 0.0
+    assert BY.score("payload", 95.0, left_out=-3.0) == 95.0
     assert "healthy runs" in own.words and own.commit == BY.commit
 
 

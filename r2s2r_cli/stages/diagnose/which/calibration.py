@@ -31,6 +31,7 @@ class Calibration:
     unfit: how far beyond those of healthy runs pieces may lie under the best effect of each [sd]: farther, no effect of
     the catalogue is enough, and `unknown` has at least unfit_share.
     commit: probability from which an effect is the verdict.
+    cautious: gains count no more than what left-out gaits say.
     conformal: names whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many
     it rests on, 0 for the defaults. lapse: how often the evidence says nothing of the truth, so that no name is ever
     certain.
@@ -47,23 +48,31 @@ class Calibration:
     unfit: float = float("inf")
     unfit_share: float = 0.0
     commit: float = 0.5
+    cautious: bool = False
     conformal: float = 0.05
     lapse: float = 0.0
     words: str = "uncalibrated: a temperature by hand"
     sets: int = 0
 
-    def score(self, name: str, marginal: float = 0.0, *, parity: float = 0.0) -> float:
+    def score(self, name: str, marginal: float = 0.0, *, left_out: float = 0.0, parity: float = 0.0) -> float:
         """What a name is worth [nats]. marginal: what the effect gains on all data, nothing where it loses: how much it
-        would harm does not say how little it is there. parity: what the parity stage says for it."""
+        would harm does not say how little it is there. left_out: what it gains on gaits that were left out. parity:
+        what the parity stage says for it."""
         if name == NONE:
             return self.none
+        if self.cautious:
+            marginal = min(marginal, left_out)
         most = float("inf") if name in NO_REPLAY else self.most
         return max(marginal, 0.0) + self.parity * min(max(parity - self.by_chance, 0.0), most)
 
     def absolute(self) -> Calibration:
-        """For a diagnosis without healthy runs."""
-        words = f"{self.words}; those had healthy runs, here are none: findings of the parity stage count for less"
-        return replace(self, parity=ABSOLUTE * self.parity, unfit=float("inf"), words=words)
+        """For a diagnosis without healthy runs: nothing says which gains make up for the simulator and were there
+        before, nor what usually is left."""
+        words = (
+            f"{self.words}; those had healthy runs, here are none: findings of the parity stage count for less, and "
+            "gains no more than left-out data say"
+        )
+        return replace(self, parity=ABSOLUTE * self.parity, unfit=float("inf"), cautious=True, words=words)
 
     def refuses(self, left_sd: float) -> bool:
         """Whether what the best effect leaves [sd of healthy pieces] is too much for any effect of the catalogue."""

@@ -35,7 +35,8 @@ def concluded(m: Material) -> Which:
     order = sorted(gains, key=lambda i: -float(m.marginal[i]))
     singles = [i for i in order if len(m.fits[i].hypothesis.parts) == 1]
     worth = {
-        i: calibration.score(m.fits[i].hypothesis.effects[0], float(m.marginal[i]), parity=m.said(i)) for i in singles
+        i: calibration.score(m.fits[i].hypothesis.effects[0], float(m.marginal[i]), left_out=gains[i], parity=m.said(i))
+        for i in singles
     }
     best: dict[str, int] = {}
     for i in sorted(singles, key=lambda i: -worth[i]):

@@ -19,7 +19,7 @@ class BlindWorthRow(BlindCounts):
     """Clear ones whose truth is first with all evidence and not without this kind."""
     won: int
     log_loss: float
-    """Of the truth, strangers and pairs left out [nats]."""
+    """Of the truth, pairs left out [nats]."""
 
 
 class BlindWorthResult(Frozen):

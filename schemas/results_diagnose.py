@@ -155,7 +155,7 @@ class DiagnoseReport(Frozen):
     refit_upper_m: float | None
     """Upper 90 % bound; below 1.25 floor there is no gap."""
     chance_nats: float
-    """What the best of the catalogue gains by chance in one case of twenty."""
+    """What the best of the catalogue gains left out by chance in one case of twenty."""
     gap_nats: float | None = None
     """What today's pieces cost beyond as many of the healthy runs, under the refit nominal model."""
     left_nats: float | None = None

@@ -74,7 +74,8 @@ def diagnose(
     """Say where the sim-to-real gap lies, which unmodelled effect causes it, and how far it shrinks with that effect.
 
     Fits the identified simulator again, alone and with every effect of the catalogue, and compares them on all runs
-    together and on what was left out. Says `no_gap`, `ambiguous` or `unknown` where that is the answer, and what to run next.
+    together and on what was left out. Says `no_gap`, `ambiguous` or `unknown` where that is the answer, and what to run
+    next.
 
     Example: r2s2r diagnose
     """

@@ -9,7 +9,7 @@ import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.diagnose_floor import floor_picture
-from r2s2r_cli.views.diagnose_page import element_words
+from r2s2r_cli.views.diagnose_page import NOWHERE, element_words
 from r2s2r_cli.views.figure import BLUE, GREEN, PURPLE, RED, new_figure, png_bytes, rod_color
 
 if TYPE_CHECKING:
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 GUILTY = RED
 PLAIN = "#8792a2"
 NINETY = 1.645
-NOWHERE = -1e8
-"""[nats] Below which a gain stands for a simulation that broke off."""
 """Sd to either side of a 90 % interval."""
 LABELS = 60
 """Letters that fit below an axis side by side."""
@@ -33,7 +31,11 @@ def draw_diagnosis(data: ArtifactData, report: DiagnoseReport) -> Iterator[tuple
     yield "gap", "the gap over time: fitted target intervals, each left out", _gap(data, report)
     yield "robot", "the robot, and what is guilty", _robot(data, report)
     yield "floor", "where on the floor the gap arises", floor_picture(data, report)
-    yield "ranking", "how much better each effect predicts what was left out", _ranking(data, report)
+    yield (
+        "ranking",
+        "how much better each effect explains all data, and predicts what was left out",
+        _ranking(data, report),
+    )
     if "judged" in data.groups:
         yield "judged", "before and after, on intervals that nothing was fitted to", _judged(data, report)
 
@@ -167,7 +169,7 @@ def _ranking(data: ArtifactData, report: DiagnoseReport) -> bytes:
                        va="center", fontsize=8)  # fmt: skip
         where = "" if one.element is None else f", {element_words(one.element)}"
         names.append(f"{one.effect}{where}")
-    left.axvline(report.chance_nats, color="#111111", lw=1, ls=":", label="reached by chance in 1 case of 20")
+    left.axvline(report.chance_nats, color="#111111", lw=1, ls=":", label="reached left out by chance in 1 case of 20")
     left.axvline(0.0, color="#111111", lw=0.8)
     left.set_yticks(range(len(names)), names, fontsize=8)
     left.invert_yaxis()

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 INDISTINCT = 3.0
 """[nats] Below, two effects cannot be told apart."""
+NOWHERE = -1e8
+"""[nats] Below which a gain stands for one that was not asked for, or broke off."""
 _RIVALS = {
     "none": "the refit nominal model; counts as much in every diagnosis",
     "unknown": "gain if errors may be larger than the floor: the more that is, the likelier a cause without a name",
@@ -114,6 +116,8 @@ def _ranked(one: RankedName) -> list[str]:
         else f"{one.elpd_gain:.1f}" + ("" if one.elpd_gain_sd is None else f" +- {one.elpd_gain_sd:.1f}")
     )
     whole = f"{one.marginal_nats:.1f}" if one.fitted and one.size and one.marginal_nats is not None else ""
+    if one.effect in _RIVALS:
+        whole, gain = (f"{one.elpd_gain:.1f}" if one.elpd_gain > NOWHERE else "-"), ""
     return [one.effect, where, whole, gain, f"{one.probability:.2f}", "; ".join(sizes), "; ".join(wide),
             rmse, "; ".join(remarks)]  # fmt: skip
 
@@ -205,7 +209,10 @@ def _how(report: DiagnoseReport) -> Iterator[list[str]]:
         f"{1e3 * report.floor_m:.1f} mm: {report.floor_from}" + ("" if report.floor_given else " (estimated)"),
     ]
     yield ["left out", report.left_out]
-    yield ["chance", f"the best of the catalogue gains {report.chance_nats:.1f} nats by chance in one case of 20"]
+    yield [
+        "chance",
+        f"the best of the catalogue gains {report.chance_nats:.1f} nats left out by chance in one case of 20",
+    ]
     yield ["probabilities", report.calibrated]
     for name, (value, sd) in report.refit.items():
         yield [f"refit: {name}", _number(value, sd, report.refit_units.get(name, ""))]

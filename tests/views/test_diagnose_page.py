@@ -71,7 +71,7 @@ def test_rivals_and_numbers_say_what_they_are() -> None:
         "refit_units": units,
     })  # fmt: skip
     text = "\n".join(" | ".join(row) for table in diagnose_tables(made) for row in table.rows)
-    assert "31.0 +- 4.0" in text and "none |  | 0.0 |  | 0.10" in text and "counts with what chance gains" in text
+    assert "31.0 +- 4.0" in text and "none |  | 0.0 |  | 0.10" in text and "counts as much in every diagnosis" in text
     assert "refit: friction | +10.5 % +- 2.2 % of the identified value" in text
     assert "refit: motor_lag.tau_s | +0.03 +- 0.004 s" in text
 
@@ -90,8 +90,8 @@ def test_what_was_not_fitted_has_no_gain() -> None:
     )
     table = next(iter(diagnose_tables(report().model_copy(update={"ranking": ranking}))))
     rows = {row[0]: row for row in table.rows}
-    assert rows["dropout"][2] == "-" and "not fitted" in rows["dropout"][-1]
-    assert rows["payload"][2].startswith("31.0") and rows["payload"][3] == "52.0" and rows["dropout"][3] == ""
+    assert rows["dropout"][3] == "-" and "not fitted" in rows["dropout"][-1]
+    assert rows["payload"][3].startswith("31.0") and rows["payload"][2] == "52.0" and rows["dropout"][2] == ""
     assert rows["payload"][6] == "mass_kg 0.03 .. 0.05 kg; place_m 0.05 .. 0.15 m"
 
 

@@ -8,8 +8,6 @@ from typing import Any
 NONE, UNKNOWN = "none", "unknown"
 NO_REPLAY = ("camera_pose", "dropout")
 """Effects that change no prediction, only what is seen or missing (a test holds it to that of `diagnose`)."""
-NO_GAP_FACTOR = 1.25
-"""Of the floor, below which the upper bound of an error is no gap (a test holds it to that of `measures`)."""
 WEAK, CLEAR = 3.0, 8.0
 """Bounds of d between what lies under the floor, weak, and clear."""
 

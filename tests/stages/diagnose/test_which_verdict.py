@@ -17,7 +17,6 @@ from r2s2r_cli.stages.diagnose.which.pair_share import LEAST, SHARE, TwoCauses, 
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.verdict import verdict_of
-from r2s2r_cli.stages.measures.gap import NO_GAP_FACTOR
 
 BY = Calibration(commit=0.6)
 CHANCE = 5.0
@@ -74,6 +73,8 @@ def test_a_stranger_is_as_probable_as_what_a_wider_floor_explains() -> None:
     odds = np.log(np.array(share) / (1.0 - np.array(share)))
     assert odds == pytest.approx(-2.0 + 0.7 * np.log([1.0, 1.0, 2.0, 4.0, 32.0]))
     assert by.with_unknown(names, -np.inf, 0.0) == {**names, "unknown": 0.0}
+    assert replace(by, unfit=4.4, unfit_share=0.75).with_unknown(names, -np.inf, 9.0)["unknown"] == 0.0
+    assert by.with_unknown(names, np.nan, 0.0) == by.with_unknown(names, 0.0, 0.0)
     found = by.with_unknown(names, 100.0, 0.0)
     assert found["payload"] / found["none"] == pytest.approx(1.5)
 
@@ -175,7 +176,7 @@ def test_between_look_alikes_that_both_stand_out_the_replay_decides() -> None:
     assert lag - late == pytest.approx(36.0)
     assert learned.score("motor_lag", 0.0, parity=4.0) == learned.score("motor_lag", 0.0)
     assert learned.score("dropout", 0.0, parity=36.0) == pytest.approx(learned.score("dropout", 0.0) + 4.5 * 32.0)
-    assert (facts.NO_REPLAY, facts.NO_GAP_FACTOR) == (NO_REPLAY, NO_GAP_FACTOR)
+    assert facts.NO_REPLAY == NO_REPLAY
     assert learned.score("motor_lag", 0.0, parity=9.0) - learned.score("motor_lag", 0.0) == pytest.approx(4.5 * 5.0)
 
 

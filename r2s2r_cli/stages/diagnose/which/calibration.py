@@ -96,9 +96,12 @@ class Calibration:
         self, probabilities: Mapping[str, float], unexplained: float, left_sd: float
     ) -> dict[str, float]:  # fmt: skip
         """Probabilities by name, pairs included, of which `unknown` takes its share. unexplained: what a wider floor
-        gains beside the best effect [nats], -inf where that was not asked: then there is no stranger."""
-        odds = np.exp(self.stranger + self.wider * np.log1p(max(unexplained, 0.0) / self.few))
-        share = 0.0 if np.isneginf(unexplained) else float(odds / (1.0 + odds))
+        gains beside the best effect [nats], -inf where that was not asked: then there is no stranger, whatever is
+        left."""
+        if np.isneginf(unexplained):
+            return {**probabilities, UNKNOWN: 0.0}
+        odds = np.exp(self.stranger + self.wider * np.log1p(max(np.nan_to_num(unexplained), 0.0) / self.few))
+        share = float(odds / (1.0 + odds))
         if self.refuses(left_sd):
             share = max(share, self.unfit_share)
         return {name: (1.0 - share) * p for name, p in probabilities.items()} | {UNKNOWN: share}

@@ -11,7 +11,7 @@ from r2s2r_cli.stages.diagnose.which.pair_share import TwoCauses
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap
 
 NONE, UNKNOWN = "none", "unknown"
-"""Names of the rivals in a ranking."""
+"""Names of a ranking that are no effects: nothing is wrong, and a cause that the catalogue does not have."""
 
 
 @dataclass(frozen=True)

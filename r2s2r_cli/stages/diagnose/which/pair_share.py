@@ -42,7 +42,8 @@ def with_pairs(
     temperature: float,
 ) -> tuple[dict[str, float], tuple[str, str] | None]:  # fmt: skip
     """Probabilities of names once pairs are possible, and the pair that is likelier than its first effect alone, None
-    for none. alone: gains of single effects [nats]; chance: what the best of the catalogue gains by chance [nats]."""
+    for none. alone: held-out gains of single effects [nats]; chance: what the best of the catalogue gains by chance
+    [nats]."""
     found, believed = dict(probability), None
     best = 0.0
     for pair in pairs:

@@ -1,4 +1,5 @@
-"""Rivals of the named effects: nothing is wrong, and something without a name; and how far chance carries the best."""
+"""Beside the named effects: that nothing is wrong, how large something without a name may be, and how far chance
+carries the best."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def compare_effects(
     old = chronic(arena, healthy, fits)
     by_chance = chance(arena, responses, groups, seed=seed)
     said = marginal_gains(arena, base, fits) - old
-    # Beside an effect that gains no more than chance does, a second one is no second cause.
+    # Beside an effect that gains no more than chance does even left out, a second one is no second cause.
     pairs = pairs_of(arena, base, fits, said, responses, told_by or {}) if said.max(initial=0.0) > by_chance else []
     if pairs:
         first = int(said.argmax())

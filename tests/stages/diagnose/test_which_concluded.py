@@ -1,0 +1,85 @@
+"""From two kinds of gains to a verdict: all data rank, and without healthy runs no more than left-out data say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.stages.diagnose.which import verdict as module
+from r2s2r_cli.stages.diagnose.which.calibration import Calibration
+from r2s2r_cli.stages.diagnose.which.found import Which
+from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
+from r2s2r_cli.stages.diagnose.which.left import Left
+from r2s2r_cli.stages.diagnose.which.material import Material
+from r2s2r_cli.stages.diagnose.which.rivals import NoGap
+from r2s2r_cli.stages.diagnose.which.score import Score
+from r2s2r_cli.stages.diagnose.which.verdict import concluded
+from tests.support.linear_arena import STRETCHES, LinearArena, candidate
+
+BY = Calibration(temperature=7.5, none=30.0, commit=0.54, conformal=0.01, stranger=-2.0, wider=0.7, unfit=4.4,
+                 unfit_share=0.75)  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _only_ranked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What needs a simulator beside the ranking is left out."""
+    monkeypatch.setattr(module, "confusable", lambda *_: ())
+    monkeypatch.setattr(module, "_shifts", lambda *_: ())
+
+
+def score(gain: float) -> Score:
+    """The same gain in every stretch, `gain` in all [nats]."""
+    each, one = np.full(STRETCHES, gain / STRETCHES), np.ones(STRETCHES)
+    return Score(each, one, np.zeros((STRETCHES, 1, 3)), np.ones(3), np.zeros((3, 3)))
+
+
+def said(by: Calibration, *, left: float = 0.0, unexplained: float = 0.0, parity: float = 0.0) -> Which:
+    """Of a payload with 90 nats on all data and -20 left out, and a lag with 40 and 60. parity: for the lag."""
+    arena = LinearArena(1.0)
+    zero = np.zeros((STRETCHES, 0))
+    fits = [Fit(Hypothesis((candidate(name, k),)), np.zeros(2), np.ones(1), np.zeros(1), np.zeros((1, 3)), 0.0,
+                np.zeros(1), zero, []) for k, name in enumerate(("payload", "motor_lag"))]  # fmt: skip
+    base = Fit(Hypothesis(), np.zeros(2), np.zeros(0), np.zeros(1), np.zeros((1, 2)), 0.0, np.zeros(0), zero, [])
+    return concluded(Material(
+        arena=arena, base=base, refit=score(0.0), fits=tuple(fits), scores=(score(-20.0), score(60.0)), responses=(),  # type: ignore[arg-type]
+        chance=5.0, no_gap=NoGap(0.02, 0.03, 0.01, 0.0), wider=1.0, left=Left(50.0, left, 1.0),
+        unexplained=unexplained, groups=arena.gait, calibration=by, chronic=np.zeros(2),
+        marginal=np.array([90.0, 40.0]), asked=("payload", "motor_lag"), parity={"motor_lag": {None: parity}},
+    ))  # fmt: skip
+
+
+def test_all_data_rank() -> None:
+    """The payload is named although what was left out speaks against it; both gains stand in the ranking."""
+    found = said(BY)
+    assert (found.verdict, found.effects) == ("effect", ("payload",))
+    first = found.ranking[0]
+    assert (first.effect, first.marginal) == ("payload", 90.0) and first.gain < 0.0
+    p = {one.effect: one.probability for one in found.ranking}
+    assert sum(p.values()) == pytest.approx(1.0)
+    assert np.log(p["payload"] / p["motor_lag"]) == pytest.approx(50.0 / 7.5)
+    assert np.log(p["motor_lag"] / p["none"]) == pytest.approx(10.0 / 7.5)
+
+
+def test_without_healthy_runs_the_lesser_gain_counts() -> None:
+    """So the payload counts nothing, and the lag its 40 nats."""
+    found = said(BY.absolute())
+    assert (found.verdict, found.effects) == ("effect", ("motor_lag",))
+    p = {one.effect: one.probability for one in found.ranking}
+    assert np.log(p["motor_lag"] / p["payload"]) == pytest.approx(40.0 / 7.5)
+
+
+def test_parity_speaks_beside_the_replay() -> None:
+    """10 nats of it at 15 each outdo the 50 that the lag is short of."""
+    assert said(BY, parity=10.0).effects == ("motor_lag",)
+
+
+def test_a_stranger_takes_its_share_of_all_names() -> None:
+    """What a wider floor explains lowers every name alike until none is a verdict; what is left beyond all healthy
+    runs makes `unknown` the verdict."""
+    ambiguous = said(BY, unexplained=400.0)
+    assert ambiguous.verdict == "ambiguous"
+    p, before = ({one.effect: one.probability for one in found.ranking} for found in (ambiguous, said(BY)))
+    assert p["payload"] / p["motor_lag"] == pytest.approx(before["payload"] / before["motor_lag"])
+    assert p["unknown"] > 0.5 > before["unknown"]
+    assert said(BY, left=4.5).verdict == "unknown" and said(BY, left=4.3).verdict == "effect"
+    assert said(BY, left=4.5, unexplained=-np.inf).verdict == "effect"

@@ -100,6 +100,10 @@ class ShrinkageFound(Frozen):
     """Judged intervals share a run with fitted ones."""
 
 
+INDISTINCT = 3.0
+"""[nats] Two effects that runs tell apart by less than this cannot be told apart."""
+
+
 class NextGaitFound(Frozen):
     """What to run next."""
 
@@ -147,6 +151,10 @@ class DiagnoseReport(Frozen):
     confusable: tuple[tuple[str, str, float], ...]
     """Pairs of effects and the nats by which these gaits tell them apart; below 3 they do not."""
     next_gait: NextGaitFound | None
+    iteration: int | None = None
+    """Of the project, whose simulator was diagnosed."""
+    free_iteration: int | None = None
+    """The first iteration after all that the project has."""
     robot: str
     floor_m: float
     floor_from: str

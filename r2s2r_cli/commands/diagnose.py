@@ -157,7 +157,11 @@ def _compute(
         target = asked.project.artifact("diagnosis", asked.iteration)
         file = asked.project.relative(target.with_name(target.stem + NEXT))
         report = report.model_copy(update={"next_gait": report.next_gait.model_copy(update={"file": file})})
-    return data, report.model_copy(update={"wall_s": time.monotonic() - begun, "seconds": seconds})
+    numbers = {
+        "iteration": None if asked.iteration is None else asked.iteration.number,
+        "free_iteration": 1 + max((one.number for one in asked.project.iterations()), default=0),
+    }
+    return data, report.model_copy(update={**numbers, "wall_s": time.monotonic() - begun, "seconds": seconds})
 
 
 NEXT = "-next.toml"

@@ -190,16 +190,24 @@ def _judged(data: ArtifactData, report: DiagnoseReport) -> bytes:
               ("effect", AFTER, "refit + " + (" + ".join(report.shrinkage.effects) if report.shrinkage else "effect")),
               ("ceiling", BLACK_BOX, "black box"))  # fmt: skip
     width = 0.8 / len(series)
+    aside = () if report.shrinkage is None else report.shrinkage.set_aside
+    counts = np.array([name not in aside for name in names], dtype=bool)
+    floor = report.floor_m if report.shrinkage is None else report.shrinkage.floor
     for k, (name, color, label) in enumerate(series):
         x = np.arange(len(names)) - 0.4 + (k + 0.5) * width
         values = 1e3 * group[name]
-        each.bar(x, np.nan_to_num(values), width, color=color, label=label)
+        bars = each.bar(x, np.nan_to_num(values), width, color=color, label=label)
+        for bar in np.array(bars.patches)[~counts]:
+            bar.set(alpha=0.25)
+        values = values[counts]
         if np.isfinite(values).any():
             all_.bar(k, float(np.sqrt(np.nanmean(values**2))), 0.7, color=color)
             # A fall or two decide the root mean square.
             all_.plot(k, float(np.nanmedian(values)), "_", color="#111111", ms=12, mew=2)
     for axes in (each, all_):
-        axes.axhline(1e3 * report.floor_m, color="#111111", lw=1, ls=":", label="floor")
+        axes.axhline(1e3 * floor, color="#111111", lw=1, ls=":", label="floor of judged intervals")
+    if aside:
+        each.set_title("pale: set aside, as in the floor", fontsize=9)
     turned = sum(map(len, names)) > LABELS
     each.set_xticks(
         range(len(names)), names, rotation=45 if turned else 0, ha="right" if turned else "center", fontsize=8

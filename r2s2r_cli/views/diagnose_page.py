@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.views.page import Page, PageTable, Picture, render
+from schemas.results_diagnose import INDISTINCT
 
 if TYPE_CHECKING:
     from schemas.results_diagnose import DiagnoseReport, ElementFound, NextGaitFound, PairFound, RankedName
 
-INDISTINCT = 3.0
-"""[nats] Below, two effects cannot be told apart."""
 NOWHERE = -1e8
 """[nats] Below which a gain stands for one that was not asked for, or broke off."""
 _RIVALS = {
@@ -170,35 +168,36 @@ def _limits(report: DiagnoseReport) -> Iterator[list[str]]:
     if report.next_gait is None:
         yield ["run next", "nothing: no gait of the library would decide more"]
     else:
-        yield ["run next", _next(report.next_gait)]
+        yield ["run next", _next(report.next_gait, _free(report))]
 
 
 def use(report: DiagnoseReport) -> str:
-    """The command that puts what was named into the simulator, empty where nothing with a number was. The fit begins at
-    the sizes that were found: where an effect is off, a patch of the floor has no place."""
+    """The command that puts what was named into the simulator, empty where nothing with a number was: in an iteration
+    that has nothing yet, from the runs of the diagnosed one. The fit begins at the sizes that were found: where an
+    effect is off, a patch of the floor has no place."""
     words: list[str] = []
     for one in (one for one in report.ranking if one.effect in report.effects and one.size):
         seats = {name.split(".")[2] for name in one.size if name.count(".") == 2}
         words.append(f"--with-effect {one.effect}" + (f":{seats.pop()}" if len(seats) == 1 else ""))
         words += [f"--free +{name}={value:.4g}" for name, value in one.size.items()]
+    if words and report.iteration is not None:
+        words.insert(0, f"{_free(report)} --also {report.iteration}")
     return " ".join(["r2s2r identify", *words]) if words else ""
 
 
-def _next(one: NextGaitFound) -> str:
+def _free(report: DiagnoseReport) -> str:
+    return "" if report.free_iteration is None else f"--iteration {report.free_iteration}"
+
+
+def _next(one: NextGaitFound, where: str) -> str:
     """What to run, and what it is worth beside the runs so far."""
-    how = f": {_record(one.file)}" if one.file else ""
+    here = f" {where}" if where else ""
+    how = f": r2s2r record {one.file}{here} --repeats 2 --port /dev/ttyUSB0 --camera realsense" if one.file else ""
     if one.now is not None and one.nats <= one.now:
         return f"nothing separates the candidates better than these runs; the best of the library is {one.name}{how}"
     beside = "" if one.now is None else f", these runs by {one.now:.1f}"
     enough = "" if one.nats >= INDISTINCT else " (too few to tell them apart)"
     return f"{one.name}: would separate the likeliest candidates by {one.nats:.1f} nats{enough}{beside}{how}"
-
-
-def _record(file: str) -> str:
-    """The command that runs the policy of `iterations/001/70-diagnose-next.toml`, in the iteration after that."""
-    number = PurePosixPath(file).parent.name
-    after = f" --iteration {int(number) + 1}" if number.isdigit() else ""
-    return f"r2s2r record {file}{after} --port /dev/ttyUSB0 --camera realsense"
 
 
 def _how(report: DiagnoseReport) -> Iterator[list[str]]:

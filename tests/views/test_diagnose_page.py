@@ -109,7 +109,10 @@ def test_two_effects_at_once_say_what_the_second_one_adds() -> None:
 
 def test_what_was_named_comes_with_the_command_that_uses_it() -> None:
     """At the element and sizes that were found; what has no number, and what is not committed to, has none."""
-    assert use(report()) == "r2s2r identify --with-effect payload:1 --free +payload.mass_kg.1=0.04"
+    plain = "--with-effect payload:1 --free +payload.mass_kg.1=0.04"
+    assert use(report()) == f"r2s2r identify {plain}"
+    placed = report().model_copy(update={"iteration": 1, "free_iteration": 3})
+    assert use(placed) == f"r2s2r identify --iteration 3 --also 1 {plain}"
     place = {"friction_field.patch_factor": 0.262, "friction_field.patch_x_m": 0.2034}
     row = report().ranking[0].model_copy(update={"effect": "friction_field", "size": place})
     floor = report().model_copy(update={"effects": ("friction_field",), "ranking": (row,)})
@@ -132,9 +135,9 @@ def test_what_to_run_next_is_said_beside_what_was_run(nats: float, now: float | 
     """With the command; a gait that is worth less than the runs so far is not praised."""
     file = "iterations/001/70-diagnose-next.toml"
     one = NextGaitFound(name="ramps", file=file, targets=((1.0,),), nats=nats, now=now)
-    made = report().model_copy(update={"next_gait": one})
+    made = report().model_copy(update={"next_gait": one, "free_iteration": 2})
     rows = [row for table in diagnose_tables(made) for row in table.rows if row[0] == "run next"]
-    command = f"r2s2r record {file} --iteration 2 --port /dev/ttyUSB0 --camera realsense"
+    command = f"r2s2r record {file} --iteration 2 --repeats 2 --port /dev/ttyUSB0 --camera realsense"
     assert rows == [["run next", f"{words}: {command}"]]
 
 

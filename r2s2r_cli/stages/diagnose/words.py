@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN
+from schemas.results_diagnose import INDISTINCT
 
 if TYPE_CHECKING:
     from r2s2r_cli.stages.diagnose.diagnosis import Diagnosis
@@ -62,7 +63,10 @@ def _verdict(found: Diagnosis) -> str:
     onset = None if found.where is None else found.where.onset
     begins = "" if onset is None or onset.order == 0 else f", from interval {onset.interval} of {onset.run} on"
     advice = f" {ADVICE[best.effect]}" if best.effect in ADVICE else ""
-    return f"The gap is caused by {best.effect}{element}{begins} (p = {which.probability:.2f}).{advice}"
+    alike = [b if a == best.effect else a for a, b, nats in which.confusable
+             if best.effect in (a, b) and nats < INDISTINCT]  # fmt: skip
+    doubt = f" These runs cannot tell it from {' or '.join(alike)}." if alike else ""
+    return f"The gap is caused by {best.effect}{element}{begins} (p = {which.probability:.2f}).{doubt}{advice}"
 
 
 def _shrunk(found: Diagnosis) -> str:
@@ -73,7 +77,7 @@ def _shrunk(found: Diagnosis) -> str:
     before, after = 1e3 * (much.rmse("refit") or 0.0), 1e3 * (much.rmse("effect") or 0.0)
     shrinks = much.share is not None and after < before
     if found.which.verdict in ("ambiguous", "unknown"):
-        names = f"the {'best' if shrinks else 'first'} of them, {names},"
+        names = f"the likeliest effect, {names},"
     count = len(much.names)
     some = f"{count - len(much.set_aside)} of " if much.set_aside else ""
     held = f" On {some}{count} held-out interval{'s' * (count != 1)}{' of the same run' if much.within_run else ''}"
@@ -88,8 +92,11 @@ def _shrunk(found: Diagnosis) -> str:
         return f"{text}: it closes none of the gap{beside}."
     wide = "" if much.ci90 is None else f" ({round(100 * much.ci90[0])} .. {round(100 * much.ci90[1])})"
     told = "" if much.predicted is None else f"; predicted {round(100 * much.predicted)} %"
-    return text + f", which closes {round(100 * much.share)} %{wide} of the gap above the floor{told}."
+    text += f", which closes {round(100 * much.share)} %{wide} of the gap above the floor{told}"
+    if much.ci90 is not None and much.ci90[0] <= 0.0:
+        text += "; that it helps is not shown, so do not act on it yet"
+    return f"{text}."
 
 
 def _named(name: str) -> str:
-    return {NONE: "no gap", UNKNOWN: "something unnamed"}.get(name, name)
+    return {NONE: "nothing wrong", UNKNOWN: "something unnamed"}.get(name, name)

@@ -19,7 +19,7 @@ def found(verdict: str, **changes: object) -> SimpleNamespace:
         ci90=(-0.004, 0.9), predicted=0.65, rmse={"refit": 0.012, "effect": 0.006}.get,
     )  # fmt: skip
     values = {"verdict": verdict, "effects": ("payload",), "probability": 0.9, "set90": ("payload", "none", "unknown"),
-              "best": best, "ranking": (SimpleNamespace(effect="none"), best),
+              "best": best, "confusable": (), "ranking": (SimpleNamespace(effect="none"), best),
               "no_gap": SimpleNamespace(rmse=0.012, upper=0.014)}  # fmt: skip
     if changes.pop("first", False):
         values["ranking"] = (best, SimpleNamespace(effect="none"))
@@ -39,10 +39,11 @@ SHRUNK = "key-frame error from 12.0 to 6.0 mm (floor 5.0), which closes 70 % (0 
         (found("effect"), "The gap is caused by payload at rod 1 (p = 0.90). On 2 held-out intervals payload", SHRUNK),
         (found("effect", element=Element("world")), "The gap is caused by payload (p = 0.90).", SHRUNK),
         (found("pair", effects=("payload", "backlash")), "The gap has two causes, payload and backlash", SHRUNK),
-        (found("ambiguous"), "These runs do not decide between payload, no gap and something unnamed (best p = 0.90).",
-         "the best of them, payload, takes"),
+        (found("ambiguous"),
+         "These runs do not decide between payload, nothing wrong and something unnamed (best p = 0.90).",
+         "the likeliest effect, payload, takes"),
         (found("ambiguous", set90=("payload",)), "These runs do not decide: payload is the likeliest (p = 0.90).",
-         "the best of them, payload, takes"),
+         "the likeliest effect, payload, takes"),
         (found("unknown"), "Something is wrong that none of the effects looked for explains (p = 0.90): 12.0 mm",
          "It acts most like something in channel mass."),
         (found("no_gap", no_gap=SimpleNamespace(rmse=0.005, upper=0.006)),
@@ -63,7 +64,7 @@ def test_of_many_names_the_likeliest_are_said() -> None:
     names = ("payload", "none", "unknown", "backlash", "motor_lag")
     ranking = [SimpleNamespace(effect=name, probability=0.5 - 0.1 * k) for k, name in enumerate(names)]
     said = sentence(found("ambiguous", set90=names, ranking=ranking))  # type: ignore[arg-type]
-    wanted = "5 names remain, the likeliest payload (0.50), no gap (0.40), something unnamed (0.30)."
+    wanted = "5 names remain, the likeliest payload (0.50), nothing wrong (0.40), something unnamed (0.30)."
     assert said.startswith(f"These runs do not decide: {wanted} On 2 held-out")
 
 
@@ -84,8 +85,18 @@ def test_what_shrinks_nothing_is_not_praised(nominal: float, ends: str) -> None:
     one = found("ambiguous")
     one.much.share, one.much.rmse = -0.1, {"nominal": nominal, "refit": 0.012, "effect": 0.0125}.get
     said = sentence(one)  # type: ignore[arg-type]
-    assert "the first of them, payload, takes the key-frame error from 12.0 to 12.5 mm" in said
-    assert "best of them" not in said and said.endswith(ends)
+    assert "the likeliest effect, payload, takes the key-frame error from 12.0 to 12.5 mm" in said
+    assert said.endswith(ends)
+
+
+def test_a_name_that_is_not_shown_to_help_comes_with_a_warning() -> None:
+    """Where the interval of its share holds 0, and where these runs cannot tell it from another effect."""
+    one = found("effect", confusable=(("backlash", "payload", 1.7), ("payload", "motor_lag", 4.0)))
+    said = sentence(one)  # type: ignore[arg-type]
+    assert "(p = 0.90). These runs cannot tell it from backlash. On" in said
+    assert said.endswith("that it helps is not shown, so do not act on it yet.")
+    one.much.ci90 = (0.2, 0.9)
+    assert sentence(one).endswith("; predicted 65 %.")  # type: ignore[arg-type]
 
 
 def test_when_it_began_is_said() -> None:

@@ -75,7 +75,7 @@ def concluded(m: Material) -> Which:
             Screened(r.candidate.effect, r.candidate.element, r.gain, r.absorbed, r.seen) for r in m.responses
         ),
         no_gap=m.no_gap, chance=m.chance, wider=m.wider, unexplained=m.unexplained, left=m.left,
-        confusable=confusable(m, list(best.values())[:ALIKE]),
+        confusable=confusable(m, [i for i in best.values() if m.fits[i].moved][:ALIKE]),
         not_testable=_not_testable(m.responses), shifts=() if top is None else _shifts(m, m.fits[top]),
         within=_left_out(m), calibrated=calibration.words, warnings=_warnings(m, [best[name] for name in names]),
         pairs=tuple(both),

@@ -26,10 +26,11 @@ def all_effects() -> tuple[Effect, ...]:
 
 
 def effect_of(name: str, *, where: str, command: str) -> Effect:
-    """The effect of that id. Raises UsageError for an unknown one, with the nearest in a command to paste."""
+    """The effect of that id. Raises UsageError for an unknown one, with the nearest in a command to
+    paste."""
     found = {effect.name: effect for effect in all_effects()}
     if name not in found:
-        near = difflib.get_close_matches(name, found, n=1, cutoff=0.0)[0]
+        near = difflib.get_close_matches(name, found, n=1, cutoff=0.5)
         raise UsageError(f"unknown effect {name!r}", where=where, expected=", ".join(found), received=name,
-                         hint=f"{command} {near}")  # fmt: skip
+                         hint=f"{command} {near[0]}" if near else "r2s2r effects")  # fmt: skip
     return found[name]

@@ -177,8 +177,8 @@ LEFT_OUT = {
     ("PublishedShrinkage", "ShrinkageFound"): {"metric", "judged_on", "set_aside", "within_run"},
     ("PublishedNext", "NextGaitFound"): {"file", "targets"},
     ("PublishedDiagnosis", "DiagnoseReport"): {
-        "robot", "floor_from", "floor_given", "left_out", "segments", "hidden", "missing", "refit", "refit_units",
-        "rollouts", "within_run", "wall_s", "seconds", "warnings",
+        "iteration", "free_iteration", "robot", "floor_from", "floor_given", "left_out", "segments", "hidden",
+        "missing", "refit", "refit_units", "rollouts", "within_run", "wall_s", "seconds", "warnings",
     },
 }  # fmt: skip
 """Of what a diagnosis says, by the model of the published file: nothing that is scored, calibrated or asked about."""
@@ -193,3 +193,12 @@ def test_what_is_left_out_was_decided(pair: tuple[str, str]) -> None:
     before = NO_LONGER_SAID.get(pair[0], set())
     assert set(mine) - before | LEFT_OUT[pair] == set(theirs) and not set(mine) & LEFT_OUT[pair]
     assert before <= set(mine) and not before & set(theirs)
+
+
+@pytest.mark.parametrize(("name", "received"), [("none.json.gz", "none of this name"), ("page.md", "neither JSON")])
+def test_what_is_no_published_file_gets_a_hint_that_writes_nothing(tmp_path: Path, name: str, received: str) -> None:
+    """A file that is not there, and one that is something else: the hint lists what there is."""
+    (tmp_path / "page.md").write_text("# a page\n")
+    with pytest.raises(InputError) as caught:
+        read_published(tmp_path / name)
+    assert received in caught.value.received and caught.value.hint.startswith("ls ")

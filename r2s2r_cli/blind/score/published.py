@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import re
+import shlex
 from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
@@ -93,11 +94,20 @@ def _read(path: Path) -> dict[str, Any]:
     except (OSError, EOFError, ValueError) as error:
         told = error.errors()[0] if isinstance(error, ValidationError) else None
         words = f"{'.'.join(map(str, told['loc']))}: {told['msg']}" if told else str(error)
+        if not path.exists():
+            words = "there is none of this name"
+        elif isinstance(error, json.JSONDecodeError | UnicodeDecodeError):
+            words = "neither JSON nor compressed JSON"
         raise InputError(
             "a published file cannot be read", where=str(path), expected=f"a file of `blind publish` ({FORMAT})",
-            received=words, hint=f"r2s2r blind publish bank --verdicts verdicts --key labels.key --out {path}",
+            received=words, hint=f"ls {shlex.quote(str(_folder(path)))}/*.json*   # what there is",
         ) from error  # fmt: skip
     return content
+
+
+def _folder(path: Path) -> Path:
+    """The nearest folder that is there."""
+    return next((one for one in path.parents if one.is_dir()), Path())
 
 
 def _sum(content: Mapping[str, Any]) -> str:

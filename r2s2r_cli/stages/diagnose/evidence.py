@@ -121,6 +121,12 @@ def whole(runs: Sequence[Run]) -> tuple[Selection, ...]:
 def require_enough(evidence: Evidence) -> None:
     """Raises InputError where there is nothing to diagnose: no run, fewer than two intervals to fit, or runs of
     different numbers of caps."""
+    if not evidence.runs and evidence.healthy:
+        raise InputError(
+            "there is no run to diagnose: all of them are given as healthy", where="--healthy",
+            expected="a run that is not, beside them", received=", ".join(run.name for run in evidence.healthy),
+            hint="r2s2r record --random 15 --port /dev/ttyUSB0   # elsewhere; then `diagnose --also` with it",
+        )  # fmt: skip
     if not evidence.runs:
         raise InputError(
             "there is no run to diagnose", where="r2s2r diagnose", expected="runs with end caps and commands",

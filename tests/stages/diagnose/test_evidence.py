@@ -75,6 +75,9 @@ def test_too_little_is_refused() -> None:
     """No run, one interval, another robot: before any work."""
     with pytest.raises(InputError, match="no run"):
         require_enough(evidence(fit=()))
+    with pytest.raises(InputError, match="all of them are given as healthy") as only:
+        require_enough(replace(evidence(fit=()), healthy=(Run(run_data()),)))
+    assert only.value.received == "walk" and only.value.hint.startswith("r2s2r record")
     with pytest.raises(InputError, match="too few") as caught:
         require_enough(evidence(run_data(), fit=(Selection("walk", (1,)),)))
     assert caught.value.received == "walk:1"

@@ -55,6 +55,7 @@ def test_an_effect_frees_its_numbers() -> None:
     ("words", "what", "hint"),
     [
         (["payloda"], "unknown effect", "--with-effect payload"),
+        (["nonsense"], "unknown effect", "r2s2r effects"),
         (["payload:7"], "no element '7'", "--with-effect payload:0"),
         (["none", "payload"], "none and an effect", "--with-effect none"),
         (["payload", "dropout"], "dropout has no number", "r2s2r identify"),

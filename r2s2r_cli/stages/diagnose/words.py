@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN
+import numpy as np
+
+from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Which
 from schemas.results_diagnose import INDISTINCT
 
 if TYPE_CHECKING:
@@ -63,8 +65,7 @@ def _verdict(found: Diagnosis) -> str:
     onset = None if found.where is None else found.where.onset
     begins = "" if onset is None or onset.order == 0 else f", from interval {onset.interval} of {onset.run} on"
     advice = f" {ADVICE[best.effect]}" if best.effect in ADVICE else ""
-    alike = [b if a == best.effect else a for a, b, nats in which.confusable
-             if best.effect in (a, b) and nats < INDISTINCT]  # fmt: skip
+    alike = _alike(which, best.effect)
     doubt = f" These runs cannot tell it from {' or '.join(alike)}." if alike else ""
     return f"The gap is caused by {best.effect}{element}{begins} (p = {which.probability:.2f}).{doubt}{advice}"
 
@@ -96,6 +97,14 @@ def _shrunk(found: Diagnosis) -> str:
     if much.ci90 is not None and much.ci90[0] <= 0.0:
         text += "; that it helps is not shown, so do not act on it yet"
     return f"{text}."
+
+
+def _alike(which: Which, name: str) -> list[str]:
+    """Effects that predict the same and are nearly as probable: one of a size of next to nothing predicts what any
+    does."""
+    near = [b if a == name else a for a, b, nats in which.confusable if name in (a, b) and nats < INDISTINCT]
+    least = np.exp(-INDISTINCT) * which.probability
+    return [one.effect for one in which.ranking if one.effect in near and one.probability >= least]
 
 
 def _named(name: str) -> str:

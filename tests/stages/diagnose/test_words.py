@@ -91,7 +91,11 @@ def test_what_shrinks_nothing_is_not_praised(nominal: float, ends: str) -> None:
 
 def test_a_name_that_is_not_shown_to_help_comes_with_a_warning() -> None:
     """Where the interval of its share holds 0, and where these runs cannot tell it from another effect."""
-    one = found("effect", confusable=(("backlash", "payload", 1.7), ("payload", "motor_lag", 4.0)))
+    names = {"payload": 0.9, "backlash": 0.05, "motor_lag": 0.05, "soft_ground": 0.01}
+    one = found(
+        "effect", ranking=[SimpleNamespace(effect=name, probability=p) for name, p in names.items()],
+        confusable=(("backlash", "payload", 1.7), ("payload", "motor_lag", 4.0), ("payload", "soft_ground", 0.0)),
+    )  # fmt: skip
     said = sentence(one)  # type: ignore[arg-type]
     assert "(p = 0.90). These runs cannot tell it from backlash. On" in said
     assert said.endswith("that it helps is not shown, so do not act on it yet.")

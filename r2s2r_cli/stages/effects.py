@@ -26,8 +26,7 @@ def all_effects() -> tuple[Effect, ...]:
 
 
 def effect_of(name: str, *, where: str, command: str) -> Effect:
-    """The effect of that id. Raises UsageError for an unknown one, with the nearest in a command to
-    paste."""
+    """The effect of that id. Raises UsageError for an unknown one, with the nearest in a command to paste."""
     found = {effect.name: effect for effect in all_effects()}
     if name not in found:
         near = difflib.get_close_matches(name, found, n=1, cutoff=0.5)

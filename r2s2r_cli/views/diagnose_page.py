@@ -180,19 +180,18 @@ def use(report: DiagnoseReport) -> str:
         seats = {name.split(".")[2] for name in one.size if name.count(".") == 2}
         words.append(f"--with-effect {one.effect}" + (f":{seats.pop()}" if len(seats) == 1 else ""))
         words += [f"--free +{name}={value:.4g}" for name, value in one.size.items()]
-    if words and report.iteration is not None:
-        words.insert(0, f"{_free(report)} --also {report.iteration}")
-    return " ".join(["r2s2r identify", *words]) if words else ""
+    also = "" if report.iteration is None else f" --also {report.iteration}"
+    return " ".join([f"r2s2r identify{_free(report)}{also}", *words]) if words else ""
 
 
 def _free(report: DiagnoseReport) -> str:
-    return "" if report.free_iteration is None else f"--iteration {report.free_iteration}"
+    """The option that names an iteration that has nothing yet, after a space."""
+    return "" if report.free_iteration is None else f" --iteration {report.free_iteration}"
 
 
 def _next(one: NextGaitFound, where: str) -> str:
-    """What to run, and what it is worth beside the runs so far."""
-    here = f" {where}" if where else ""
-    how = f": r2s2r record {one.file}{here} --repeats 2 --port /dev/ttyUSB0 --camera realsense" if one.file else ""
+    """What to run (where: the option that says in which iteration), and what it is worth beside the runs so far."""
+    how = f": r2s2r record {one.file}{where} --repeats 2 --port /dev/ttyUSB0 --camera realsense" if one.file else ""
     if one.now is not None and one.nats <= one.now:
         return f"nothing separates the candidates better than these runs; the best of the library is {one.name}{how}"
     beside = "" if one.now is None else f", these runs by {one.now:.1f}"

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from r2s2r_cli.blind.score.calibrate import calibrated
+from r2s2r_cli.blind.score.calibrate import calibrated, learn
 from r2s2r_cli.blind.score.cases import FEW, Case, case
 from r2s2r_cli.blind.score.facts import truth_of
 from r2s2r_cli.errors import InputError
@@ -133,8 +133,6 @@ def test_what_is_learned_from_is_what_counts(marginal: float, parity: float, une
     }  # fmt: skip
     one = case(truth_of(label), document)
     assert one is not None
-    from r2s2r_cli.blind.score.calibrate import learn
-
     sets = planted(40)
     own, _ = learn(sets)
     by = known(calibrated(sets, words="test"))
@@ -151,8 +149,6 @@ def test_too_few_sets_teach_nothing() -> None:
 def test_what_only_strangers_leave_is_learned() -> None:
     """Half-way between the most that any other set leaves and the least beyond, with the odds of as many strangers;
     nothing where a set that the catalogue explains leaves the most."""
-    from r2s2r_cli.blind.score.calibrate import learn
-
     sets = [replace(one, left_sd=min(0.1 * k, 3.0)) for k, one in enumerate(planted(60))]
     sets = [replace(one, truth="none") if one.truth == "unknown" else one for one in sets]
     sets[7] = replace(sets[7], truth="unknown", left_sd=5.0)

@@ -61,11 +61,8 @@ class Learned:
 
     def probabilities(self, one: Case) -> dict[str, float]:
         """Of every name of a set, and `unknown`."""
-        found = _probabilities(one, self.numbers, self.strange)
-        if one.left_sd > self.unfit.get("unfit", np.inf) and found[UNKNOWN] < self.unfit["unfit_share"]:
-            share = (1.0 - self.unfit["unfit_share"]) / (1.0 - found[UNKNOWN])
-            found = {name: share * p for name, p in found.items()} | {UNKNOWN: self.unfit["unfit_share"]}
-        return found
+        beyond = one.left_sd > self.unfit.get("unfit", np.inf)
+        return _probabilities(one, self.numbers, self.strange, least=self.unfit["unfit_share"] if beyond else 0.0)
 
 
 def learn(cases: Sequence[Case], *, where: str = "BANK") -> tuple[Learned, Apart]:
@@ -129,12 +126,13 @@ def _unfit(cases: Sequence[Case]) -> dict[str, float]:
     return {"unfit": (most + min(beyond)) / 2, "unfit_share": (len(beyond) + 1) / (len(beyond) + 2)} if beyond else {}
 
 
-def _probabilities(one: Case, numbers: np.ndarray, strange: np.ndarray) -> dict[str, float]:
+def _probabilities(one: Case, numbers: np.ndarray, strange: np.ndarray, *, least: float = 0.0) -> dict[str, float]:
+    """Of every name and `unknown`, which has `least` at least."""
     x = _design(one) @ numbers
     e = np.exp(x - x.max())
     p = (1.0 - LAPSE) * e / e.sum() + LAPSE / len(x)
-    share = 1.0 / (1.0 + np.exp(-strange[0] - strange[1] * one.strange))
-    return dict(zip(one.names, ((1.0 - share) * p).tolist(), strict=True)) | {UNKNOWN: float(share)}
+    share = max(float(1.0 / (1.0 + np.exp(-strange[0] - strange[1] * one.strange))), least)
+    return dict(zip(one.names, ((1.0 - share) * p).tolist(), strict=True)) | {UNKNOWN: share}
 
 
 def _design(one: Case) -> np.ndarray:

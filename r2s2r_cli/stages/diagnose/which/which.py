@@ -89,10 +89,12 @@ def compare_effects(
         if alone is not fits[first]:
             fits[first], own[first] = alone, scores(arena, [alone], groups)[0]
             old[first] = chronic(arena, healthy, [alone])[0]
+            said[first] = marginal_gains(arena, base, [alone])[0] - old[first]
         Fits(arena).secants(pairs)
         fits, own = [*fits, *pairs], [*own, *scores(arena, pairs, groups)]
-        old = np.concatenate([old, chronic(arena, healthy, pairs)])
-        said = marginal_gains(arena, base, fits) - old
+        before = chronic(arena, healthy, pairs)
+        old = np.concatenate([old, before])
+        said = np.concatenate([said, marginal_gains(arena, base, pairs) - before])
     told("left out", 1, 1)
     material = Material(
         arena=arena, base=base, refit=refit, fits=tuple(fits), scores=tuple(own), responses=responses,

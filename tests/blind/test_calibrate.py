@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.blind.score.calibrate import calibrated, learn
-from r2s2r_cli.blind.score.cases import FEW, Case, case
+from r2s2r_cli.blind.score.cases import FEW, HELD, Case, case
 from r2s2r_cli.blind.score.facts import truth_of
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
@@ -19,8 +19,8 @@ TRUE = Calibration(temperature=20.0, parity=14.0, none=50.0, stranger=-2.5, wide
 def scores(by: Calibration, one: Case) -> dict[str, float]:
     """What a diagnosis makes of the evidence of a set; the parity stage has said what it says by chance too."""
     return {
-        name: by.score(name, float(a), parity=float(b) + by.by_chance)
-        for name, a, b in zip(one.names, one.said, one.parity, strict=True)
+        name: by.score(name, float(a), left_out=float(a), parity=float(b) + by.by_chance)
+        for name, a, b in zip(one.names, one.gain, one.parity, strict=True)
     }
 
 
@@ -110,7 +110,10 @@ def test_a_verdict_becomes_a_case() -> None:
     assert one is not None and one.names == ("payload", "motor_lag", "dropout", "none") and one.truth == "payload"
     assert one.said.tolist() == [11.0, 0.0, 0.0, 0.0] and one.parity.tolist() == [2.5, 8.0, 95.0, 0.0]
     assert one.strange == pytest.approx(np.log(4.0)) and one.left_sd == 2.0
-    assert one.left_out is not None and one.left_out.tolist() == [-7.5, 3.0, 0.0, 0.0]
+    assert one.left_out is not None and one.left_out.tolist() == [0.0, 3.0, 0.0, 0.0]
+    assert one.gain.tolist() == pytest.approx([(1.0 - HELD) * 11.0, HELD * 3.0, 0.0, 0.0])
+    assert one.may_name("payload") and one.may_name("motor_lag") and not one.may_name("none")
+    assert not replace(one, parity=np.zeros(4)).may_name("payload")
     pair = next(each for each in blind_bank.bank() if each["kind"] == "pair" and each["d"] > 3)
     assert case(truth_of(pair), document) is None
     for row in document["ranking"]:
@@ -120,14 +123,17 @@ def test_a_verdict_becomes_a_case() -> None:
 
 
 @pytest.mark.parametrize(
-    ("marginal", "parity", "unexplained"), [(75.0, 9.0, 0.0), (-3.0, 3.0, 20.0), (900.0, 99.0, -4.0)]
+    ("marginal", "left_out", "parity", "unexplained"),
+    [(75.0, 31.0, 9.0, 0.0), (-3.0, 1.0, 3.0, 20.0), (900.0, -80.0, 99.0, -4.0)],
 )
-def test_what_is_learned_from_is_what_counts(marginal: float, parity: float, unexplained: float) -> None:
+def test_what_is_learned_from_is_what_counts(
+    marginal: float, left_out: float, parity: float, unexplained: float
+) -> None:
     """For the learning as for a diagnosis: the same verdict has the same probabilities."""
     label = next(each for each in blind_bank.bank() if each["kind"] == "single" and each["d"] > 8)
     rows = {"payload": (marginal, parity), "dropout": (0.0, parity), "none": (0.0, 0.0)}
     document = {
-        "ranking": [*({"effect": name, "elpd_gain": 1.0, "marginal_nats": m, "parity_nats": p}
+        "ranking": [*({"effect": name, "elpd_gain": left_out, "marginal_nats": m, "parity_nats": p}
                       for name, (m, p) in rows.items()), {"effect": "unknown", "elpd_gain": unexplained}],
         "left_nats": 4.0, "left_sd_nats": 2.0,
     }  # fmt: skip
@@ -136,7 +142,7 @@ def test_what_is_learned_from_is_what_counts(marginal: float, parity: float, une
     sets = planted(40)
     own, _ = learn(sets)
     by = known(calibrated(sets, words="test"))
-    told = by.probabilities({name: by.score(name, m, parity=p) for name, (m, p) in rows.items()})
+    told = by.probabilities({name: by.score(name, m, left_out=left_out, parity=p) for name, (m, p) in rows.items()})
     assert own.probabilities(one) == pytest.approx(by.with_unknown(told, unexplained, 2.0), rel=1e-9)
 
 

@@ -75,12 +75,13 @@ def test_what_misleads_is_better_left_out() -> None:
 
 
 def test_each_kind_is_left_out_and_nothing_else() -> None:
-    """Left-out gaits take the place of what all data say, losses as nothing; sets that do not say them stay as they
+    """Left-out gaits take the place of what all data say, or these of them; sets that do not say them stay as they
     are."""
     one = replace(sets(5, 3, replay=60.0, parity=8.0)[1][1], strange=2.0, left_sd=9.0)
-    other = np.array([-5.0, 1.0, 2.0, 3.0, 0.0])
+    other = np.array([0.0, 1.0, 2.0, 3.0, 0.0])
     left_out = KINDS["all data together (left-out gaits instead)"]
-    assert left_out(replace(one, left_out=other)).said.tolist() == [0.0, 1.0, 2.0, 3.0, 0.0]
+    assert left_out(replace(one, left_out=other)).gain.tolist() == other.tolist()
+    assert KINDS["left-out gaits (all data together instead)"](replace(one, left_out=other)).gain is one.said
     assert left_out(one) is one
     alone = KINDS["the replay (parity alone)"](one)
     assert not alone.said.any() and alone.strange == alone.left_sd == 0.0 and alone.parity is one.parity

@@ -1,16 +1,17 @@
 """From verdicts on a calibration bank to the numbers that turn gains into probabilities.
 
-Where the catalogue has the cause, p(name) ~ exp(score / temperature): of an effect what it gains on all data together
-and `parity` times what the parity stage says for it, of `none` one number. Linear in 1 / temperature and the products
-with it: a multinomial regression, in which any name is the truth once in 50 sets (LAPSE). How probable it is that the
-catalogue does not have the cause is a regression of its own, on what a wider floor explains: how much is left under the
-best effect says nothing of that, but for what strangers alone leave (`unfit`).
+Where the catalogue has the cause, p(name) ~ exp(score / temperature): of an effect what it gains, on all data together
+and for a part (HELD) on gaits that were left out, and `parity` times what the parity stage says for it, of `none` one
+number. Linear in 1 / temperature and the products with it: a multinomial regression, in which any name is the truth
+once in 50 sets (LAPSE). How probable it is that the catalogue does not have the cause is a regression of its own, on
+what a wider floor explains: how much is left under the best effect says nothing of that, but for what strangers alone
+leave (`unfit`).
 
 Thresholds come from probabilities of sets left out of the fit. That of names is for sets in which the catalogue has the
 cause; how often strangers are taken for one of them is another figure.
 
-What left-out gaits say, a weight for each effect, the equivalence test and what pieces cost beyond those of healthy
-runs were worth nothing or less on sets left out (docs/concepts/blind-trials.md), and do not count.
+A weight for each effect, the equivalence test and what pieces cost beyond those of healthy runs were worth nothing or
+less on sets left out (docs/concepts/blind-trials.md), and do not count.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from r2s2r_cli.blind.score.cases import BY_CHANCE, FEW, MOST, Case
+from r2s2r_cli.blind.score.cases import BY_CHANCE, FEW, HELD, MOST, Case
 from r2s2r_cli.blind.score.facts import NONE, UNKNOWN
 from r2s2r_cli.errors import InputError
 
@@ -77,7 +78,7 @@ def learn(cases: Sequence[Case], *, where: str = "BANK") -> tuple[Learned, Apart
     apart = [pair for fold in range(FOLDS) for pair in _left_out(cases, fold)]
     first, right, sure = _first(apart)
     named = np.array([
-        name not in (NONE, UNKNOWN) and one.truth != UNKNOWN for name, (one, _) in zip(first, apart, strict=True)
+        one.may_name(name) and one.truth != UNKNOWN for name, (one, _) in zip(first, apart, strict=True)
     ])  # fmt: skip
     here = np.array([1.0 - p[UNKNOWN] for _, p in apart])
     commit = _commit(sure[named], right[named], (sure / here)[named])
@@ -102,6 +103,7 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
         "parity": learned["parity"] / sharp,
         "by_chance": BY_CHANCE,
         "most": MOST,
+        "held": HELD,
         "none": learned["none"] / sharp,
         **dict(zip(("stranger", "wider"), own.strange.tolist(), strict=True)),
         "few": FEW,
@@ -139,7 +141,7 @@ def _design(one: Case) -> np.ndarray:
     """What multiplies LEARNED in the exponent of every name, (name, LEARNED)."""
     none = np.array([name == NONE for name in one.names])
     return np.stack(
-        [np.where(none, 0.0, one.said * SHARPNESS), np.where(none, 0.0, one.parity), none.astype(float)], axis=1
+        [np.where(none, 0.0, one.gain * SHARPNESS), np.where(none, 0.0, one.parity), none.astype(float)], axis=1
     )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from r2s2r_cli.blind.score.facts import NO_REPLAY, UNKNOWN, Truth
+from r2s2r_cli.blind.score.facts import NO_REPLAY, NONE, UNKNOWN, Truth
 
 BY_CHANCE = 4.0
 """[nats] That the parity stage says for the best of a whole catalogue where nothing is wrong: less than that says
@@ -16,6 +16,10 @@ MOST = 8.0
 """[nats] beyond that which count: look-alikes share a finding, and 48 nats for one with 36 for the other, weighed
 several times, outvoted the replay, which tells them apart."""
 
+HELD = 0.3
+"""Of what an effect gains the share that left-out gaits say; the rest is what all data do, which rank better. They are
+no less right where they lose, but one step off a cliff costs a right effect any number of nats, so losses do not count.
+"""
 FEW = 10.0
 """[nats] From about which on what a wider floor explains says something of a stranger; gains span decades."""
 
@@ -23,7 +27,7 @@ FEW = 10.0
 @dataclass(frozen=True)
 class Case:
     """One set. names: `none` and the effects that were ranked; said (n,) [nats]: what all data together say for each,
-    at least 0; left_out (n,) [nats]: what gaits say that each was not fitted to; parity (n,) [nats]: beyond BY_CHANCE,
+    at least 0; left_out (n,) [nats]: what gaits say that each was not fitted to, at least 0; parity (n,) [nats]: beyond BY_CHANCE,
     MOST at most where a replay tells. truth: the right name, not among `names` where the screening had lost it, or no
     catalogue has it (`unknown`). strange: ln(1 + x / FEW) of what a wider floor gains beside the best effect, x [nats];
     left_sd: what that leaves, in sd of healthy pieces, 0 where that is less than in healthy runs."""
@@ -35,6 +39,18 @@ class Case:
     strange: float = 0.0
     left_sd: float = 0.0
     left_out: np.ndarray | None = None
+
+    @property
+    def gain(self) -> np.ndarray:
+        """What counts, (n,) [nats]: all data and, where it is known what left-out gaits say, HELD of them."""
+        return self.said if self.left_out is None else (1.0 - HELD) * self.said + HELD * self.left_out
+
+    def may_name(self, name: str) -> bool:
+        """Whether it is an effect for which something speaks that it was not fitted to (`Calibration.witnessed`)."""
+        if name in (NONE, UNKNOWN):
+            return False
+        i = self.names.index(name)
+        return self.left_out is None or bool(self.left_out[i] > 0.0 or self.parity[i] > 0.0)
 
 
 def case(truth: Truth, document: dict[str, Any]) -> Case | None:
@@ -55,4 +71,4 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
     ])  # fmt: skip
     strange = float(np.log1p(max(float(stranger["elpd_gain"]), 0.0) / FEW))
     left = max(float(document.get("left_nats") or 0.0), 0.0) / float(document.get("left_sd_nats") or np.inf)
-    return Case(names, np.maximum(said, 0.0), parity, truth.right, strange, left, left_out)
+    return Case(names, np.maximum(said, 0.0), parity, truth.right, strange, left, np.maximum(left_out, 0.0))

@@ -14,7 +14,7 @@ import numpy as np
 
 from r2s2r_cli.blind.score.calibrate import Learned, learn
 from r2s2r_cli.blind.score.cases import Case
-from r2s2r_cli.blind.score.facts import NONE, UNKNOWN, Truth
+from r2s2r_cli.blind.score.facts import UNKNOWN, Truth
 from r2s2r_cli.errors import InputError
 from schemas.results_blind_worth import BlindWorthRow
 
@@ -63,7 +63,7 @@ def _ranked(truth: Truth, one: Case, own: Learned) -> Ranked:
     p = own.probabilities(one)
     order = tuple(sorted(p, key=lambda name: -p[name]))
     first = order[0]
-    named = first not in (NONE, UNKNOWN) and p[first] >= own.commit
+    named = one.may_name(first) and p[first] >= own.commit
     return Ranked(truth, one, order, p, first if named else None)
 
 
@@ -85,15 +85,24 @@ def _row(what: str, found: Sequence[Ranked], everything: Sequence[Ranked]) -> Bl
     )  # fmt: skip
 
 
-def _left_out(one: Case) -> Case:
-    return one if one.left_out is None else replace(one, said=np.maximum(one.left_out, 0.0))
+def _parity_alone(one: Case) -> Case:
+    return replace(one, said=np.zeros_like(one.said), left_out=None, strange=0.0, left_sd=0.0)
+
+
+def _all_data_alone(one: Case) -> Case:
+    return replace(one, left_out=None)
+
+
+def _left_out_alone(one: Case) -> Case:
+    return one if one.left_out is None else replace(one, said=one.left_out, left_out=None)
 
 
 KINDS: dict[str, Without] = {
     "nothing": lambda one: one,
     "the parity stage": lambda one: replace(one, parity=np.zeros_like(one.parity)),
-    "the replay (parity alone)": lambda one: replace(one, said=np.zeros_like(one.said), strange=0.0, left_sd=0.0),
-    "all data together (left-out gaits instead)": _left_out,
+    "the replay (parity alone)": _parity_alone,
+    "left-out gaits (all data together instead)": _all_data_alone,
+    "all data together (left-out gaits instead)": _left_out_alone,
     "what a wider floor explains": lambda one: replace(one, strange=0.0),
     "what is left beyond healthy runs": lambda one: replace(one, left_sd=0.0),
 }

@@ -1,4 +1,4 @@
-"""From two kinds of gains to a verdict: all data rank, and without healthy runs no more than left-out data say."""
+"""From two kinds of gains to a verdict: all data rank, left-out gaits doubt."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.verdict import concluded
 from tests.support.linear_arena import STRETCHES, LinearArena, candidate
 
-BY = Calibration(temperature=7.5, none=30.0, commit=0.54, conformal=0.01, stranger=-2.0, wider=0.7, unfit=4.4,
+BY = Calibration(temperature=7.5, held=0.25, none=30.0, commit=0.54, conformal=0.01, stranger=-2.0, wider=0.7, unfit=4.4,
                  unfit_share=0.75)  # fmt: skip
 
 
@@ -33,39 +33,54 @@ def score(gain: float) -> Score:
     return Score(each, one, np.zeros((STRETCHES, 1, 3)), np.ones(3), np.zeros((3, 3)))
 
 
-def said(by: Calibration, *, left: float = 0.0, unexplained: float = 0.0, parity: float = 0.0) -> Which:
-    """Of a payload with 90 nats on all data and -20 left out, and a lag with 40 and 60. parity: for the lag."""
+def said(
+    by: Calibration, *, left_out: float = 20.0, left: float = 0.0, unexplained: float = 0.0, parity: float = 0.0,
+    of_payload: float = 0.0,
+) -> Which:  # fmt: skip
+    """Of a payload with 90 nats on all data and 20 left out, and a lag with 40 and 60. left_out: of the payload;
+    parity: for the lag, of_payload: for the payload."""
     arena = LinearArena(1.0)
     zero = np.zeros((STRETCHES, 0))
     fits = [Fit(Hypothesis((candidate(name, k),)), np.zeros(2), np.ones(1), np.zeros(1), np.zeros((1, 3)), 0.0,
                 np.zeros(1), zero, []) for k, name in enumerate(("payload", "motor_lag"))]  # fmt: skip
     base = Fit(Hypothesis(), np.zeros(2), np.zeros(0), np.zeros(1), np.zeros((1, 2)), 0.0, np.zeros(0), zero, [])
     return concluded(Material(
-        arena=arena, base=base, refit=score(0.0), fits=tuple(fits), scores=(score(-20.0), score(60.0)), responses=(),  # type: ignore[arg-type]
+        arena=arena, base=base, refit=score(0.0), fits=tuple(fits), scores=(score(left_out), score(60.0)), responses=(),  # type: ignore[arg-type]
         chance=5.0, no_gap=NoGap(0.02, 0.03, 0.01, 0.0), wider=1.0, left=Left(50.0, left, 1.0),
         unexplained=unexplained, groups=arena.gait, calibration=by, chronic=np.zeros(2),
-        marginal=np.array([90.0, 40.0]), asked=("payload", "motor_lag"), parity={"motor_lag": {None: parity}},
+        marginal=np.array([90.0, 40.0]), asked=("payload", "motor_lag"), parity={"motor_lag": {None: parity}, "payload": {None: of_payload}},
     ))  # fmt: skip
 
 
 def test_all_data_rank() -> None:
-    """The payload is named although what was left out speaks against it; both gains stand in the ranking."""
+    """The payload is named although gaits that were left out say more for the lag; both gains stand in the ranking."""
     found = said(BY)
     assert (found.verdict, found.effects) == ("effect", ("payload",))
     first = found.ranking[0]
-    assert (first.effect, first.marginal) == ("payload", 90.0) and first.gain < 0.0
+    assert (first.effect, first.marginal) == ("payload", 90.0)
     p = {one.effect: one.probability for one in found.ranking}
     assert sum(p.values()) == pytest.approx(1.0)
-    assert np.log(p["payload"] / p["motor_lag"]) == pytest.approx(50.0 / 7.5)
-    assert np.log(p["motor_lag"] / p["none"]) == pytest.approx(10.0 / 7.5)
+    gain = {one.effect: one.gain for one in found.ranking}
+    assert gain["payload"] < 30.0 < gain["motor_lag"]
+    worth = {name: 0.75 * all_data + 0.25 * gain[name] for name, all_data in (("payload", 90.0), ("motor_lag", 40.0))}
+    assert np.log(p["payload"] / p["motor_lag"]) == pytest.approx((worth["payload"] - worth["motor_lag"]) / 7.5)
+    assert np.log(p["motor_lag"] / p["none"]) == pytest.approx((worth["motor_lag"] - 30.0) / 7.5)
+
+
+def test_what_left_out_gaits_speak_against_is_first_and_no_verdict() -> None:
+    """Unless the parity stage speaks for it."""
+    found = said(BY, left_out=-20.0)
+    assert (found.verdict, found.ranking[0].effect) == ("ambiguous", "payload") and found.probability > BY.commit
+    assert said(BY, left_out=-20.0, of_payload=1.0).effects == ("payload",)
 
 
 def test_without_healthy_runs_the_lesser_gain_counts() -> None:
-    """So the payload counts nothing, and the lag its 40 nats."""
+    """So the payload counts its 20 nats, and the lag its 40."""
     found = said(BY.absolute())
     assert (found.verdict, found.effects) == ("effect", ("motor_lag",))
     p = {one.effect: one.probability for one in found.ranking}
-    assert np.log(p["motor_lag"] / p["payload"]) == pytest.approx(40.0 / 7.5)
+    payload = next(one.gain for one in found.ranking if one.effect == "payload")
+    assert np.log(p["motor_lag"] / p["payload"]) == pytest.approx((40.0 - payload) / 7.5)
 
 
 def test_parity_speaks_beside_the_replay() -> None:

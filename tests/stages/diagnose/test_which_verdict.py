@@ -18,7 +18,7 @@ from r2s2r_cli.stages.diagnose.which.rivals import NoGap, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.verdict import verdict_of
 
-BY = Calibration(commit=0.6)
+BY = Calibration(commit=0.6, held=0.3)
 CHANCE = 5.0
 GAP, NO_GAP = NoGap(0.02, 0.03, 0.01, 0.0), NoGap(0.009, 0.011, 0.01, 0.95)
 """A refit error of twice the floor, and one at the floor."""
@@ -34,6 +34,19 @@ def test_a_name_has_its_threshold() -> None:
     assert verdict_of(ranking("payload", 0.6, 30.0), BY, None, GAP)[:2] == ("effect", ("payload",))
     assert verdict_of(ranking("payload", 0.59, 30.0), BY, None, GAP) == ("ambiguous", (), 0.59)
     assert verdict_of(ranking("unknown", 0.99, 30.0), BY, None, GAP) == ("ambiguous", (), 0.99)
+
+
+def test_a_name_needs_a_witness() -> None:
+    """Left-out gaits or the parity stage; what explains only that which it was fitted to is not named, nor is a pair
+    that begins with it, and where the error is at the floor there is no gap."""
+    by = replace(BY, by_chance=4.0)
+    alone = Ranked("payload", -25.0, 0.9, marginal=95.0, parity=3.9)
+    other = Ranked("backlash", 30.0, 0.1)
+    assert verdict_of([alone, other], by, None, GAP) == ("ambiguous", (), 0.9)
+    assert verdict_of([alone, other], by, ("payload", "backlash"), GAP) == ("ambiguous", (), 0.9)
+    assert verdict_of([alone, other], by, None, NO_GAP) == ("no_gap", (), 0.95)
+    for seen in (replace(alone, gain=0.1), replace(alone, parity=4.1)):
+        assert verdict_of([seen, other], by, None, GAP) == ("effect", ("payload",), 0.9)
 
 
 def test_no_gap_is_a_claim_about_size() -> None:
@@ -111,9 +124,12 @@ def test_the_bound_and_its_confidence_agree() -> None:
 
 
 def test_an_effect_that_harms_is_not_there_and_no_less_than_that() -> None:
-    """What it gains counts in full, and a loss as nothing: one that breaks everything is as improbable as one that
-    changes nothing. What `none` is worth depends on no evidence."""
-    assert BY.score("payload", 30.0) - BY.score("payload", 10.0) == pytest.approx(20.0)
+    """What it gains counts, on all data for the larger part and on left-out gaits for the rest, and a loss as nothing:
+    one that breaks everything is as improbable as one that changes nothing. What `none` is worth depends on no
+    evidence."""
+    assert BY.score("payload", 30.0, left_out=5.0) - BY.score("payload", 10.0, left_out=5.0) == pytest.approx(14.0)
+    assert BY.score("payload", 30.0, left_out=15.0) - BY.score("payload", 30.0, left_out=5.0) == pytest.approx(3.0)
+    assert BY.score("payload", 30.0, left_out=-400.0) == BY.score("payload", 30.0) == pytest.approx(21.0)
     assert BY.score("payload", -500.0) == BY.score("payload", 0.0) == 0.0
     assert BY.score("none", 99.0, parity=99.0) == BY.none
 
@@ -160,12 +176,10 @@ def test_without_healthy_runs_less_counts() -> None:
     """The parity stage for less, and no gain that left-out data do not confirm; whoever reads the probabilities is
     told."""
     own = BY.absolute()
-    assert own.score("payload", 7.0, left_out=9.0, parity=8.0) - 7.0 == pytest.approx(
-        ABSOLUTE * (BY.score("payload", 7.0, parity=8.0) - 7.0)
-    )
-    assert own.score("payload", 7.0, left_out=9.0) == BY.score("payload", 7.0) == 7.0
+    assert own.score("payload", 0.0, parity=8.0) == pytest.approx(ABSOLUTE * BY.score("payload", 0.0, parity=8.0))
+    assert own.score("payload", 7.0, left_out=9.0) == pytest.approx(7.0)
     assert own.score("payload", 95.0, left_out=9.0) == 9.0 and own.score("payload", 95.0, left_out=-3.0) == 0.0
-    assert BY.score("payload", 95.0, left_out=-3.0) == 95.0
+    assert BY.score("payload", 95.0, left_out=-3.0) == pytest.approx(0.7 * 95.0)
     assert "healthy runs" in own.words and own.commit == BY.commit
 
 
@@ -173,7 +187,7 @@ def test_between_look_alikes_that_both_stand_out_the_replay_decides() -> None:
     """A lag and a latency, 36 and 48 nats from the ramps of the winches, 69 and 33 from the replay."""
     learned = replace(BY, parity=4.5, by_chance=4.0, most=8.0)
     lag, late = learned.score("motor_lag", 69.0, parity=36.0), learned.score("command_latency", 33.0, parity=48.0)
-    assert lag - late == pytest.approx(36.0)
+    assert lag - late == pytest.approx(0.7 * 36.0)
     assert learned.score("motor_lag", 0.0, parity=4.0) == learned.score("motor_lag", 0.0)
     assert learned.score("dropout", 0.0, parity=36.0) == pytest.approx(learned.score("dropout", 0.0) + 4.5 * 32.0)
     assert facts.NO_REPLAY == NO_REPLAY

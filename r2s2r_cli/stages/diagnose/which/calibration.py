@@ -24,14 +24,14 @@ class Calibration:
     temperature [nats]: of the softmax over `none` and the effects. parity: nats of gain that a nat of the parity stage
     is worth, which needs no simulator and errs far less, beyond by_chance [nats], which it says for the best of a whole
     catalogue where nothing is wrong; most [nats]: of them that count, since a finding that stands out says that
-    something is wrong, and which of its look-alikes it is the replay tells better, where there is one. none [nats]:
-    what the best effect must exceed.
+    something is wrong, and which of its look-alikes it is the replay tells better, where there is one. held: share of a
+    gain that left-out gaits must say, the rest is of all data. none [nats]: what the best effect must exceed.
     stranger: log odds of a cause that the catalogue does not have; wider: by what ln(1 + x / few) raises them, x what a
     wider floor gains beside the best effect [nats]; few [nats]: from about where on it says something.
     unfit: how far beyond those of healthy runs pieces may lie under the best effect of each [sd]: farther, no effect of
     the catalogue is enough, and `unknown` has at least unfit_share.
     commit: probability from which an effect is the verdict.
-    cautious: gains count no more than what left-out gaits say.
+    cautious: the lesser of both counts alone.
     conformal: names whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many
     it rests on, 0 for the defaults. lapse: how often the evidence says nothing of the truth, so that no name is ever
     certain.
@@ -41,6 +41,7 @@ class Calibration:
     parity: float = 15.0
     by_chance: float = 0.0
     most: float = float("inf")
+    held: float = 0.3
     none: float = 20.0
     stranger: float = -2.0
     wider: float = 0.0
@@ -55,15 +56,21 @@ class Calibration:
     sets: int = 0
 
     def score(self, name: str, marginal: float = 0.0, *, left_out: float = 0.0, parity: float = 0.0) -> float:
-        """What a name is worth [nats]. marginal: what the effect gains on all data, nothing where it loses: how much it
-        would harm does not say how little it is there. left_out: what it gains on gaits that were left out. parity:
-        what the parity stage says for it."""
+        """What a name is worth [nats]. marginal: what the effect gains on all data, left_out: on gaits that were left
+        out; nothing where it loses: how much it would harm does not say how little it is there. parity: what the parity
+        stage says for it."""
         if name == NONE:
             return self.none
         if self.cautious:
-            marginal = min(marginal, left_out)
+            marginal = left_out = min(marginal, left_out)
         most = float("inf") if name in NO_REPLAY else self.most
-        return max(marginal, 0.0) + self.parity * min(max(parity - self.by_chance, 0.0), most)
+        gain = (1.0 - self.held) * max(marginal, 0.0) + self.held * max(left_out, 0.0)
+        return gain + self.parity * min(max(parity - self.by_chance, 0.0), most)
+
+    def witnessed(self, left_out: float, parity: float) -> bool:
+        """Whether anything speaks for an effect that did not help to fit it: gaits that were left out, or the parity
+        stage [nats]. Without that it is no verdict, however well it explains what it was fitted to."""
+        return left_out > 0.0 or parity > self.by_chance
 
     def absolute(self) -> Calibration:
         """For a diagnosis without healthy runs: nothing says which gains make up for the simulator and were there

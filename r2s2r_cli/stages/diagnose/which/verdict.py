@@ -122,13 +122,14 @@ def verdict_of(
     ranking: list[Ranked], calibration: Calibration, pair: tuple[str, ...] | None, gap: NoGap, *, left_sd: float = 0.0,
 ) -> tuple[str, tuple[str, ...], float]:  # fmt: skip
     """What the first of the ranking is worth. Where the best effect leaves too much (left_sd, `Calibration.refuses`)
-    that is a verdict of its own: no effect of the catalogue is enough. Where no cause is named, that there is no gap is
-    a claim about its size (design.md, Measures), not about causes that hide below the floor."""
+    that is a verdict of its own: no effect of the catalogue is enough. A name that nothing speaks for but what it was
+    fitted to is none (`Calibration.witnessed`). Where no cause is named, that there is no gap is a claim about its size
+    (design.md, Measures), not about causes that hide below the floor."""
     first = ranking[0]
-    named = first.effect not in (NONE, UNKNOWN)
+    named = first.effect not in (NONE, UNKNOWN) and calibration.witnessed(first.gain, first.parity)
     if first.effect == UNKNOWN and calibration.refuses(left_sd):
         return "unknown", (), first.probability
-    if pair is not None and first.effect in pair:
+    if named and pair is not None and first.effect in pair:
         # What speaks for both together is shared between their names.
         p = sum(one.probability for one in ranking if one.effect in pair)
         if calibration.commits(p):

@@ -111,6 +111,8 @@ class PublishedDiagnosis(Frozen):
     left_sd_nats: float | None = None
     refit_rmse_m: float | None = None
     refit_upper_m: float | None = None
+    refit_floor_m: float | None = None
+    refit_kept: float = 1.0
     floor_m: float
     calibrated: str = ""
 

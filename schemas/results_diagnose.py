@@ -161,7 +161,11 @@ class DiagnoseReport(Frozen):
     floor_given: bool
     refit_rmse_m: float
     refit_upper_m: float | None
-    """Upper 90 % bound; below 1.25 floor there is no gap."""
+    """Upper 90 % bound; below 1.25 `refit_floor_m` there is no gap."""
+    refit_floor_m: float | None = None
+    """The floor of as large a share of the intervals; None: before version 17 of the stage, `floor_m`."""
+    refit_kept: float = 1.0
+    """Share of the intervals, the best ones, that these three are of."""
     chance_nats: float
     """What the best of the catalogue gains left out by chance in one case of twenty."""
     gap_nats: float | None = None

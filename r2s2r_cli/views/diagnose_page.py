@@ -201,7 +201,9 @@ def _next(one: NextGaitFound, where: str) -> str:
 
 def _how(report: DiagnoseReport) -> Iterator[list[str]]:
     upper = "" if report.refit_upper_m is None else f", upper 90 % bound {1e3 * report.refit_upper_m:.1f} mm"
-    yield ["refit error, left out", f"{1e3 * report.refit_rmse_m:.1f} mm{upper}"]
+    floor = "" if report.refit_floor_m is None else f"; floor {1e3 * report.refit_floor_m:.1f} mm"
+    part = "" if report.refit_kept == 1.0 else f", all of the best {100 * report.refit_kept:.0f} % of the intervals"
+    yield ["refit error, left out", f"{1e3 * report.refit_rmse_m:.1f} mm{upper}{floor}{part}"]
     yield [
         "floor",
         f"{1e3 * report.floor_m:.1f} mm: {report.floor_from}" + ("" if report.floor_given else " (estimated)"),

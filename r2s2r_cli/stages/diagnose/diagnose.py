@@ -88,8 +88,9 @@ def diagnose(
     fitted = refit(evidence, replayer, starts=starts, told=progress,
         again=settings.refit_baseline, with_floor=settings.with_floor,
     )  # fmt: skip
+    at_floor, kept = fitted.floor.equivalence
     compared = compare_effects(
-        fitted.arena, fitted.base, floor_m=fitted.floor.rmse, kept=fitted.floor.kept,
+        fitted.arena, fitted.base, floor_m=at_floor, kept=kept,
         calibration=settings.calibration or calibration(),
         sizes={} if said is None else said.starts(), told_by=None if said is None else said.nats(),
         effects=settings.effects, seed=settings.seed, told=progress,

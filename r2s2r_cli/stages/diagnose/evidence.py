@@ -61,13 +61,20 @@ class Run:
 class FloorGiven:
     """What remains of a gap when nothing is wrong. rmse: key-frame cap RMSE [m]; sensor: the part of it that noise
     explains [m]; words: where it comes from; given: False where it was estimated from the diagnosed runs themselves.
-    kept: share of the intervals, the best ones, that it was taken from."""
+    kept: share of the intervals, the best ones, that it was taken from. usual: the same RMSE [m] of the share that the
+    equivalence test looks at, and that share; None: as `rmse` and `kept`."""
 
     rmse: float
     sensor: float
     words: str
     given: bool = True
     kept: float = 1.0
+    usual: tuple[float, float] | None = None
+
+    @property
+    def equivalence(self) -> tuple[float, float]:
+        """RMSE [m] that no gap must be near, and the share of the intervals that it is taken from."""
+        return self.usual or (self.rmse, self.kept)
 
 
 @dataclass(frozen=True)

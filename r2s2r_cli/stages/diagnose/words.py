@@ -35,10 +35,11 @@ def sentence(found: Diagnosis) -> str:
 def _verdict(found: Diagnosis) -> str:
     which = found.which
     best = which.best
-    refit, floor = 1e3 * which.no_gap.rmse, 1e3 * found.floor.rmse
+    refit, floor = 1e3 * which.no_gap.rmse, 1e3 * which.no_gap.floor
+    part = "" if which.no_gap.kept == 1.0 else f" on the best {100 * which.no_gap.kept:.0f} % of the intervals"
     if which.verdict == "no_gap":
         bound = f"upper 90 % bound {1e3 * (which.no_gap.upper or 0.0):.1f} mm"
-        text = f"There is no gap above the floor: {refit:.1f} mm after refitting, {bound}; floor {floor:.1f} mm."
+        text = f"There is no gap above the floor: {refit:.1f} mm after refitting{part}, {bound}; floor {floor:.1f} mm."
         if best is not None and which.ranking[0] is best:
             text += f" Below it may hide {best.effect} (p = {best.probability:.2f})."
         return text
@@ -46,7 +47,7 @@ def _verdict(found: Diagnosis) -> str:
         where = "" if found.channel is None else f" It acts most like something in channel {found.channel}."
         return (
             f"Something is wrong that none of the effects looked for explains (p = {which.probability:.2f}): "
-            f"{refit:.1f} mm at the end of an interval after refitting, floor {floor:.1f} mm.{where}"
+            f"{refit:.1f} mm at the end of an interval after refitting{part}, floor {floor:.1f} mm.{where}"
         )
     if which.verdict == "ambiguous" or best is None:
         first, *others = [_named(name) for name in which.set90]

@@ -71,6 +71,7 @@ def test_what_left_out_gaits_speak_against_is_first_and_no_verdict() -> None:
     """Unless the parity stage speaks for it."""
     found = said(BY, left_out=-20.0)
     assert (found.verdict, found.ranking[0].effect) == ("ambiguous", "payload") and found.probability > BY.commit
+    assert any("nothing else speaks for it" in text for text in found.warnings)
     assert said(BY, left_out=-20.0, of_payload=1.0).effects == ("payload",)
 
 

@@ -20,13 +20,12 @@ def found(verdict: str, **changes: object) -> SimpleNamespace:
     )  # fmt: skip
     values = {"verdict": verdict, "effects": ("payload",), "probability": 0.9, "set90": ("payload", "none", "unknown"),
               "best": best, "confusable": (), "ranking": (SimpleNamespace(effect="none"), best),
-              "no_gap": SimpleNamespace(rmse=0.012, upper=0.014)}  # fmt: skip
+              "no_gap": SimpleNamespace(rmse=0.012, upper=0.014, floor=0.005, kept=1.0)}  # fmt: skip
     if changes.pop("first", False):
         values["ranking"] = (best, SimpleNamespace(effect="none"))
     where = SimpleNamespace(onset=changes.pop("onset", None))
     return SimpleNamespace(
-        which=SimpleNamespace(**{**values, **changes}), much=much, channel="mass", floor=SimpleNamespace(rmse=0.005),
-        where=where,
+        which=SimpleNamespace(**{**values, **changes}), much=much, channel="mass", where=where,
     )  # fmt: skip
 
 
@@ -46,9 +45,10 @@ SHRUNK = "key-frame error from 12.0 to 6.0 mm (floor 5.0), which closes 70 % (0 
          "the likeliest effect, payload, takes"),
         (found("unknown"), "Something is wrong that none of the effects looked for explains (p = 0.90): 12.0 mm",
          "It acts most like something in channel mass."),
-        (found("no_gap", no_gap=SimpleNamespace(rmse=0.005, upper=0.006)),
-         "There is no gap above the floor: 5.0 mm after refitting, upper 90 % bound 6.0 mm; floor 5.0 mm.", "5.0 mm."),
-        (found("no_gap", no_gap=SimpleNamespace(rmse=0.005, upper=0.006), first=True),
+        (found("no_gap", no_gap=SimpleNamespace(rmse=0.005, upper=0.006, floor=0.005, kept=0.75)),
+         "There is no gap above the floor: 5.0 mm after refitting on the best 75 % of the intervals, upper 90 % bound "
+         "6.0 mm; floor 5.0 mm.", "5.0 mm."),
+        (found("no_gap", no_gap=SimpleNamespace(rmse=0.005, upper=0.006, floor=0.005, kept=1.0), first=True),
          "There is no gap above the floor: 5.0 mm", "floor 5.0 mm. Below it may hide payload (p = 0.40)."),
     ],
 )  # fmt: skip

@@ -25,12 +25,14 @@ DRAWS = 1000
 class NoGap:
     """The equivalence test. rmse: of the refit model at the ends of stretches left out [m]; upper: its upper 90 %
     bound, None for fewer than two stretches; floor [m]; equivalent: the bound is below 1.25 floor. sure: confidence of
-    the largest bound that still is, 0 to 1."""
+    the largest bound that still is, 0 to 1. kept: share of the stretches, the best ones, that all
+    of this is of."""
 
     rmse: float
     upper: float | None
     floor: float
     sure: float = 0.0
+    kept: float = 1.0
 
     @property
     def equivalent(self) -> bool:
@@ -45,7 +47,7 @@ def no_gap(refit: Score, floor_m: float, *, kept: float = 1.0) -> NoGap:
     squared = squared[counting(squared, kept)] if len(squared) else squared
     rmse = float(np.sqrt(squared.mean())) if len(squared) else float("inf")
     bound = upper_bound(squared, level=0.90) if len(squared) else None
-    return NoGap(rmse, bound, floor_m, 0.0 if bound is None else _sure(squared, floor_m))
+    return NoGap(rmse, bound, floor_m, 0.0 if bound is None else _sure(squared, floor_m), kept)
 
 
 def _sure(squared: np.ndarray, floor_m: float) -> float:

@@ -77,7 +77,8 @@ def concluded(m: Material) -> Which:
         no_gap=m.no_gap, chance=m.chance, wider=m.wider, unexplained=m.unexplained, left=m.left,
         confusable=confusable(m, [i for i in best.values() if m.fits[i].moved][:ALIKE]),
         not_testable=_not_testable(m.responses), shifts=() if top is None else _shifts(m, m.fits[top]),
-        within=_left_out(m), calibrated=calibration.words, warnings=_warnings(m, [best[name] for name in names]),
+        within=_left_out(m), calibrated=calibration.words,
+        warnings=(*_unwitnessed(ranking[0], calibration), *_warnings(m, [best[name] for name in names])),
         pairs=tuple(both),
     )  # fmt: skip
 
@@ -220,6 +221,15 @@ def _left_out(m: Material) -> str:
     runs = {one.run for one in m.arena.many}
     return (
         f"leave one run out, {count} runs" if len(runs) > 1 else f"leave one interval out, {count} intervals of one run"
+    )
+
+
+def _unwitnessed(first: Ranked, calibration: Calibration) -> tuple[str, ...]:
+    if first.effect in (NONE, UNKNOWN) or calibration.witnessed(first.gain, first.parity):
+        return ()
+    return (
+        f"{first.effect} explains what it was fitted to, but nothing else speaks for it: neither what was left out "
+        f"({first.gain:+.1f} nats) nor the parity stage; it may be one event, and is no verdict",
     )
 
 

@@ -27,10 +27,10 @@ FEW = 10.0
 @dataclass(frozen=True)
 class Case:
     """One set. names: `none` and the effects that were ranked; said (n,) [nats]: what all data together say for each,
-    at least 0; left_out (n,) [nats]: what gaits say that each was not fitted to, at least 0; parity (n,) [nats]: beyond BY_CHANCE,
-    MOST at most where a replay tells. truth: the right name, not among `names` where the screening had lost it, or no
-    catalogue has it (`unknown`). strange: ln(1 + x / FEW) of what a wider floor gains beside the best effect, x [nats];
-    left_sd: what that leaves, in sd of healthy pieces, 0 where that is less than in healthy runs."""
+    at least 0; left_out (n,) [nats]: what gaits say that each was not fitted to, at least 0; parity (n,) [nats]: beyond
+    BY_CHANCE, MOST at most where a replay tells. truth: the right name, not among `names` where the screening had lost
+    it, or no catalogue has it (`unknown`). strange: ln(1 + x / FEW) of what a wider floor gains beside the best effect,
+    x [nats]; left_sd: what that leaves, in sd of healthy pieces, 0 where that is less than in healthy runs."""
 
     names: tuple[str, ...]
     said: np.ndarray

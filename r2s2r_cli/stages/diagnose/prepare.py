@@ -9,6 +9,7 @@ import numpy as np
 
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run, whole
+from r2s2r_cli.stages.diagnose.floors import NUMERICS_M, floor_for, healthy_floor
 from r2s2r_cli.stages.diagnose.parity.lengths import late_readings
 from r2s2r_cli.stages.diagnose.starts import Starts, as_known
 from r2s2r_cli.stages.diagnose.which.arena import Arena
@@ -21,12 +22,7 @@ from r2s2r_cli.stages.diagnose.which.replay import Replayer
 from r2s2r_cli.stages.diagnose.which.shake import shaken
 from r2s2r_cli.stages.diagnose.which.stretches import stretches
 from r2s2r_cli.stages.identify.data import Selection
-from r2s2r_cli.stages.measures.floor import floor_of
-from r2s2r_cli.stages.measures.gap import counting
-from r2s2r_cli.stages.measures.steps import steps_of
 
-NUMERICS_M = 3e-3
-"""[m] What two good engines differ by at the end of a step of this robot, beside noise (tier B without an effect)."""
 FLOORS_M = (0.8e-3, 1.6e-3, 3.2e-3, 6.4e-3, 13e-3)
 """Floors that healthy runs are tried with."""
 NOISES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
@@ -38,11 +34,6 @@ FLOOR_SPREAD = 0.5
 """Of the logarithm of the floor, before healthy runs are looked at: noisy ones say little of it."""
 ROUNDS = 2
 """Times that start states are made anew with the refitted numbers, where nothing is known of these to begin with."""
-KEPT = 0.9
-"""Share of healthy stretches that the floor is taken from: a tip-over that went the other way is not the floor."""
-USUAL = 0.75
-"""The same for the equivalence test. Healthy runs have about eleven intervals, and one or two falls among them, or among
-those that are judged, decide the root mean square of nine tenths: with nothing wrong one was 0.3 to 1.3 of the other."""
 NO_FLOOR_M = 1e-4
 FROZEN = 1e8
 """Times its prior's precision that a nuisance has which is not fitted."""
@@ -101,13 +92,7 @@ def refit(
         simulator, noise, lasts = arena.floor_m, arena.noise, arena.lasts
         prior = _posterior(arena, base)
         healthy, begin = Healthy(arena, base), base.z[: arena.shared]
-        if evidence.floor is None:
-            sensor = float(np.sqrt(np.mean([np.sum(one.noise[-1] ** 2, axis=-1).mean() for one in arena.whole])))
-            squared = healthy.score.squared
-            squared = squared[np.isfinite(squared)]
-            rmse, usual = (float(np.sqrt(np.mean(squared[counting(squared, part)]))) for part in (KEPT, USUAL))
-            words = "the healthy runs, refitted"
-            floor = FloorGiven(rmse, min(sensor, rmse), words, True, KEPT, (usual, USUAL))
+        floor = floor if evidence.floor is not None else healthy_floor(healthy)
         told("healthy runs", 1, 1)
     arena, base = _fitted(
         evidence.runs, evidence.fit, replayer, simulator, (noise, lasts), prior, starts, begin, late, told
@@ -120,35 +105,6 @@ def refit(
             f"{asked - len(arena.whole)} of {asked} intervals have no key frame: the robot tips over as they begin"
         )
     return Refit(arena, base, floor, tuple(warnings), healthy)
-
-
-def floor_for(evidence: Evidence) -> tuple[FloorGiven, list[str]]:
-    """The floor that was given; else of repeats among the runs; else of noise and a foreign engine's numerics, which is
-    said."""
-    if evidence.floor is not None:
-        return evidence.floor, []
-    sensor = _sensor(evidence.runs)
-    steps = [
-        step for run in evidence.runs
-        for one in evidence.fit if one.run == run.name for step in steps_of(run.caps, one.intervals)
-    ]  # fmt: skip
-    found = floor_of(steps)
-    if found is not None and found.contrasts >= 2:
-        given = FloorGiven(found.floor_m, found.sensor_m, "repeats within the diagnosed runs", False)
-    else:
-        given = FloorGiven(
-            float(np.hypot(NUMERICS_M, sensor)),
-            sensor,
-            "the noise of the caps and 3 mm for the numerics of engines",
-            False,
-        )
-    said = [] if evidence.healthy else [f"no floor was given: taken from {given.words}, {1e3 * given.rmse:.1f} mm"]
-    return given, said
-
-
-def _sensor(runs: Sequence[Run]) -> float:
-    """What noise alone makes of the cap RMSE at a key frame that was started from a frame [m]."""
-    return float(np.sqrt(np.mean([np.sum(run.caps.noise**2, axis=-1).mean() for run in runs])))
 
 
 def _fitted(

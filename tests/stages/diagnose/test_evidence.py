@@ -10,7 +10,7 @@ import pytest
 
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run, require_enough
-from r2s2r_cli.stages.diagnose.prepare import floor_for
+from r2s2r_cli.stages.diagnose.floors import floor_for
 from r2s2r_cli.stages.estimate.smooth import MISSING
 from r2s2r_cli.stages.identified import nominal
 from r2s2r_cli.stages.identify.data import RunData, Selection

@@ -16,8 +16,8 @@ from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.verdict import concluded
 from tests.support.linear_arena import STRETCHES, LinearArena, candidate
 
-BY = Calibration(temperature=7.5, held=0.25, none=30.0, commit=0.54, conformal=0.01, stranger=-2.0, wider=0.7, unfit=4.4,
-                 unfit_share=0.75)  # fmt: skip
+BY = Calibration(temperature=7.5, held=0.25, none=30.0, commit=0.54, conformal=0.01, stranger=-2.0, wider=0.7,
+                 unfit=4.4, unfit_share=0.75)  # fmt: skip
 
 
 @pytest.fixture(autouse=True)
@@ -45,10 +45,11 @@ def said(
                 np.zeros(1), zero, []) for k, name in enumerate(("payload", "motor_lag"))]  # fmt: skip
     base = Fit(Hypothesis(), np.zeros(2), np.zeros(0), np.zeros(1), np.zeros((1, 2)), 0.0, np.zeros(0), zero, [])
     return concluded(Material(
-        arena=arena, base=base, refit=score(0.0), fits=tuple(fits), scores=(score(left_out), score(60.0)), responses=(),  # type: ignore[arg-type]
-        chance=5.0, no_gap=NoGap(0.02, 0.03, 0.01, 0.0), wider=1.0, left=Left(50.0, left, 1.0),
+        arena=arena, base=base, refit=score(0.0), fits=tuple(fits), scores=(score(left_out), score(60.0)),  # type: ignore[arg-type]
+        responses=(), chance=5.0, no_gap=NoGap(0.02, 0.03, 0.01, 0.0), wider=1.0, left=Left(50.0, left, 1.0),
         unexplained=unexplained, groups=arena.gait, calibration=by, chronic=np.zeros(2),
-        marginal=np.array([90.0, 40.0]), asked=("payload", "motor_lag"), parity={"motor_lag": {None: parity}, "payload": {None: of_payload}},
+        marginal=np.array([90.0, 40.0]), asked=("payload", "motor_lag"),
+        parity={"motor_lag": {None: parity}, "payload": {None: of_payload}},
     ))  # fmt: skip
 
 

@@ -46,8 +46,8 @@ SHRUNK = "key-frame error from 12.0 to 6.0 mm (floor 5.0), which closes 70 % (0 
         (found("unknown"), "Something is wrong that none of the effects looked for explains (p = 0.90): 12.0 mm",
          "It acts most like something in channel mass."),
         (found("no_gap", no_gap=SimpleNamespace(rmse=0.005, upper=0.006, floor=0.005, kept=0.75)),
-         "There is no gap above the floor: 5.0 mm after refitting on the best 75 % of the intervals, upper 90 % bound "
-         "6.0 mm; floor 5.0 mm.", "5.0 mm."),
+         "There is no gap above the floor: 5.0 mm after refitting on the best 75 % of the intervals, upper 90 % bound",
+         "bound 6.0 mm; floor 5.0 mm."),
         (found("no_gap", no_gap=SimpleNamespace(rmse=0.005, upper=0.006, floor=0.005, kept=1.0), first=True),
          "There is no gap above the floor: 5.0 mm", "floor 5.0 mm. Below it may hide payload (p = 0.40)."),
     ],

@@ -8,9 +8,9 @@ import numpy as np
 
 from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run, whole
+from r2s2r_cli.stages.diagnose.floors import KEPT
 from r2s2r_cli.stages.diagnose.much.blackbox import corrected
 from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, foretold, share_with_interval
-from r2s2r_cli.stages.diagnose.prepare import KEPT
 from r2s2r_cli.stages.diagnose.starts import Starts
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.before import Healthy

@@ -225,12 +225,14 @@ def _left_out(m: Material) -> str:
 
 
 def _unwitnessed(first: Ranked, calibration: Calibration) -> tuple[str, ...]:
-    if first.effect in (NONE, UNKNOWN) or calibration.witnessed(first.gain, first.parity):
+    likely = first.effect not in (NONE, UNKNOWN) and calibration.commits(first.probability)
+    if not likely or calibration.witnessed(first.gain, first.parity):
         return ()
-    return (
+    text = (
         f"{first.effect} explains what it was fitted to, but nothing else speaks for it: neither what was left out "
-        f"({first.gain:+.1f} nats) nor the parity stage; it may be one event, and is no verdict",
+        f"({first.gain:+.1f} nats) nor the parity stage; it may be one event, and is no verdict"
     )
+    return (text,)
 
 
 def _warnings(m: Material, rows: list[int]) -> tuple[str, ...]:

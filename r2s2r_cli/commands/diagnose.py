@@ -238,7 +238,7 @@ def _policy(report: DiagnoseReport) -> bytes:
 def _show(report: DiagnoseReport, console: Console) -> None:
     from r2s2r_cli.views.diagnose_page import diagnose_tables
 
-    for table in diagnose_tables(report):
+    for table in diagnose_tables(report, brief=True):
         console.table(table.title, table.columns, table.rows)
     console.data(report.sentence)
     for text in report.warnings:

@@ -9,7 +9,7 @@ import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.diagnose_floor import floor_picture
-from r2s2r_cli.views.diagnose_page import NOWHERE, element_words
+from r2s2r_cli.views.diagnose_ranking import NOWHERE, element_words
 from r2s2r_cli.views.figure import BLUE, GREEN, PURPLE, RED, new_figure, png_bytes, rod_color
 
 if TYPE_CHECKING:

@@ -6,37 +6,18 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from r2s2r_cli.views.diagnose_ranking import element_words, ranking_table
 from r2s2r_cli.views.page import Page, PageTable, Picture, render
 from schemas.results_diagnose import INDISTINCT
 
 if TYPE_CHECKING:
-    from schemas.results_diagnose import DiagnoseReport, ElementFound, NextGaitFound, PairFound, RankedName
-
-NOWHERE = -1e8
-"""[nats] Below which a gain stands for one that was not asked for, or broke off."""
-_RIVALS = {
-    "none": "the refit nominal model; counts as much in every diagnosis",
-    "unknown": "gain if errors may be larger than the floor: the more that is, the likelier a cause without a name",
-}
+    from schemas.results_diagnose import DiagnoseReport, NextGaitFound, PairFound, RankedName
 
 
-def diagnose_tables(report: DiagnoseReport) -> Iterator[PageTable]:
-    """What people read first comes first."""
-    yield PageTable(
-        "what explains the gap",
-        [
-            "name",
-            "where",
-            "all data: gain [nats]",
-            "left out: gain +- sd [nats]",
-            "probability",
-            "size",
-            "90 % interval",
-            "left-out error [mm]",
-            "remarks",
-        ],
-        [_ranked(one) for one in report.ranking],
-    )
+def diagnose_tables(report: DiagnoseReport, *, brief: bool = False) -> Iterator[PageTable]:
+    """What people read first comes first. brief: for a terminal, without effects of which nothing is said and without
+    the refitted numbers."""
+    yield ranking_table(report, brief=brief)
     if report.pairs:
         alone = {one.effect: one for one in report.ranking}
         yield PageTable(
@@ -55,7 +36,7 @@ def diagnose_tables(report: DiagnoseReport) -> Iterator[PageTable]:
              for a, b, nats in report.confusable],
         )  # fmt: skip
     yield PageTable("what cannot be told, and what to run next", ["what", "found"], list(_limits(report)))
-    yield PageTable("how", ["what", "found"], list(_how(report)))
+    yield PageTable("how", ["what", "found"], list(_how(report, brief=brief)))
 
 
 def diagnose_page(report: DiagnoseReport, pictures: Sequence[tuple[str, bytes]]) -> bytes:
@@ -75,49 +56,12 @@ def diagnose_page(report: DiagnoseReport, pictures: Sequence[tuple[str, bytes]])
     )  # fmt: skip
 
 
-def element_words(element: ElementFound | None) -> str:
-    """`cable 3`, `all sensors`, `the world`."""
-    if element is None:
-        return ""
-    if element.xy_m is not None:
-        return f"the place ({element.xy_m[0]:.2f}, {element.xy_m[1]:.2f}) m"
-    if element.kind in ("world", "camera", "place"):
-        return f"the {element.kind}"
-    return f"all {element.kind}s" if element.index is None else f"{element.kind} {element.index}"
-
-
 def _more(pair: PairFound, first: RankedName | None) -> tuple[str, str]:
     """What the second effect adds to the first, on left-out gaits and on all data."""
     if first is None:
         return "", ""
     both, one = pair.marginal_nats, first.marginal_nats
     return f"{pair.elpd_gain - first.elpd_gain:+.1f}", "" if both is None or one is None else f"{both - one:+.1f}"
-
-
-def _ranked(one: RankedName) -> list[str]:
-    sizes, wide = [], []
-    for name, value in one.size.items():
-        short = name.split(".")[1]
-        unit = "" if one.units.get(name, "1") == "1" else f" {one.units[name]}"
-        sizes.append(f"{short} {value:.3g}{unit}")
-        whose = f"{short} " if len(one.size) > 1 else ""
-        wide.append(f"{whose}{one.ci90[name][0]:.3g} .. {one.ci90[name][1]:.3g}{unit}")
-    remarks = [_RIVALS[one.effect]] if one.effect in _RIVALS else []
-    remarks += [] if one.fitted else ["not fitted: it promised too little"]
-    remarks += [] if one.moved else ["never left its start"]
-    remarks += [f"{name.split('.', 1)[1]} on a bound" for name in one.on_bound]
-    rmse = "" if one.rmse_m is None else f"{1e3 * one.rmse_m:.1f}"
-    where = element_words(one.element) or (f"channel {one.channel}" if one.channel else "")
-    gain = (
-        "-"
-        if not one.fitted
-        else f"{one.elpd_gain:.1f}" + ("" if one.elpd_gain_sd is None else f" +- {one.elpd_gain_sd:.1f}")
-    )
-    whole = f"{one.marginal_nats:.1f}" if one.fitted and one.size and one.marginal_nats is not None else ""
-    if one.effect in _RIVALS:
-        whole, gain = (f"{one.elpd_gain:.1f}" if one.elpd_gain > NOWHERE else "-"), ""
-    return [one.effect, where, whole, gain, f"{one.probability:.2f}", "; ".join(sizes), "; ".join(wide),
-            rmse, "; ".join(remarks)]  # fmt: skip
 
 
 def _shrinkage(report: DiagnoseReport) -> PageTable:
@@ -199,7 +143,7 @@ def _next(one: NextGaitFound, where: str) -> str:
     return f"{one.name}: would separate the likeliest candidates by {one.nats:.1f} nats{enough}{beside}{how}"
 
 
-def _how(report: DiagnoseReport) -> Iterator[list[str]]:
+def _how(report: DiagnoseReport, *, brief: bool) -> Iterator[list[str]]:
     upper = "" if report.refit_upper_m is None else f", upper 90 % bound {1e3 * report.refit_upper_m:.1f} mm"
     floor = "" if report.refit_floor_m is None else f"; floor {1e3 * report.refit_floor_m:.1f} mm"
     part = "" if report.refit_kept == 1.0 else f", all of the best {100 * report.refit_kept:.0f} % of the intervals"
@@ -214,7 +158,9 @@ def _how(report: DiagnoseReport) -> Iterator[list[str]]:
         f"the best of the catalogue gains {report.chance_nats:.1f} nats left out by chance in one case of 20",
     ]
     yield ["probabilities", report.calibrated]
-    for name, (value, sd) in report.refit.items():
+    if brief and report.refit:
+        yield ["refit", f"{len(report.refit)} numbers: on the page and with --json"]
+    for name, (value, sd) in () if brief else report.refit.items():
         yield [f"refit: {name}", _number(value, sd, report.refit_units.get(name, ""))]
     took = f", {report.wall_s:.1f} s" if report.wall_s else ""
     yield ["work", f"{report.rollouts} simulated stretches{took}"

@@ -57,7 +57,7 @@ def test_tables_hold_the_share_beside_its_prediction_and_its_doubts() -> None:
     """Both shares, the size with its unit and interval, the bound it ended on, and who cannot be told apart."""
     text = "\n".join(" | ".join(row) for table in diagnose_tables(report()) for row in table.rows)
     assert "70 % (40 .. 90)" in text and "65 %" in text
-    assert "mass_kg 0.04 kg | 0.03 .. 0.05" in text
+    assert "mass_kg 0.04 (0.03 .. 0.05) kg" in text
     assert "place_m.1 on a bound" in text
     assert "payload | com_offset | 2.1 | cannot be told apart" in text
 
@@ -71,7 +71,9 @@ def test_rivals_and_numbers_say_what_they_are() -> None:
         "refit_units": units,
     })  # fmt: skip
     text = "\n".join(" | ".join(row) for table in diagnose_tables(made) for row in table.rows)
-    assert "31.0 +- 4.0" in text and "none |  | 0.0 |  | 0.10" in text and "counts as much in every diagnosis" in text
+    assert (
+        "31.0 +- 4.0" in text and "none |  | 0.0 |  |  | 0.10" in text and "counts as much in every diagnosis" in text
+    )
     assert "refit: friction | +10.5 % +- 2.2 % of the identified value" in text
     assert "refit: motor_lag.tau_s | +0.03 +- 0.004 s" in text
 
@@ -92,7 +94,25 @@ def test_what_was_not_fitted_has_no_gain() -> None:
     rows = {row[0]: row for row in table.rows}
     assert rows["dropout"][3] == "-" and "not fitted" in rows["dropout"][-1]
     assert rows["payload"][3].startswith("31.0") and rows["payload"][2] == "52.0" and rows["dropout"][2] == ""
-    assert rows["payload"][6] == "mass_kg 0.03 .. 0.05 kg; place_m 0.05 .. 0.15 m"
+    assert rows["payload"][6] == "mass_kg 0.04 (0.03 .. 0.05) kg; place_m 0.1 (0.05 .. 0.15) m"
+
+
+def test_a_terminal_is_told_what_something_is_said_of() -> None:
+    """Effects that were not fitted, are not in the 90 % set and that no log speaks for stand in one row, as do the
+    refitted numbers; the page has all of them."""
+    first, none = report().ranking
+    others = tuple(
+        none.model_copy(update={"effect": name, "fitted": False, "probability": p, "parity_nats": nats})
+        for name, p, nats in (("com_offset", 0.02, 0.0), ("backlash", 0.03, 0.2), ("dropout", 0.01, 9.0),
+                              ("motor_lag", 0.01, 0.0))
+    )  # fmt: skip
+    made = report().model_copy(update={"ranking": (first, none, *others)})
+    brief, whole = (list(diagnose_tables(made, brief=short)) for short in (True, False))
+    names = [row[0] for row in brief[0].rows]
+    assert names == ["payload", "none", "com_offset", "dropout", "2 others"] and brief[0].rows[-1][5] == "<= 0.03 each"
+    assert [row[0] for row in whole[0].rows] == ["payload", "none", "com_offset", "backlash", "dropout", "motor_lag"]
+    assert not any(row[0] == "refit: friction" for row in brief[-1].rows)
+    assert any(row[0] == "refit: friction" for row in whole[-1].rows)
 
 
 def test_two_effects_at_once_say_what_the_second_one_adds() -> None:

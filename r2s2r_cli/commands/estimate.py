@@ -95,7 +95,8 @@ def estimate(
         from r2s2r_cli.store.read import read_artifact
 
         _, recording = read_artifact(source, "recording")
-        hints = hints_of(here.relative(source), source, header.provenance)
+        rig = any(recording.groups[f"runs/{name}"].attributes["origin"] == "rig" for name in recording.runs())
+        hints = hints_of(here.relative(source), source, header.provenance, rig=rig)
         with PictureFile(source) as file, console.parts() as show, hints:
             return compute_states(
                 recording, here.robot(), here.config(place, overrides).estimate, show=show,

@@ -10,23 +10,25 @@ from r2s2r_cli.errors import R2S2RError
 from schemas.header import Provenance
 
 _CAMERA = "--camera realsense"
+_RIG = "--camera rig://127.0.0.1:9000   # as `r2s2r rig --camera-port 9000` prints it"
 
 
 @contextmanager
-def hints_of(source: str, path: Path, made: Provenance) -> Iterator[None]:
-    """An error on the way leaves with a hint that can be pasted in the project. source: the recording in words."""
+def hints_of(source: str, path: Path, made: Provenance, *, rig: bool = False) -> Iterator[None]:
+    """An error on the way leaves with a hint that can be pasted in the project. source: the recording in words. rig: it
+    is of a rig, whose camera is its own."""
     from r2s2r_cli.stages.estimate.unseen import Unseen
 
     try:
         yield
     except R2S2RError as error:
         if isinstance(error, Unseen):
-            error.hint = seen_again(made, path) or error.hint
+            error.hint = seen_again(made, path, rig=rig) or error.hint
         error.hint = error.hint.replace("10-record.h5", source)
         raise
 
 
-def seen_again(made: Provenance, path: Path) -> str:
+def seen_again(made: Provenance, path: Path, *, rig: bool = False) -> str:
     """The command that made the recording, so that pictures come with it; nothing where no stage made it.
 
     `execute` asks before the robot moves; `record` does not, and no robot moves because a hint was pasted.
@@ -38,5 +40,10 @@ def seen_again(made: Provenance, path: Path) -> str:
     again = command_again(made, path, force=True)
     if made.stage == "import":
         return again + "   # with end caps, or with color/ and depth/ in the folder"
-    again += "" if "--camera" in again.split() else f" {_CAMERA}"
-    return again if made.stage == "execute" else again + " --dry-run   # moves nothing; without it the robot does"
+    if made.stage == "record":
+        again += " --dry-run"
+    if "--camera" not in again.split():
+        again += f" {_RIG if rig else _CAMERA}"
+    if made.stage == "execute":
+        return again
+    return again + f"{';' if '#' in again else '   #'} --dry-run moves nothing; without it the robot does"

@@ -49,7 +49,7 @@ def write_folder(case: Case, folder: Path) -> None:
         ("execute", {"port": "udp://h:1", "camera": "open3d"},
          "r2s2r execute --port udp://h:1 --camera open3d --iteration 2 --force"),
         ("record", {"random": 15, "port": "udp://h:1"},
-         "r2s2r record --random 15 --port udp://h:1 --iteration 2 --force --camera realsense --dry-run   # "),
+         "r2s2r record --random 15 --port udp://h:1 --iteration 2 --force --dry-run --camera realsense   # "),
         ("bench", {}, "r2s2r import crawl.csv"),
     ],
 )  # fmt: skip
@@ -62,6 +62,12 @@ def test_runs_that_nobody_saw_have_their_own_command_as_the_hint(
     with pytest.raises(Unseen) as caught, hints_of("50-execute.h5", path, made):
         raise Unseen("nothing", hint="r2s2r import crawl.csv")
     assert caught.value.hint.startswith(expected)
+    with pytest.raises(Unseen) as of_rig, hints_of("50-execute.h5", path, made, rig=True):
+        raise Unseen("nothing", hint="r2s2r import crawl.csv")
+    asked = of_rig.value.hint.partition("#")[0].split()
+    assert asked == [
+        word if word != "realsense" else "rig://127.0.0.1:9000" for word in caught.value.hint.partition("#")[0].split()
+    ]
     with pytest.raises(InputError, match="few") as other, hints_of("50-execute.h5", path, made):
         raise InputError("few", hint="r2s2r inspect 10-record.h5")
     assert other.value.hint == "r2s2r inspect 50-execute.h5"

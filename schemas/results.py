@@ -55,7 +55,7 @@ class ArtifactState(Frozen):
     stage: str
     iteration: int | None
     artifact: str
-    state: Literal["fresh", "stale", "damaged", "unsealed", "recording"]
+    state: Literal["fresh", "stale", "damaged", "unsealed", "recording", "interrupted", "running"]
     reasons: tuple[str, ...]
     overrides: dict[str, Any] = Field(default_factory=dict)
     """Settings that came from `--set` when it was made: the same command without them makes it again."""

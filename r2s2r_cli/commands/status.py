@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from r2s2r_cli.commands.mend import Mending, mending, sighted
+from r2s2r_cli.commands.unfinished import UNDER_WAY, checkpoints, interrupted, unsealed
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError, GateError
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from r2s2r_cli.store.brief import brief
 from r2s2r_cli.store.header import read_header, sealed_header, whole_header
 from r2s2r_cli.store.lock import writer
-from r2s2r_cli.store.project import Iteration, Project, journal_of
+from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import Header
 from schemas.results import ArtifactState, StatusResult
 
@@ -58,7 +59,7 @@ def status(
             console.table(shown.title, shown.columns, shown.rows)
     if result.next:
         console.hint(result.next)
-    unfit = [a for a in result.artifacts if a.state != "fresh"]
+    unfit = [a for a in result.artifacts if a.state not in ("fresh", *UNDER_WAY)]
     if check and unfit:
         raise GateError(
             f"{len(unfit)} of {len(result.artifacts)} artifacts are not fresh",
@@ -85,10 +86,13 @@ def survey(project: Project, *, thorough: bool = False) -> StatusResult:
         states.append(state)
         again += [mend.command] if mend.command else []
         runs += [mend.runs] if mend.runs else []
-    busy = writer(project.root) if journals else None
-    states += [_unsealed(project, iterations.get(path.parent), path, busy) for path in journals]
+    kept = checkpoints(project)
+    busy = writer(project.root) if journals or kept else None
+    states += [unsealed(project, iterations.get(path.parent), path, busy) for path in journals]
+    states += [interrupted(project, one, busy) for one in kept]
     if busy is None:
         again = [f"r2s2r recover {shlex.quote(project.relative(path))}" for path in journals] + again
+        again += [one.command for one in kept]
     return StatusResult(
         project=project.file.name,
         robot=project.robot().name,
@@ -156,17 +160,6 @@ def _reasons(
 def _remarks(state: ArtifactState) -> str:
     made = [f"made with --set {key}={value}" for key, value in state.overrides.items()]
     return "; ".join([*brief(state.reasons), *made])
-
-
-def _unsealed(project: Project, iteration: Iteration | None, path: Path, busy: str | None) -> ArtifactState:
-    """A journal: of a recording that runs, or of one that was cut off. busy: who writes in the project now."""
-    executed = iteration is not None and path == journal_of(iteration.artifact("recording", executed=True))
-    why = "the recording was cut off before it was sealed" if busy is None else f"{busy} is writing it"
-    return ArtifactState(
-        stage="execute" if executed else "record", iteration=iteration.number if iteration else None,
-        artifact=project.relative(path), state="unsealed" if busy is None else "recording", reasons=(why,),
-        bytes=path.stat().st_size, content_sha256=None,
-    )  # fmt: skip
 
 
 def _forward(project: Project) -> str:

@@ -1,0 +1,56 @@
+"""What was begun and is no artifact yet, as `status` says it: journals of recordings, checkpoints of computations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from r2s2r_cli.store.checkpoint import checkpoint_of
+from r2s2r_cli.store.project import Iteration, Project, journal_of
+from schemas.results import ArtifactState
+
+RESUMED = {"identification": "identify", "plan": "plan", "diagnosis": "diagnose"}
+"""Stages that go on from a checkpoint, by what they make."""
+UNDER_WAY = ("interrupted", "running")
+"""States of computations: no artifact is wrong or missing because of them."""
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A checkpoint."""
+
+    path: Path
+    stage: str
+    iteration: int
+
+    @property
+    def command(self) -> str:
+        """What goes on from it, but for the options that were typed then."""
+        return f"r2s2r {self.stage} --iteration {self.iteration} --resume"
+
+
+def checkpoints(project: Project) -> list[Kept]:
+    """Of every iteration."""
+    places = [(one, checkpoint_of(one.artifact(kind)), stage) for one in project.iterations()
+              for kind, stage in RESUMED.items()]  # fmt: skip
+    return [Kept(path, stage, one.number) for one, path, stage in places if path.exists()]
+
+
+def interrupted(project: Project, one: Kept, busy: str | None) -> ArtifactState:
+    """A checkpoint. busy: who writes in the project now."""
+    why = f"{busy} is at work" if busy else "what was worked out so far is kept: --resume, with the options of then"
+    return ArtifactState(
+        stage=one.stage, iteration=one.iteration, artifact=project.relative(one.path),
+        state="running" if busy else "interrupted", reasons=(why,), bytes=one.path.stat().st_size, content_sha256=None,
+    )  # fmt: skip
+
+
+def unsealed(project: Project, iteration: Iteration | None, path: Path, busy: str | None) -> ArtifactState:
+    """A journal: of a recording that runs, or of one that was cut off. busy: who writes in the project now."""
+    executed = iteration is not None and path == journal_of(iteration.artifact("recording", executed=True))
+    why = "the recording was cut off before it was sealed" if busy is None else f"{busy} is writing it"
+    return ArtifactState(
+        stage="execute" if executed else "record", iteration=iteration.number if iteration else None,
+        artifact=project.relative(path), state="unsealed" if busy is None else "recording", reasons=(why,),
+        bytes=path.stat().st_size, content_sha256=None,
+    )  # fmt: skip

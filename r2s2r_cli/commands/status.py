@@ -78,21 +78,23 @@ def survey(project: Project, *, thorough: bool = False) -> StatusResult:
     iterations = {iteration.path: iteration for iteration in project.iterations()}
     journals = project.journals()
     states: list[ArtifactState] = []
+    kept = checkpoints(project)
     again: list[str] = []
     runs: list[str] = []
     stale: set[str] = set()
     for path in project.artifacts():
         state, mend = _state(project, iterations.get(path.parent), path, stale, thorough)
         states.append(state)
-        again += [mend.command] if mend.command else []
+        going_on = kept.get((state.stage, state.iteration))
+        if mend.command:  # made anew, what is kept would be lost
+            again.append(mend.command if going_on is None else going_on.command)
         runs += [mend.runs] if mend.runs else []
-    kept = checkpoints(project)
     busy = writer(project.root) if journals or kept else None
     states += [unsealed(project, iterations.get(path.parent), path, busy) for path in journals]
-    states += [interrupted(project, one, busy) for one in kept]
+    states += [interrupted(project, one, busy) for one in kept.values()]
     if busy is None:
         again = [f"r2s2r recover {shlex.quote(project.relative(path))}" for path in journals] + again
-        again += [one.command for one in kept]
+        again += [one.command for one in kept.values()]
     return StatusResult(
         project=project.file.name,
         robot=project.robot().name,

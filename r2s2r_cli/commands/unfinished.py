@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-from r2s2r_cli.store.checkpoint import checkpoint_of
+from r2s2r_cli.store.checkpoint import checkpoint_of, command_of
 from r2s2r_cli.store.project import Iteration, Project, journal_of
 from schemas.results import ArtifactState
 
@@ -25,23 +26,26 @@ class Kept:
 
     @property
     def command(self) -> str:
-        """What goes on from it, but for the options that were typed then."""
-        return f"r2s2r {self.stage} --iteration {self.iteration} --resume"
+        """What goes on from it: as it was typed, or, of an older r2s2r, without its options."""
+        typed = command_of(self.path) or (self.stage, "--iteration", str(self.iteration))
+        return shlex.join(["r2s2r", *typed, "--resume"])
 
 
-def checkpoints(project: Project) -> list[Kept]:
-    """Of every iteration."""
+def checkpoints(project: Project) -> dict[tuple[str, int | None], Kept]:
+    """Of every iteration, by stage and its number."""
     places = [(one, checkpoint_of(one.artifact(kind)), stage) for one in project.iterations()
               for kind, stage in RESUMED.items()]  # fmt: skip
-    return [Kept(path, stage, one.number) for one, path, stage in places if path.exists()]
+    return {(stage, one.number): Kept(path, stage, one.number) for one, path, stage in places if path.exists()}
 
 
 def interrupted(project: Project, one: Kept, busy: str | None) -> ArtifactState:
     """A checkpoint. busy: who writes in the project now."""
-    why = f"{busy} is at work" if busy else "what was worked out so far is kept: --resume, with the options of then"
+    running = busy is not None and f"'r2s2r {one.stage}'" in busy
+    why = f"{busy} is at work" if running else f"what was worked out so far is kept: {one.command}"
     return ArtifactState(
         stage=one.stage, iteration=one.iteration, artifact=project.relative(one.path),
-        state="running" if busy else "interrupted", reasons=(why,), bytes=one.path.stat().st_size, content_sha256=None,
+        state="running" if running else "interrupted", reasons=(why,), bytes=one.path.stat().st_size,
+        content_sha256=None,
     )  # fmt: skip
 
 

@@ -55,7 +55,10 @@ class CheckpointFile:
 
     def save(self, values: Mapping[str, Any]) -> None:
         """Replace what was saved, whole or not at all; floats come back bit by bit. Raises ArtifactError."""
-        write_text(self.path, json.dumps({"form": _FORM, "key": self.key, "values": dict(values)}))
+        write_text(
+            self.path,
+            json.dumps({"form": _FORM, "key": self.key, "command": list(self.command), "values": dict(values)}),
+        )
 
     def clear(self) -> None:
         """Remove it: the artifact stands."""
@@ -65,6 +68,16 @@ class CheckpointFile:
 def begin_anew(command: Sequence[str]) -> str:
     """The hint where a checkpoint is of no use: the command line that takes none up."""
     return shlex.join(["r2s2r", *(word for word in command if word != "--resume")])
+
+
+def command_of(checkpoint: Path) -> tuple[str, ...] | None:
+    """The words that were typed after `r2s2r` for the work that lies there, of either kind of checkpoint; None where it
+    does not say."""
+    try:
+        with checkpoint.open("rb") as file:
+            return tuple(str(word) for word in json.loads(file.readline())["command"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 def checkpoint_of(artifact: Path) -> Path:

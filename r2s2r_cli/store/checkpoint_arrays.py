@@ -85,7 +85,8 @@ class ArrayCheckpoint:
         try:
             with self.path.open("ab" if self._mine else "wb") as file:
                 if not self._mine:
-                    file.write(json.dumps({"form": _FORM, "key": self.key}).encode() + b"\n")
+                    head = {"form": _FORM, "key": self.key, "command": list(self.command)}
+                    file.write(json.dumps(head).encode() + b"\n")
                 file.write(record)
         except OSError as error:
             raise disk_error(error, self.path) from error

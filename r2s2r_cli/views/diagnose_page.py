@@ -159,7 +159,7 @@ def _how(report: DiagnoseReport, *, brief: bool) -> Iterator[list[str]]:
     ]
     yield ["probabilities", report.calibrated]
     if brief and report.refit:
-        yield ["refit", f"{len(report.refit)} numbers: on the page and with --json"]
+        yield ["refit", f"{len(report.refit)} numbers: all with --json"]
     for name, (value, sd) in () if brief else report.refit.items():
         yield [f"refit: {name}", _number(value, sd, report.refit_units.get(name, ""))]
     took = f", {report.wall_s:.1f} s" if report.wall_s else ""

@@ -15,6 +15,9 @@ _RIVALS = {
     "none": "the refit nominal model; counts as much in every diagnosis",
     "unknown": "a cause that the catalogue lacks; gain: of errors larger than the floor",
 }
+SPOKEN = 4.0
+"""[nats] From which on the parity stage says something of an effect: so much it says for the best of a whole catalogue
+where nothing is wrong (`calibration.json`, by_chance)."""
 COLUMNS = (
     "name", "where", "all data: gain [nats]", "left out: gain +- sd [nats]", "parity [nats]", "probability",
     "size (90 % interval)", "left-out error [mm]", "remarks",
@@ -29,7 +32,7 @@ def ranking_table(report: DiagnoseReport, *, brief: bool = False) -> PageTable:
     others = [one for one in report.ranking if one not in shown]
     if others:
         most = max(one.probability for one in others)
-        told = "not fitted: they promised too little; on the page and with --json"
+        told = "not fitted: they promised too little; all with --json"
         rows.append([f"{len(others)} others", "", "", "-", "", f"<= {most:.2f} each", "", "", told])
     return PageTable("what explains the gap", list(COLUMNS), rows)
 
@@ -46,7 +49,7 @@ def element_words(element: ElementFound | None) -> str:
 
 
 def _said(one: RankedName, report: DiagnoseReport) -> bool:
-    return one.fitted or one.effect in (*_RIVALS, *report.set90, *report.effects) or one.parity_nats >= 1.0
+    return one.fitted or one.effect in (*_RIVALS, *report.set90, *report.effects) or one.parity_nats >= SPOKEN
 
 
 def _ranked(one: RankedName) -> list[str]:

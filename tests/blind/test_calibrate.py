@@ -124,7 +124,13 @@ def test_a_verdict_becomes_a_case() -> None:
 
 @pytest.mark.parametrize(
     ("marginal", "left_out", "parity", "unexplained"),
-    [(75.0, 31.0, 9.0, 0.0), (-3.0, 1.0, 3.0, 20.0), (900.0, -80.0, 99.0, -4.0)],
+    [
+        (75.0, 31.0, 9.0, 0.0),
+        (-3.0, 1.0, 3.0, 20.0),
+        (900.0, -80.0, 99.0, -4.0),
+        (900.0, -80.0, 4.0, 0.0),
+        (9.0, 0.0, 4.1, 0.0),
+    ],
 )
 def test_what_is_learned_from_is_what_counts(
     marginal: float, left_out: float, parity: float, unexplained: float
@@ -144,6 +150,8 @@ def test_what_is_learned_from_is_what_counts(
     by = known(calibrated(sets, words="test"))
     told = by.probabilities({name: by.score(name, m, left_out=left_out, parity=p) for name, (m, p) in rows.items()})
     assert own.probabilities(one) == pytest.approx(by.with_unknown(told, unexplained, 2.0), rel=1e-9)
+    for name, nats in (("payload", parity), ("dropout", parity)):
+        assert one.may_name(name) == by.witnessed(left_out, nats)
 
 
 def test_too_few_sets_teach_nothing() -> None:

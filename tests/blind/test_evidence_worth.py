@@ -81,7 +81,10 @@ def test_each_kind_is_left_out_and_nothing_else() -> None:
     other = np.array([0.0, 1.0, 2.0, 3.0, 0.0])
     left_out = KINDS["all data together (left-out gaits instead)"]
     assert left_out(replace(one, left_out=other)).gain.tolist() == other.tolist()
-    assert KINDS["left-out gaits (all data together instead)"](replace(one, left_out=other)).gain is one.said
+    assert (
+        KINDS["left-out gaits, and the witness (all data together instead)"](replace(one, left_out=other)).gain
+        is one.said
+    )
     assert left_out(one) is one
     alone = KINDS["the replay (parity alone)"](one)
     assert not alone.said.any() and alone.strange == alone.left_sd == 0.0 and alone.parity is one.parity

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from r2s2r_cli.commands.status import survey
+from r2s2r_cli.commands.unfinished import Kept
 from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_of
+from r2s2r_cli.store.checkpoint_arrays import ArrayCheckpoint
 from r2s2r_cli.store.lock import writing
 from r2s2r_cli.store.project import Project
 from tests.commands.conftest import invoke
@@ -19,21 +22,38 @@ def bot(project: Path) -> Project:
     found = Project.find(project)
     place = found.iteration(1, create=True)
     place.path.mkdir(parents=True)
-    CheckpointFile(checkpoint_of(place.artifact("diagnosis")), "0" * 64).save({"cost": 1.0})
+    typed = ("diagnose", "--iteration", "1", "--healthy", "a b")
+    CheckpointFile(checkpoint_of(place.artifact("diagnosis")), "0" * 64, command=typed).save({"cost": 1.0})
     return found
 
 
 def test_what_was_interrupted_is_said_with_the_command_that_goes_on(bot: Project) -> None:
-    """It makes nothing stale: a check passes."""
+    """With the options of then. It makes nothing stale: a check passes."""
     found = survey(bot)
     assert [(one.stage, one.iteration, one.state) for one in found.artifacts] == [("diagnose", 1, "interrupted")]
-    assert found.next == "r2s2r diagnose --iteration 1 --resume" and "--resume" in found.artifacts[0].reasons[0]
+    assert found.next == "r2s2r diagnose --iteration 1 --healthy 'a b' --resume"
+    assert found.next in found.artifacts[0].reasons[0]
     assert invoke("status", "--check").exit_code == 0
 
 
 def test_what_runs_is_no_wreck(bot: Project) -> None:
-    """Nothing is hinted to be gone on with from under its writer."""
-    with writing(bot.root, "diagnose"):
-        found = survey(bot)
-    assert [one.state for one in found.artifacts] == ["running"] and "r2s2r diagnose" in found.artifacts[0].reasons[0]
-    assert "--resume" not in found.next
+    """Nothing is hinted to be gone on with from under its writer; beside another command it is interrupted still, and
+    has to wait."""
+    for command, state in (("diagnose", "running"), ("record", "interrupted")):
+        with writing(bot.root, command):
+            found = survey(bot)
+        assert [one.state for one in found.artifacts] == [state]
+        assert ("is at work" in found.artifacts[0].reasons[0]) == (state == "running")
+        assert "--resume" not in found.next
+
+
+def test_arrays_and_values_say_how_to_go_on(tmp_path: Path) -> None:
+    """Both kinds of checkpoints; those of an older r2s2r name stage and iteration alone, and what is none says
+    nothing."""
+    path = tmp_path / "40-plan.partial"
+    ArrayCheckpoint(path, "0" * 64, command=("plan", "--to", "1,2,0")).keep(b"0" * 32, [np.zeros(3)])
+    assert Kept(path, "plan", 2).command == "r2s2r plan --to 1,2,0 --resume"
+    path.write_text('{"form": 1, "key": "0", "values": {}}')
+    assert Kept(path, "plan", 2).command == "r2s2r plan --iteration 2 --resume"
+    path.write_bytes(bytes(range(256)))
+    assert Kept(path, "plan", 2).command == "r2s2r plan --iteration 2 --resume"

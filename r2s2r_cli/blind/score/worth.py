@@ -101,7 +101,7 @@ KINDS: dict[str, Without] = {
     "nothing": lambda one: one,
     "the parity stage": lambda one: replace(one, parity=np.zeros_like(one.parity)),
     "the replay (parity alone)": _parity_alone,
-    "left-out gaits (all data together instead)": _all_data_alone,
+    "left-out gaits, and the witness (all data together instead)": _all_data_alone,
     "all data together (left-out gaits instead)": _left_out_alone,
     "what a wider floor explains": lambda one: replace(one, strange=0.0),
     "what is left beyond healthy runs": lambda one: replace(one, left_sd=0.0),

@@ -28,7 +28,8 @@ def healthy_floor(healthy: Healthy) -> FloorGiven:
     squared = healthy.score.squared
     squared = squared[np.isfinite(squared)]
     rmse, usual = (float(np.sqrt(np.mean(squared[counting(squared, part)]))) for part in (KEPT, USUAL))
-    return FloorGiven(rmse, min(sensor, rmse), "the healthy runs, refitted", True, KEPT, (usual, USUAL))
+    words = f"the healthy runs, refitted, the best {100 * KEPT:.0f} % of their intervals"
+    return FloorGiven(rmse, min(sensor, rmse), words, True, KEPT, (usual, USUAL))
 
 
 def floor_for(evidence: Evidence) -> tuple[FloorGiven, list[str]]:

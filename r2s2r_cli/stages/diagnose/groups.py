@@ -45,7 +45,7 @@ def _ranking(found: Diagnosis) -> Group:
     return Group({
         "name": _texts([one.effect for one in rows]),
         "elpd_gain": np.nan_to_num(np.array([one.gain for one in rows]), neginf=-1e9),
-        "marginal": np.array([one.marginal if one.fitted and one.size else np.nan for one in rows], dtype=float),
+        "marginal": _finite([one.marginal if one.fitted and one.size else np.nan for one in rows]),
         "parity": np.array([one.parity for one in rows], dtype=float),
         "probability": np.array([one.probability for one in rows]),
         "rmse": np.array([np.nan if one.rmse is None else one.rmse for one in rows], dtype=float),

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run, require_enough
-from r2s2r_cli.stages.diagnose.floors import floor_for
+from r2s2r_cli.stages.diagnose.floors import KEPT, USUAL, floor_for, healthy_floor
 from r2s2r_cli.stages.estimate.smooth import MISSING
 from r2s2r_cli.stages.identified import nominal
 from r2s2r_cli.stages.identify.data import RunData, Selection
@@ -95,6 +96,21 @@ def test_without_a_floor_it_is_estimated_and_said() -> None:
     assert said == ["no floor was given: taken from the noise of the caps and 3 mm for the numerics of engines, 3.5 mm"]
     given = FloorGiven(0.008, 0.002, "floor.h5")
     assert floor_for(replace(one, floor=given)) == (given, [])
+    assert given.equivalence == (0.008, 1.0)  # of all intervals, against it
+
+
+def test_one_fall_of_a_healthy_robot_does_not_decide_what_no_gap_is() -> None:
+    """Of eleven intervals with 10 mm two that end 80 and 90 mm off: the floor of nine tenths has one of them, that of three
+    quarters, which the equivalence test looks at, none."""
+    squared = np.full(11, 1e-4)
+    squared[[3, 7]] = 64e-4, 81e-4
+    caps = SimpleNamespace(noise=np.full((1, 6, 3), 2e-3))
+    healthy = SimpleNamespace(arena=SimpleNamespace(whole=(caps,)), score=SimpleNamespace(squared=squared))
+    floor = healthy_floor(healthy)  # type: ignore[arg-type]
+    assert floor.equivalence == (pytest.approx(0.010), USUAL) and floor.kept == KEPT
+    assert floor.rmse == pytest.approx(np.sqrt((9 * 1e-4 + 64e-4) / 10)) and floor.sensor == pytest.approx(
+        np.sqrt(12e-6)
+    )
 
 
 def test_shuffled_commands_belong_to_other_intervals() -> None:

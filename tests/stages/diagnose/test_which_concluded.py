@@ -73,7 +73,7 @@ def test_what_left_out_gaits_speak_against_is_first_and_no_verdict() -> None:
     found = said(BY, left_out=-20.0)
     assert (found.verdict, found.ranking[0].effect) == ("ambiguous", "payload") and found.probability > BY.commit
     assert any("nothing else speaks for it" in text for text in found.warnings)
-    assert said(BY, left_out=-20.0, of_payload=1.0).effects == ("payload",)
+    assert said(BY, left_out=-20.0, of_payload=BY.by_chance + 1.0).effects == ("payload",)
 
 
 def test_without_healthy_runs_the_lesser_gain_counts() -> None:

@@ -11,6 +11,7 @@ from r2s2r_cli.blind.score import facts
 from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration, calibration
 from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
+from r2s2r_cli.stages.diagnose.which.doubts import unwitnessed
 from r2s2r_cli.stages.diagnose.which.found import Ranked
 from r2s2r_cli.stages.diagnose.which.left import Left
 from r2s2r_cli.stages.diagnose.which.pair_share import LEAST, SHARE, TwoCauses, with_pairs
@@ -45,6 +46,10 @@ def test_a_name_needs_a_witness() -> None:
     assert verdict_of([alone, other], by, None, GAP) == ("ambiguous", (), 0.9)
     assert verdict_of([alone, other], by, ("payload", "backlash"), GAP) == ("ambiguous", (), 0.9)
     assert verdict_of([alone, other], by, None, NO_GAP) == ("no_gap", (), 0.95)
+    shared = [replace(alone, probability=0.45), replace(other, probability=0.4), Ranked("none", 0.0, 0.15)]
+    for pair, count in ((("payload", "backlash"), 1), (None, 0)):
+        assert verdict_of(shared, by, pair, GAP) == ("ambiguous", (), 0.45)
+        assert len(unwitnessed(shared, by, pair)) == count
     for seen in (replace(alone, gain=0.1), replace(alone, parity=4.1)):
         assert verdict_of([seen, other], by, None, GAP) == ("effect", ("payload",), 0.9)
 

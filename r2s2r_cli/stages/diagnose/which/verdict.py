@@ -11,6 +11,7 @@ from r2s2r_cli.stages.diagnose.parity.finding import Element
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.confusable import confusable
+from r2s2r_cli.stages.diagnose.which.doubts import of_first, unwitnessed, warnings_of
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked, Screened, Shift, Which
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.material import Material
@@ -30,7 +31,8 @@ SHIFTED = 1.0
 
 def concluded(m: Material) -> Which:
     """The verdict."""
-    gains = dict(enumerate((gains_of(m.refit, m.scores) - m.chronic).tolist()))
+    known = np.nan_to_num(gains_of(m.refit, m.scores) - m.chronic, nan=-np.inf)  # all break off at the same piece
+    gains = dict(enumerate(known.tolist()))
     calibration = m.calibration
     order = sorted(gains, key=lambda i: -float(m.marginal[i]))
     singles = [i for i in order if len(m.fits[i].hypothesis.parts) == 1]
@@ -78,7 +80,7 @@ def concluded(m: Material) -> Which:
         confusable=confusable(m, [i for i in best.values() if m.fits[i].moved][:ALIKE]),
         not_testable=_not_testable(m.responses), shifts=() if top is None else _shifts(m, m.fits[top]),
         within=_left_out(m), calibrated=calibration.words,
-        warnings=(*_unwitnessed(ranking[0], calibration), *_warnings(m, [best[name] for name in names])),
+        warnings=(*unwitnessed(ranking, calibration, pair), *warnings_of(m, [best[name] for name in names])),
         pairs=tuple(both),
     )  # fmt: skip
 
@@ -124,15 +126,15 @@ def verdict_of(
 ) -> tuple[str, tuple[str, ...], float]:  # fmt: skip
     """What the first of the ranking is worth. Where the best effect leaves too much (left_sd, `Calibration.refuses`)
     that is a verdict of its own: no effect of the catalogue is enough. A name that nothing speaks for but what it was
-    fitted to is none (`Calibration.witnessed`). Where no cause is named, that there is no gap is a claim about its size
+    fitted to is none (`Calibration.witnessed`), alone or first of a pair: what both gain is no witness of either.
+    Where no cause is named, that there is no gap is a claim about its size
     (design.md, Measures), not about causes that hide below the floor."""
     first = ranking[0]
     named = first.effect not in (NONE, UNKNOWN) and calibration.witnessed(first.gain, first.parity)
     if first.effect == UNKNOWN and calibration.refuses(left_sd):
         return "unknown", (), first.probability
     if named and pair is not None and first.effect in pair:
-        # What speaks for both together is shared between their names.
-        p = sum(one.probability for one in ranking if one.effect in pair)
+        p = of_first(ranking, pair)
         if calibration.commits(p):
             return "pair", pair, p
     if named and calibration.commits(first.probability):
@@ -222,29 +224,3 @@ def _left_out(m: Material) -> str:
     return (
         f"leave one run out, {count} runs" if len(runs) > 1 else f"leave one interval out, {count} intervals of one run"
     )
-
-
-def _unwitnessed(first: Ranked, calibration: Calibration) -> tuple[str, ...]:
-    likely = first.effect not in (NONE, UNKNOWN) and calibration.commits(first.probability)
-    if not likely or calibration.witnessed(first.gain, first.parity):
-        return ()
-    text = (
-        f"{first.effect} explains what it was fitted to, but nothing else speaks for it: neither what was left out "
-        f"({first.gain:+.1f} nats) nor the parity stage; it may be one event, and is no verdict"
-    )
-    return (text,)
-
-
-def _warnings(m: Material, rows: list[int]) -> tuple[str, ...]:
-    said = []
-    for i in rows:
-        fit = m.fits[i]
-        if not fit.moved:
-            said.append(f"the fit of {fit.hypothesis.label} never left its start: its size says nothing")
-        if fit.on_bound:
-            said.append(f"{', '.join(fit.on_bound)} ended on a bound: another size, or another effect")
-    if m.wider > 1.0:
-        said.append(
-            f"what the best effect leaves is {m.wider:g} times the floor: scores count errors of that size as possible"
-        )
-    return tuple(said)

@@ -1,5 +1,5 @@
 """Stage 2 of a diagnosis: which effect. Refit nominal + effect against refit nominal: on all data together, which rank
-effects, and on gaits that were left out, which say what a claim is worth."""
+effects for the larger part, and on gaits that were left out, which doubt and say what a claim is worth."""
 
 from __future__ import annotations
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from r2s2r_cli.commands.mend import Mending
 from r2s2r_cli.commands.status import survey
 from r2s2r_cli.commands.unfinished import Kept
 from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_of
 from r2s2r_cli.store.checkpoint_arrays import ArrayCheckpoint
 from r2s2r_cli.store.lock import writing
 from r2s2r_cli.store.project import Project
+from schemas.results import ArtifactState
 from tests.commands.conftest import invoke
 
 
@@ -57,3 +60,20 @@ def test_arrays_and_values_say_how_to_go_on(tmp_path: Path) -> None:
     assert Kept(path, "plan", 2).command == "r2s2r plan --iteration 2 --resume"
     path.write_bytes(bytes(range(256)))
     assert Kept(path, "plan", 2).command == "r2s2r plan --iteration 2 --resume"
+
+
+def test_nothing_is_made_anew_over_what_is_kept(bot: Project, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a stale artifact has a checkpoint, going on is what mends it; other stages are mended before."""
+    place = bot.iteration(1)
+    states = [
+        (ArtifactState(stage=stage, iteration=1, artifact=name, state="stale", reasons=("old",), bytes=1,
+                       content_sha256=None), Mending(f"r2s2r {stage} --iteration 1"))
+        for stage, name in (("estimate", "20-estimate.h5"), ("diagnose", "70-diagnose.h5"))
+    ]  # fmt: skip
+    given = iter(states)
+    monkeypatch.setattr(Project, "artifacts", lambda _: [place.path / "20-estimate.h5", place.path / "70-diagnose.h5"])
+    monkeypatch.setattr(sys.modules[survey.__module__], "_state", lambda *_: next(given))
+    assert survey(bot).next == "r2s2r estimate --iteration 1"
+    given = iter(states[1:])
+    monkeypatch.setattr(Project, "artifacts", lambda _: [place.path / "70-diagnose.h5"])
+    assert survey(bot).next == "r2s2r diagnose --iteration 1 --healthy 'a b' --resume"

@@ -100,8 +100,8 @@ def test_without_a_floor_it_is_estimated_and_said() -> None:
 
 
 def test_one_fall_of_a_healthy_robot_does_not_decide_what_no_gap_is() -> None:
-    """Of eleven intervals with 10 mm two that end 80 and 90 mm off: the floor of nine tenths has one of them, that of three
-    quarters, which the equivalence test looks at, none."""
+    """Of eleven intervals with 10 mm two that end 80 and 90 mm off: the floor of nine tenths has one of them, that
+    of three quarters, which the equivalence test looks at, none."""
     squared = np.full(11, 1e-4)
     squared[[3, 7]] = 64e-4, 81e-4
     caps = SimpleNamespace(noise=np.full((1, 6, 3), 2e-3))

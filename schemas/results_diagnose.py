@@ -102,6 +102,9 @@ class ShrinkageFound(Frozen):
 
 INDISTINCT = 3.0
 """[nats] Two effects that runs tell apart by less than this cannot be told apart."""
+BY_CHANCE = 4.0
+"""[nats] That the parity stage says for the best of a whole catalogue where nothing is wrong: less than that says
+nothing, and weighed like more it outdoes gains that are real."""
 
 
 class NextGaitFound(Frozen):

@@ -10,7 +10,7 @@ from r2s2r_cli.errors import R2S2RError
 from schemas.header import Provenance
 
 _CAMERA = "--camera realsense"
-_RIG = "--camera rig://127.0.0.1:9000   # as `r2s2r rig --camera-port 9000` prints it"
+_RIG = "--camera rig://127.0.0.1:9000"
 
 
 @contextmanager
@@ -40,10 +40,11 @@ def seen_again(made: Provenance, path: Path, *, rig: bool = False) -> str:
     again = command_again(made, path, force=True)
     if made.stage == "import":
         return again + "   # with end caps, or with color/ and depth/ in the folder"
-    if made.stage == "record":
-        again += " --dry-run"
+    remarks = []
     if "--camera" not in again.split():
         again += f" {_RIG if rig else _CAMERA}"
-    if made.stage == "execute":
-        return again
-    return again + f"{';' if '#' in again else '   #'} --dry-run moves nothing; without it the robot does"
+        remarks += ["the camera as `r2s2r rig --camera-port 9000` prints it"] if rig else []
+    if made.stage == "record":
+        again += " --dry-run"
+        remarks.append("--dry-run moves nothing; without it the robot does")
+    return again + (f"   # {'; '.join(remarks)}" if remarks else "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from r2s2r_cli.store.checkpoint import checkpoint_of, command_of
@@ -24,7 +25,7 @@ class Kept:
     stage: str
     iteration: int
 
-    @property
+    @cached_property
     def command(self) -> str:
         """What goes on from it: as it was typed, or, of an older r2s2r, without its options."""
         typed = command_of(self.path) or (self.stage, "--iteration", str(self.iteration))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.views.page import PageTable
+from schemas.results_diagnose import BY_CHANCE
 
 if TYPE_CHECKING:
     from schemas.results_diagnose import DiagnoseReport, ElementFound, RankedName
@@ -15,9 +16,6 @@ _RIVALS = {
     "none": "the refit nominal model; counts as much in every diagnosis",
     "unknown": "a cause that the catalogue lacks; gain: of errors larger than the floor",
 }
-SPOKEN = 4.0
-"""[nats] From which on the parity stage says something of an effect: so much it says for the best of a whole catalogue
-where nothing is wrong (`calibration.json`, by_chance)."""
 COLUMNS = (
     "name", "where", "all data: gain [nats]", "left out: gain +- sd [nats]", "parity [nats]", "probability",
     "size (90 % interval)", "left-out error [mm]", "remarks",
@@ -49,7 +47,7 @@ def element_words(element: ElementFound | None) -> str:
 
 
 def _said(one: RankedName, report: DiagnoseReport) -> bool:
-    return one.fitted or one.effect in (*_RIVALS, *report.set90, *report.effects) or one.parity_nats >= SPOKEN
+    return one.fitted or one.effect in (*_RIVALS, *report.set90, *report.effects) or one.parity_nats >= BY_CHANCE
 
 
 def _ranked(one: RankedName) -> list[str]:

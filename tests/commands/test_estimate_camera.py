@@ -49,7 +49,7 @@ def write_folder(case: Case, folder: Path) -> None:
         ("execute", {"port": "udp://h:1", "camera": "open3d"},
          "r2s2r execute --port udp://h:1 --camera open3d --iteration 2 --force"),
         ("record", {"random": 15, "port": "udp://h:1"},
-         "r2s2r record --random 15 --port udp://h:1 --iteration 2 --force --dry-run --camera realsense   # "),
+         "r2s2r record --random 15 --port udp://h:1 --iteration 2 --force --camera realsense --dry-run   # "),
         ("bench", {}, "r2s2r import crawl.csv"),
     ],
 )  # fmt: skip

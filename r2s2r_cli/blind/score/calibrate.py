@@ -22,9 +22,10 @@ from typing import Any
 
 import numpy as np
 
-from r2s2r_cli.blind.score.cases import BY_CHANCE, FEW, HELD, MOST, Case
+from r2s2r_cli.blind.score.cases import FEW, HELD, MOST, Case
 from r2s2r_cli.blind.score.facts import NONE, UNKNOWN
 from r2s2r_cli.errors import InputError
+from schemas.results_diagnose import BY_CHANCE
 
 LEAST_SETS = 12
 LEARNED = ("sharpness", "parity", "none")

@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 
 from r2s2r_cli.blind.score.facts import NO_REPLAY, NONE, UNKNOWN, Truth
+from schemas.results_diagnose import BY_CHANCE
 
-BY_CHANCE = 4.0
-"""[nats] That the parity stage says for the best of a whole catalogue where nothing is wrong: less than that says
-nothing, and weighed like more it outdoes gains that are real."""
 MOST = 8.0
 """[nats] beyond that which count: look-alikes share a finding, and 48 nats for one with 36 for the other, weighed
 several times, outvoted the replay, which tells them apart."""

@@ -9,7 +9,7 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run
 from r2s2r_cli.stages.diagnose.which.before import Healthy
 from r2s2r_cli.stages.measures.floor import floor_of
-from r2s2r_cli.stages.measures.gap import counting
+from r2s2r_cli.stages.measures.gap import kept_rmse
 from r2s2r_cli.stages.measures.steps import steps_of
 
 NUMERICS_M = 3e-3
@@ -27,7 +27,7 @@ def healthy_floor(healthy: Healthy) -> FloorGiven:
     sensor = float(np.sqrt(np.mean([np.sum(one.noise[-1] ** 2, axis=-1).mean() for one in healthy.arena.whole])))
     squared = healthy.score.squared
     squared = squared[np.isfinite(squared)]
-    rmse, usual = (float(np.sqrt(np.mean(squared[counting(squared, part)]))) for part in (KEPT, USUAL))
+    rmse, usual = kept_rmse(squared, KEPT), kept_rmse(squared, USUAL)
     words = f"the healthy runs, refitted, the best {100 * KEPT:.0f} % of their intervals"
     return FloorGiven(rmse, min(sensor, rmse), words, True, KEPT, (usual, USUAL))
 

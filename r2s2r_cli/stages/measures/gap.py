@@ -18,6 +18,11 @@ def counting(worst: np.ndarray, kept: float) -> np.ndarray:
     return np.asarray((worst <= np.sort(worst, axis=-1)[..., last : last + 1]) & np.isfinite(worst))
 
 
+def kept_rmse(squared: np.ndarray, kept: float) -> float:
+    """Root mean square [m] of the share `kept` of the best of squared errors (segment,) [m^2]."""
+    return float(np.sqrt(np.mean(squared[counting(squared, kept)])))
+
+
 def corrected_gap(mse: float, floor_m: float) -> float:
     """G = sqrt(max(0, MSE - floor^2)) [m]; mse [m^2]."""
     return float(np.sqrt(max(0.0, mse - floor_m**2)))

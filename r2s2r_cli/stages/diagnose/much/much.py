@@ -20,7 +20,7 @@ from r2s2r_cli.stages.diagnose.which.score import Score, groups_of
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch, stretches
 from r2s2r_cli.stages.diagnose.which.which import Compared
 from r2s2r_cli.stages.identify.data import Selection
-from r2s2r_cli.stages.measures.gap import counting
+from r2s2r_cli.stages.measures.gap import kept_rmse
 
 Told = Callable[[str, int, int], None]
 
@@ -153,7 +153,7 @@ def _alike(runs: Sequence[Run], healthy: Healthy, floor: FloorGiven, starts: Sta
     except NumericalError:
         return floor.rmse, floor.kept
     squared = _squared(errors)
-    return float(np.sqrt(np.mean(squared[counting(squared, KEPT)]))), KEPT
+    return kept_rmse(squared, KEPT), KEPT
 
 
 def _squared(errors: np.ndarray) -> np.ndarray:

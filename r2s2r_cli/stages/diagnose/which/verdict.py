@@ -31,8 +31,8 @@ SHIFTED = 1.0
 
 def concluded(m: Material) -> Which:
     """The verdict."""
-    known = np.nan_to_num(gains_of(m.refit, m.scores) - m.chronic, nan=-np.inf)  # all break off at the same piece
-    gains = dict(enumerate(known.tolist()))
+    known = gains_of(m.refit, m.scores) - m.chronic
+    gains = dict(enumerate(np.where(np.isnan(known), -np.inf, known).tolist()))  # nan: all break off at one piece
     calibration = m.calibration
     order = sorted(gains, key=lambda i: -float(m.marginal[i]))
     singles = [i for i in order if len(m.fits[i].hypothesis.parts) == 1]
@@ -127,8 +127,8 @@ def verdict_of(
     """What the first of the ranking is worth. Where the best effect leaves too much (left_sd, `Calibration.refuses`)
     that is a verdict of its own: no effect of the catalogue is enough. A name that nothing speaks for but what it was
     fitted to is none (`Calibration.witnessed`), alone or first of a pair: what both gain is no witness of either.
-    Where no cause is named, that there is no gap is a claim about its size
-    (design.md, Measures), not about causes that hide below the floor."""
+    Where no cause is named, that there is no gap is a claim about its size (design.md, Measures), not about causes that
+    hide below the floor."""
     first = ranking[0]
     named = first.effect not in (NONE, UNKNOWN) and calibration.witnessed(first.gain, first.parity)
     if first.effect == UNKNOWN and calibration.refuses(left_sd):

@@ -26,12 +26,13 @@ class RankedName(Frozen):
 
     effect: str
     elpd_gain: float
-    """Log predictive density over the refit nominal model on gaits that were left out [nats]."""
+    """Log predictive density over the refit nominal model on gaits that were left out, of which no piece says more than
+    6 nats (12 before version 18) [nats]."""
     elpd_gain_sd: float | None = None
     """Its sd, from how much the left-out parts differ in it; None: one part, or no fit."""
     marginal_nats: float | None = None
-    """Log ratio of marginal likelihoods over the refit nominal model, all gaits together [nats]; None: before version
-    13."""
+    """Log ratio of marginal likelihoods over the refit nominal model, all gaits together, of which no piece says more
+    than 6 nats (whatever it says before version 18) [nats]; None: before version 13."""
     parity_nats: float = 0.0
     """What the parity stage says for it, without a simulator [nats]."""
     fitted: bool = True

@@ -6,10 +6,13 @@ the recorded duties (command replay). The difference of end caps and sensor leng
 floor, and projected on the complement of the rig's own sensitivities to friction, motor speed (both common to the set)
 and start pose (x, y and heading of every interval: exact, the floor is the same everywhere). The rest of the pose is
 known as well as the camera's noise allows: every interval is simulated a few times more from a start that was pushed as
-far, and what that changes, a fall that comes earlier, is no effect's; neither is a clock that is some milliseconds off.
+far, and what that changes of caps and lengths, a fall that comes earlier, is no effect's; neither is a clock that is some
+milliseconds off.
 d is the length of what is left: with d >= 8 no test would miss it.
 No interval counts for more than MOST, nor for more than the one that counts next: one tip-over that happens in one
-world and not in the other is worth more than all the rest together, and says nothing about which effect it was.
+world and not in the other is worth more than all the rest together, and says nothing about which effect it was. Nor does
+what any difference at all would make: pushes of some micrometres turn the same intervals over at another instant as a
+slope of 0.2 mrad does, and what they come to on the average is taken off each.
 """
 
 from __future__ import annotations
@@ -38,6 +41,8 @@ PUSHES = 6
 PUSH_M_PER_S, PUSH_RAD_PER_S, PUSHED_M = 0.02, 0.1, 0.001
 """Sd of the least push in every coordinate of a rod, and what it comes to: cables stop it within a twentieth of a
 second, a millimetre or a third of a degree away."""
+MINUTE, MINUTES = 0.003, 4
+"""Size of the pushes that are next to nothing, in the least ones, and how many of them there are."""
 START_SHARE = 0.4
 """Of the camera's noise, to which a start pose is known: errors that stay over an interval are 0.3 of it, and some
 frames before the start leave as much of the rest."""
@@ -75,6 +80,14 @@ class _Looks:
     length: np.ndarray
 
 
+@dataclass(frozen=True)
+class _Reach:
+    """Floor at the end of an interval of a coordinate of a cap, and of a length [m]."""
+
+    caps: float
+    length: float
+
+
 def detectability(robot: Robot, hidden: Hidden, runs: list[Driven]) -> Detectable:
     """Of a set whose gaits ran as `runs`. Raises NumericalError as the rig does."""
     plain = hidden.healthy()
@@ -83,8 +96,9 @@ def detectability(robot: Robot, hidden: Hidden, runs: list[Driven]) -> Detectabl
     fast = [_replayed(robot, replace(plain, speed=plain.speed * (1 + STEP)), run, g) for g, run in enumerate(runs)]
     rng = np.random.default_rng([hidden.seed, 17])
     pushed = [[_replayed(robot, plain, run, g, rng) for g, run in enumerate(runs)] for _ in range(PUSHES)]
+    minute = [[_replayed(robot, plain, run, g, rng, MINUTE) for g, run in enumerate(runs)] for _ in range(MINUTES)]
     whole, later = ([_recorded(hidden, run, g, by) for g, run in enumerate(runs)] for by in (0.0, CLOCK_S))
-    told = _Told(hidden, base, (rub, fast), pushed, (whole, later))
+    told = _Told(hidden, base, (rub, fast), pushed, (whole, later), minute)
     d, gap = told(whole)
     d = float(np.hypot(d, _lost(hidden, runs)))
     each = []
@@ -109,6 +123,7 @@ class _Told:
     def __init__(
         self, hidden: Hidden, base: list[list[_Looks]], varied: tuple[list[list[_Looks]], ...],
         pushed: list[list[list[_Looks]]], clocks: tuple[list[list[_Looks]], list[list[_Looks]]],
+        minute: list[list[list[_Looks]]],
     ) -> None:  # fmt: skip
         self._hidden, self._base = hidden, base
         # The pushes of an interval are few directions of many: how far they reach counts in all of them.
@@ -123,16 +138,25 @@ class _Told:
         common = [self._white(one) for one in varied]
         self._common = np.column_stack([np.concatenate([part for part, _ in one]) for one in common])
         self._own = [_poses(looks) for run in base for looks in run]
+        self._by_nothing = np.mean([self._squares(one) for one in minute], axis=0)
 
     def __call__(self, other: list[list[_Looks]]) -> tuple[float, float]:
         """d, and the root mean square at key frames [m]."""
+        last = [(b.p[-1] - a.p[-1]).ravel() for x, y in zip(self._base, other, strict=True)
+                for a, b in zip(x, y, strict=True)]  # fmt: skip
+        each = np.maximum(self._squares(other) - self._by_nothing, 0.0)
+        each = np.minimum(each, np.sort(each)[-2:][0])
+        return float(np.sqrt(each.sum())), float(np.sqrt(3 * np.mean(np.concatenate(last) ** 2)))
+
+    def _squares(self, other: list[list[_Looks]]) -> np.ndarray:
+        """Square of what is left of every interval, MOST at most, (interval,)."""
         white = self._white(other)
         r = np.concatenate([part for part, _ in white])
         nuisances, sized, begins, at = [], [], [], 0
         grown = [one for run in self._grown for one in run]
         for pose, columns, reach, (part, cap_rows) in zip(self._own, self._known, grown, white, strict=True):
             own, of_size = np.zeros((len(r), 3)), np.zeros((len(r), columns.shape[1]))
-            own[at : at + cap_rows], of_size[at : at + len(part)] = self._caps_white(pose, reach), columns
+            own[at : at + cap_rows], of_size[at : at + len(part)] = self._caps_white(pose, reach.caps), columns
             nuisances.append(own)
             sized.append(of_size)
             begins.append(at)
@@ -145,19 +169,15 @@ class _Told:
         padded = np.concatenate([r, np.zeros(known.shape[1])])
         left = padded - J @ np.linalg.lstsq(J, padded, rcond=1e-9)[0]
         of_known = (left[len(r) :] ** 2).reshape(len(white), -1).sum(axis=1)
-        last = [(b.p[-1] - a.p[-1]).ravel() for x, y in zip(self._base, other, strict=True)
-                for a, b in zip(x, y, strict=True)]  # fmt: skip
-        each = np.minimum(np.add.reduceat(left[: len(r)] ** 2, begins) + of_known, MOST**2)
-        each = np.minimum(each, np.sort(each)[-2:][0])
-        return float(np.sqrt(each.sum())), float(np.sqrt(3 * np.mean(np.concatenate(last) ** 2)))
+        return np.asarray(np.minimum(np.add.reduceat(left[: len(r)] ** 2, begins) + of_known, MOST**2))
 
     def _white(self, other: list[list[_Looks]]) -> list[tuple[np.ndarray, int]]:
         """Whitened difference from the base of every interval, and how much of it is caps."""
         found = []
         for mine, theirs, reach in zip(self._base, other, self._grown, strict=True):
             for a, b, grown in zip(mine, theirs, reach, strict=True):
-                caps = self._caps_white((b.p - a.p).reshape(len(a.t), -1, 1), grown).ravel()
-                root = _root(len(a.t), LENGTH_SD_M, 0.0, LET_OUT_M, LENGTH_GROWN_M)
+                caps = self._caps_white((b.p - a.p).reshape(len(a.t), -1, 1), grown.caps).ravel()
+                root = _root(len(a.t), LENGTH_SD_M, 0.0, LET_OUT_M, grown.length)
                 found.append((np.concatenate([caps, np.linalg.solve(root, b.length - a.length).ravel()]), len(caps)))
         return found
 
@@ -178,10 +198,11 @@ def _root(n: int, sd: float, ar: float, constant: float, grown: float) -> np.nda
     return np.asarray(np.linalg.cholesky(sd**2 * np.where(lag == 0, 1.0, ar**lag) + constant**2 + walk))
 
 
-def _reach(base: _Looks, pushed: list[_Looks]) -> float:
-    """Floor of a cap's coordinate at the end of an interval [m]: of engines, and of how far pushes carry it."""
-    carried = np.sqrt(np.mean([(one.p[-1] - base.p[-1]) ** 2 for one in pushed]))
-    return float(np.hypot(GROWN_M, carried))
+def _reach(base: _Looks, pushed: list[_Looks]) -> _Reach:
+    """Of engines, and of how far pushes carry them: what a fall is to the caps it is to the cables."""
+    caps = np.sqrt(np.mean([(one.p[-1] - base.p[-1]) ** 2 for one in pushed]))
+    length = np.sqrt(np.mean([(one.length[-1] - base.length[-1]) ** 2 for one in pushed]))
+    return _Reach(float(np.hypot(GROWN_M, caps)), float(np.hypot(LENGTH_GROWN_M, length)))
 
 
 def _poses(looks: _Looks) -> np.ndarray:
@@ -205,10 +226,11 @@ def _recorded(hidden: Hidden, run: Driven, gait: int, later: float = 0.0) -> lis
 
 
 def _replayed(
-    robot: Robot, hidden: Hidden, run: Driven, gait: int, pushes: np.random.Generator | None = None
-) -> list[_Looks]:
+    robot: Robot, hidden: Hidden, run: Driven, gait: int, pushes: np.random.Generator | None = None,
+    size: float | None = None,
+) -> list[_Looks]:  # fmt: skip
     """Every interval of a run in another world, from its true start under its duties. pushes: draws what a start is
-    pushed by."""
+    pushed by; size: of the push, in the least; None: as well as the camera's noise tells a start."""
     body = body_of(robot, hidden, gait, run.gait.position, run.gait.heading)
     world = hidden.world(gait, run.gait.position, run.gait.heading)
     camera, late = world.seen(), world.seen().clock.stamp_delay_s
@@ -216,10 +238,10 @@ def _replayed(
     for t, moment, first in zip(_times(run), run.moments, run.starts, strict=True):
         body.restore(moment)
         if pushes is not None:
-            rods, by = run.caps.shape[1] // 2, max(1.0, START_SHARE * hidden.noise_m / PUSHED_M)
+            rods, by = run.caps.shape[1] // 2, size or max(1.0, START_SHARE * hidden.noise_m / PUSHED_M)
             body.push(by * PUSH_M_PER_S * pushes.standard_normal((rods, 3)),
                       by * PUSH_RAD_PER_S * pushes.standard_normal((rods, 3)),
-                      LET_OUT_M * pushes.standard_normal(len(robot.actuated)))  # fmt: skip
+                      (size or 1.0) * LET_OUT_M * pushes.standard_normal(len(robot.actuated)))  # fmt: skip
         k, now = int(first), float(run.t[first])
         p, length = [], []
         for due in t:

@@ -10,7 +10,8 @@ import pytest
 from r2s2r_cli.stages.diagnose.which.before import Healthy, before, chronic
 from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
-from r2s2r_cli.stages.diagnose.which.score import ENOUGH, gains, scores
+from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH
+from r2s2r_cli.stages.diagnose.which.score import gains, scores
 from tests.support.linear_arena import EACH, STRETCHES, LinearArena, candidate
 
 QUIET = 0.5
@@ -61,13 +62,13 @@ def test_nuisances_make_up_for_what_looks_like_them() -> None:
     arena = LinearArena(0.0, noise=QUIET)
     arena.B[:, 0] = arena.A[:, 0]
     runs = healthy(arena)
-    (free,) = before(runs, [fitted(0.5)])
-    assert free == pytest.approx(-0.5 * ((runs.base.z[0] - 0.5) ** 2 - runs.base.z[0] ** 2), abs=0.01)
+    (free,) = before(runs, [fitted(0.3)])
+    assert free == pytest.approx(-0.5 * ((runs.base.z[0] - 0.3) ** 2 - runs.base.z[0] ** 2), abs=0.01)
     arena.lower, arena.upper = runs.base.z, runs.base.z
-    (held,) = before(runs, [fitted(0.5)])
+    (held,) = before(runs, [fitted(0.3)])
     left = arena.A @ runs.base.z - arena.y
-    assert held == pytest.approx(0.5 * (left @ left - np.sum((left + 0.5 * arena.A[:, 0]) ** 2)), rel=1e-9)
-    assert held < free - 20
+    assert held == pytest.approx(0.5 * (left @ left - np.sum((left + 0.3 * arena.A[:, 0]) ** 2)), rel=1e-9)
+    assert held < free - 8
 
 
 def test_following_alone_is_no_gain() -> None:
@@ -126,7 +127,7 @@ def test_what_was_there_before_is_no_news(seed: int) -> None:
     solver.run(fits)
     found = scores(today, fits, today.gait)  # type: ignore[arg-type]
     (gain,) = gains(found[0], found[1:])
-    assert gain > 20
+    assert gain > 15
     same, none = (healthy(LinearArena(truth, seed=100 + seed)) for truth in (0.5, 0.0))
     (old,), (never,) = chronic(today, same, fits[1:]), chronic(today, none, fits[1:])  # type: ignore[arg-type]
     assert old > 0.65 * gain

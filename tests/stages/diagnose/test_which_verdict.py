@@ -154,7 +154,7 @@ NAMES = {"payload": 0.7, "motor_lag": 0.1, "backlash": 0.1, "none": 0.1}
 def shared(added: float) -> tuple[dict[str, float], tuple[str, str] | None]:
     """With one pair whose second effect adds as much."""
     pair = TwoCauses(("payload", "motor_lag"), ALONE["payload"] + added, 200.0, added)
-    return with_pairs(NAMES, [pair], ALONE, CHANCE, 6.0)
+    return with_pairs(NAMES, [pair], ALONE, CHANCE)
 
 
 def test_a_second_effect_must_add_a_share_of_the_first_and_more() -> None:
@@ -174,7 +174,7 @@ def test_pairs_share_without_adding() -> None:
     second = [one["motor_lag"] for one in seen]
     assert second == sorted(second) and second[-1] == pytest.approx(0.5)
     assert seen[0]["payload"] == pytest.approx(NAMES["payload"], abs=0.05)
-    assert with_pairs(NAMES, [], ALONE, CHANCE, 6.0) == (NAMES, None)
+    assert with_pairs(NAMES, [], ALONE, CHANCE) == (NAMES, None)
 
 
 def test_without_healthy_runs_less_counts() -> None:

@@ -40,10 +40,11 @@ class Fits:
         if x.shape[1]:
             sd = PRIOR_SCALES * hypothesis.stack("scale")
             prior = prior + 0.5 * np.sum(((x - hypothesis.stack("off")) / sd) ** 2, axis=1)
-        data = self._nats(residual).sum(axis=1)
+        data = self.nats(residual).sum(axis=1)
         return np.where(np.isfinite(data), data, np.inf) + prior
 
-    def _nats(self, residual: np.ndarray) -> np.ndarray:
+    def nats(self, residual: np.ndarray) -> np.ndarray:
+        """What every stretch costs of residuals (k, M), (k, stretch)."""
         return minus_log(self.arena.squares(residual), self.arena.logdets, self.arena.sizes)
 
     def values(self, hypothesis: Hypothesis, z: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -124,11 +125,11 @@ class Fits:
         raw = self._raw([(fit.hypothesis, fit.z, fit.x) for fit in fits], wanted)
         white = whitened(self.arena.white, raw)
         own = np.array([fit.residual for fit in fits])
-        costs = self._nats(own)
-        better = self._nats(white) < costs
+        costs = self.nats(own)
+        better = self.nats(white) < costs
         mixed = [np.where(yes[:, None], new, old) for yes, new, old in zip(better.T, raw, before, strict=True)]
         white = whitened(self.arena.white, mixed)
-        gains = (costs - self._nats(white)).sum(axis=1)
+        gains = (costs - self.nats(white)).sum(axis=1)
         for i, (fit, gain) in enumerate(zip(fits, gains.tolist(), strict=True)):
             if gain <= 0:
                 continue

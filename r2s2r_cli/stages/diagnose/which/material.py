@@ -36,7 +36,9 @@ class Material:
     chronic: np.ndarray
     """What of the gain of each fit was there before (`before.chronic`) [nats]."""
     marginal: np.ndarray
-    """What each fit gains on all data (`marginal_gains`), less what was there before [nats]."""
+    """What counts of what each fit gains on all data (`marginal_gains`), less what was there before [nats]."""
+    whole: np.ndarray
+    """The same with all that single pieces say."""
     asked: tuple[str, ...] | None = None
     """Ids of the effects that may be named; None: all."""
     parity: Mapping[str, Mapping[int | None, float]] = field(default_factory=dict)

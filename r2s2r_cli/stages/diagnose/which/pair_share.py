@@ -19,8 +19,8 @@ SHARE = 0.2
 """Of the first effect's gain, which it must add as well: in 22 calibration sets with one cause that gained 30 nats or
 more second effects added 0.22 of it at most but for one fit that had stopped early, in three with two causes 0.48 to
 1.5 (`calibration-9`)."""
-SLACK = 3.0
-"""Temperatures by which what it adds must differ from that for the odds to change by a factor e: what second laws add
+SLACK = 20.0
+"""[nats] by which what it adds must differ from that for the odds to change by a factor e: what second laws add
 where one effect is there differs from set to set by more than gains do."""
 LARGEST = 60.0
 """Of an exponent."""
@@ -39,7 +39,6 @@ class TwoCauses:
 
 def with_pairs(
     probability: Mapping[str, float], pairs: Sequence[TwoCauses], alone: Mapping[str, float], chance: float,
-    temperature: float,
 ) -> tuple[dict[str, float], tuple[str, str] | None]:  # fmt: skip
     """Probabilities of names once pairs are possible, and the pair that is likelier than its first effect alone, None
     for none. alone: held-out gains of single effects [nats]; chance: what the best of the catalogue gains by chance
@@ -51,7 +50,7 @@ def with_pairs(
         if first not in probability or second not in probability:
             continue
         needed = chance + LEAST + SHARE * max(alone.get(first, 0.0), 0.0)
-        beyond = (pair.added - needed) / (SLACK * temperature)
+        beyond = (pair.added - needed) / SLACK
         both = probability[first] * float(np.exp(min(beyond, LARGEST)))
         found[first] += both / 2
         found[second] += both / 2

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH, bounded, gains_over_first
 from r2s2r_cli.stages.diagnose.which.fit import PRIOR_SCALES, Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
@@ -24,8 +25,6 @@ from r2s2r_cli.stages.diagnose.which.rough import DRAWS, around, root_of
 from r2s2r_cli.stages.diagnose.which.starting import LOST_M
 from r2s2r_cli.stages.diagnose.which.white import White
 
-ENOUGH = 12.0
-"""[nats]"""
 SILENT = 0.01
 """Of the precision of a number's prior, below which data say nothing of it."""
 
@@ -50,16 +49,15 @@ class Score:
         return np.asarray(np.sum(self.key**2, axis=-1).mean(axis=-1))
 
 
-def gains(refit: Score, others: Sequence[Score]) -> np.ndarray:
+def gains(refit: Score, others: Sequence[Score], enough: float = ENOUGH) -> np.ndarray:
     """Held-out log density of hypotheses over the refit nominal model, (hypothesis,) [nats]. At a piece none loses more
-    than ENOUGH against the best of them all: a robot that tips over, or not, is explained by anything."""
-    total = _table(refit, others).sum(axis=1)
-    return np.asarray(total[1:] - total[0])
+    than `enough` against the best of them all (`bounded`)."""
+    return gains_over_first(_table(refit, others), enough)
 
 
 def gain_sds(refit: Score, others: Sequence[Score], groups: np.ndarray) -> np.ndarray:
     """Sd of the gains, (hypothesis,) [nats], from how much the groups differ in what they gain; nan with one group."""
-    table = _table(refit, others)
+    table = bounded(_table(refit, others))
     own = np.stack([(table[1:] - table[0])[:, groups == name].sum(axis=1) for name in np.unique(groups)], axis=1)
     count = own.shape[1]
     return np.sqrt(count) * own.std(axis=1, ddof=1) if count > 1 else np.full(len(own), np.nan)
@@ -67,8 +65,7 @@ def gain_sds(refit: Score, others: Sequence[Score], groups: np.ndarray) -> np.nd
 
 def _table(refit: Score, others: Sequence[Score]) -> np.ndarray:
     """Log densities (1 + hypothesis, stretch), the refit nominal model first."""
-    table = np.array([refit.elpd, *(score.elpd for score in others)])
-    return np.asarray(np.logaddexp(table, table.max(axis=0) - ENOUGH))
+    return np.array([refit.elpd, *(score.elpd for score in others)])
 
 
 def groups_of(arena: Arena) -> np.ndarray:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.parity.finding import Element
+from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH, ENOUGH_OF_TWO
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.confusable import confusable
@@ -31,11 +32,12 @@ SHIFTED = 1.0
 
 def concluded(m: Material) -> Which:
     """The verdict."""
-    known = gains_of(m.refit, m.scores) - m.chronic
-    gains = dict(enumerate(np.where(np.isnan(known), -np.inf, known).tolist()))  # nan: all break off at one piece
     calibration = m.calibration
-    order = sorted(gains, key=lambda i: -float(m.marginal[i]))
+    order = sorted(range(len(m.fits)), key=lambda i: -float(m.marginal[i]))
     singles = [i for i in order if len(m.fits[i].hypothesis.parts) == 1]
+    # Beside a pair that explains a piece both its first effect and nothing at all would lose the same there.
+    gains = dict(zip(singles, _left_out_gains(m, singles, ENOUGH), strict=True))
+    of_two = dict(enumerate(_left_out_gains(m, range(len(m.fits)), ENOUGH_OF_TWO)))
     worth = {
         i: calibration.score(m.fits[i].hypothesis.effects[0], float(m.marginal[i]), left_out=gains[i], parity=m.said(i))
         for i in singles
@@ -48,10 +50,11 @@ def concluded(m: Material) -> Which:
     table = {name: worth[i] for name, i in best.items()}
     table |= {one.effect: calibration.score(one.effect, parity=one.parity) for one in others}
     table[NONE] = calibration.score(NONE)
-    both = [_two(m, i, best, gains) for i in order if len(m.fits[i].hypothesis.parts) == 2]
-    probability, pair = with_pairs(calibration.probabilities(table), both, names, m.chance, calibration.temperature)
+    both = [_two(m, i, best, gains, of_two) for i in order if len(m.fits[i].hypothesis.parts) == 2]
+    alone = {name: of_two[i] for name, i in best.items()}
+    probability, pair = with_pairs(calibration.probabilities(table), both, alone, m.chance)
     probability = calibration.with_unknown(probability, m.unexplained, m.left.beyond)
-    sds = gain_sds(m.refit, m.scores, m.groups).tolist() if m.scores else []
+    sds = dict(zip(singles, gain_sds(m.refit, [m.scores[i] for i in singles], m.groups).tolist(), strict=True))
     ranking = [
         replace(
             _ranked(m, i, gains[i], probability[name], singles, gains),
@@ -85,12 +88,21 @@ def concluded(m: Material) -> Which:
     )  # fmt: skip
 
 
-def _two(m: Material, i: int, best: Mapping[str, int], gains: Mapping[int, float]) -> TwoCauses:
+def _left_out_gains(m: Material, which: Sequence[int], enough: float) -> list[float]:
+    """Of some fits, less what was there before."""
+    found = gains_of(m.refit, [m.scores[i] for i in which], enough) - m.chronic[list(which)]
+    return np.where(np.isnan(found), -np.inf, found).tolist()  # type: ignore[no-any-return]  # nan: all break off at one piece
+
+
+def _two(
+    m: Material, i: int, best: Mapping[str, int], gains: Mapping[int, float], of_two: Mapping[int, float]
+) -> TwoCauses:
     """Of a fit of two effects, the first of which was fitted alone as well."""
     first, second = m.fits[i].hypothesis.effects
     alone = best[first]
-    added = min(gains[i] - gains[alone], float(m.marginal[i] - m.marginal[alone]))
-    return TwoCauses((first, second), gains[i], float(m.marginal[i]), added)
+    left_out = of_two[i] - of_two[alone]
+    added = min(left_out, float(m.whole[i] - m.whole[alone]))
+    return TwoCauses((first, second), gains[alone] + left_out, float(m.marginal[i]), added)
 
 
 def _not_fitted(m: Material, fitted: Mapping[str, float]) -> list[Ranked]:

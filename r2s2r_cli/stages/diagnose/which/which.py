@@ -20,13 +20,15 @@ from r2s2r_cli.stages.diagnose.which.marginal import marginal_gains
 from r2s2r_cli.stages.diagnose.which.material import Material
 from r2s2r_cli.stages.diagnose.which.pairs import ITERATIONS, pairs_of
 from r2s2r_cli.stages.diagnose.which.rivals import WIDER, chance, no_gap
-from r2s2r_cli.stages.diagnose.which.score import ENOUGH, Score, groups_of, scores
+from r2s2r_cli.stages.diagnose.which.score import Score, groups_of, scores
 from r2s2r_cli.stages.diagnose.which.screen import screen
 from r2s2r_cli.stages.diagnose.which.search import Said, Told, fitted, led, picked_of
 from r2s2r_cli.stages.diagnose.which.verdict import concluded
 
 PLACES = 8
 """Of a patch on the floor, to begin with."""
+MOST_UNEXPLAINED = 12.0
+"""[nats] that a piece says for a wider floor."""
 LOOKED_AT = 4
 """Fits that the size of an error without a name is learned from."""
 SECOND = 3
@@ -80,31 +82,32 @@ def compare_effects(
     refit, *own = scores(arena, [base, *fits], groups)
     old = chronic(arena, healthy, fits)
     by_chance = chance(arena, responses, groups, seed=seed)
-    said = marginal_gains(arena, base, fits) - old
+    said = marginal_gains(arena, base, fits).less(old)
     # Beside an effect that gains no more than chance does even left out, a second one is no second cause.
-    pairs = pairs_of(arena, base, fits, said, responses, told_by or {}) if said.max(initial=0.0) > by_chance else []
+    likely = said.counted.max(initial=0.0) > by_chance
+    pairs = pairs_of(arena, base, fits, said.counted, responses, told_by or {}) if likely else []
     if pairs:
-        first = int(said.argmax())
+        first = int(said.counted.argmax())
         alone = led(Fits(arena), fits[first], pairs, iterations=ITERATIONS)
         if alone is not fits[first]:
             fits[first], own[first] = alone, scores(arena, [alone], groups)[0]
             old[first] = chronic(arena, healthy, [alone])[0]
-            said[first] = marginal_gains(arena, base, [alone])[0] - old[first]
+            said = marginal_gains(arena, base, fits).less(old)
         Fits(arena).secants(pairs)
-        fits, own = [*fits, *pairs], [*own, *scores(arena, pairs, groups)]
+        own = [*own, *scores(arena, pairs, groups)]
         before = chronic(arena, healthy, pairs)
-        old = np.concatenate([old, before])
-        said = np.concatenate([said, marginal_gains(arena, base, pairs) - before])
+        said = said.with_pairs(first, marginal_gains(arena, base, pairs).whole - before)
+        fits, old = [*fits, *pairs], np.concatenate([old, before])
     told("left out", 1, 1)
     material = Material(
         arena=arena, base=base, refit=refit, fits=tuple(fits), scores=tuple(own), responses=responses,
         chance=by_chance, no_gap=no_gap(refit, floor_m, kept=kept), wider=wider,
         left=left(at_least, arena.sizes, refit, own, healthy),
-        unexplained=unexplained, groups=groups, calibration=calibration, chronic=old, marginal=said,
+        unexplained=unexplained, groups=groups, calibration=calibration, chronic=old, marginal=said.counted, whole=said.whole,
         asked=None if effects is None else tuple(effects), parity=told_by or {},
     )  # fmt: skip
     which = concluded(material)
-    order = _in_order(which, fits, said)
+    order = _in_order(which, fits, said.counted)
     return Compared(arena, base, tuple(fits[i] for i in order), refit, tuple(own[i] for i in order), which)
 
 
@@ -145,7 +148,7 @@ def _widened(arena: Arena, fits: Sequence[Fit]) -> tuple[float, float]:
         arena.whiten(floor_m=factor * own, trial=True)
         found[factor] = np.array([arena.log_densities(raw) for raw in raws]).max(axis=0)
     arena.whiten(floor_m=own)
-    more = {factor: float(np.minimum(one - found[1.0], ENOUGH).sum()) for factor, one in found.items()}
+    more = {factor: float(np.minimum(one - found[1.0], MOST_UNEXPLAINED).sum()) for factor, one in found.items()}
     factor = max(more, key=lambda one: more[one])
     return factor, more[factor]
 

@@ -139,9 +139,14 @@ def calibrate(
     verdicts: Verdicts = None,
     key: Key = None,
     published: Published = False,
+    older: Annotated[
+        list[Path] | None,
+        typer.Option("--older", metavar="FILE", help="Published shards of versions that counted gains otherwise: they "
+                     "teach only how much the best effect may leave. Several."),
+    ] = None,
     json: JsonOption = False,
     quiet: QuietOption = False,
-) -> None:
+) -> None:  # fmt: skip
     """Learn from a calibration bank how gains become probabilities, and from which one on a name is committed to.
 
     Example: r2s2r blind calibrate --published docs/blind/calibration-7.json.gz --out calibration.json
@@ -154,9 +159,9 @@ def calibrate(
     console = Console(json=json, quiet=quiet)
     if published:
         _alone(verdicts, key)
-        found = calibration_published(banks)
+        found = calibration_published(banks, older or ())
     else:
-        found = calibration(*_bank(banks, verdicts, key, "calibrate"))
+        found = calibration(*_bank(banks, verdicts, key, "calibrate"), older or ())
     out.write_text(format_json.dumps(found, indent=1, sort_keys=True) + "\n", encoding="utf-8")
     result = BlindCalibrateResult.model_validate({**found, "out": str(out), **found["left_out"]}, extra="ignore")
     console.document(result)

@@ -63,15 +63,16 @@ def publish(
     return published(shard, None if shard.code else code(judged_by))
 
 
-def calibration(bank: Path, verdicts: Path, key: bytes) -> dict[str, Any]:
-    """What the verdicts on a calibration bank teach about probabilities (`calibrate`). Raises InputError as `score`
-    does, for another bank, and for too few sets."""
-    return _calibration(pooled([opened(bank, verdicts, key)]), str(bank))
+def calibration(bank: Path, verdicts: Path, key: bytes, older: Sequence[Path] = ()) -> dict[str, Any]:
+    """What the verdicts on a calibration bank teach about probabilities (`calibrate`). older: published files of
+    versions that counted gains in another way; they teach only what the best effect may leave. Raises InputError as
+    `score` does, for another bank, and for too few sets."""
+    return _calibration(pooled([opened(bank, verdicts, key)]), str(bank), older)
 
 
-def calibration_published(files: Sequence[Path]) -> dict[str, Any]:
+def calibration_published(files: Sequence[Path], older: Sequence[Path] = ()) -> dict[str, Any]:
     """The same of published files together."""
-    return _calibration(pooled([read_published(path) for path in files]), ", ".join(map(str, files)))
+    return _calibration(pooled([read_published(path) for path in files]), ", ".join(map(str, files)), older)
 
 
 def worth_published(learned: Sequence[Path], judged: Sequence[Path]) -> BlindWorthResult:
@@ -113,11 +114,15 @@ def _cases(pool: Pool) -> list[tuple[Truth, Case]]:
     return [(truth, one) for truth, one in found if one is not None]
 
 
-def _calibration(pool: Pool, where: str) -> dict[str, Any]:
+def _calibration(pool: Pool, where: str, older: Sequence[Path]) -> dict[str, Any]:
     _must_teach(pool, where)
+    before = [pooled([read_published(path)]) for path in older]
+    for path, one in zip(older, before, strict=True):
+        _must_teach(one, str(path))
     cases = [one for _, one in _cases(pool)]
     banks = " + ".join(one.index_sha256[:12] for one in pool.shards)
-    return calibrated(cases, words=f"{len(cases)} sets of the calibration bank {banks}")
+    known = [one for pool in before for _, one in _cases(pool)]
+    return calibrated(cases, words=f"{len(cases)} sets of the calibration bank {banks}", older=known)
 
 
 def _score(pool: Pool, again: Sequence[Path]) -> BlindScoreResult:

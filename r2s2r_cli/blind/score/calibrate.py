@@ -86,9 +86,9 @@ def learn(cases: Sequence[Case], *, where: str = "BANK") -> tuple[Learned, Apart
     return Learned(_fit(cases), _fit_strange(cases), _unfit(cases), commit), apart
 
 
-def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
+def calibrated(cases: Sequence[Case], *, words: str, older: Sequence[Case] = ()) -> dict[str, Any]:
     """The numbers of `stages/diagnose/which/calibration.json`, with what they reach on sets that were left out (but for
-    `unfit`, which few sets teach: all of them).
+    `unfit`, which few sets teach: all of them, and those `older` ones whose gains were counted in another way).
 
     Raises InputError for too few sets.
     """
@@ -108,7 +108,7 @@ def calibrated(cases: Sequence[Case], *, words: str) -> dict[str, Any]:
         "none": learned["none"] / sharp,
         **dict(zip(("stranger", "wider"), own.strange.tolist(), strict=True)),
         "few": FEW,
-        **own.unfit,
+        **(_unfit([*cases, *older]) if older else own.unfit),
         "commit": own.commit,
         "conformal": float(held[k - 1]) if k else 0.0,
         "lapse": LAPSE,

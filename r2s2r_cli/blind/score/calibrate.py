@@ -36,6 +36,8 @@ STRANGER, STRANGER_SD = (-2.0, 0.0), (1.0, 0.5)
 """The same of `stranger` and `wider`."""
 FOLDS = 10
 COVER = 0.90
+LEAST_LIKELY = 0.02
+"""Probability below which no name is held by the 90 % set, however many sets lose their truth by that."""
 PRECISION = 0.90
 """How often a verdict that commits to an effect shall be right (the reference, section 4)."""
 LEAST_SURE = 0.5
@@ -95,7 +97,8 @@ def calibrated(cases: Sequence[Case], *, words: str, older: Sequence[Case] = ())
     own, apart = learn(cases)
     _, right, _ = _first(apart)
     held = np.sort([p.get(one.truth, 0.0) for one, p in apart])
-    # Split conformal: with the k-th smallest as threshold at least COVER of new sets keep their truth.
+    # Split conformal: with the k-th smallest as threshold at least COVER of new sets keep their truth, but for effects
+    # that nothing speaks for: listing every name of the catalogue would hold those, and say nothing.
     k = int(np.floor((len(held) + 1) * (1.0 - COVER)))
     learned = dict(zip(LEARNED, own.numbers.tolist(), strict=True))
     sharp = max(learned["sharpness"] * SHARPNESS, 1e-6)
@@ -110,7 +113,7 @@ def calibrated(cases: Sequence[Case], *, words: str, older: Sequence[Case] = ())
         "few": FEW,
         **(_unfit([*cases, *older]) if older else own.unfit),
         "commit": own.commit,
-        "conformal": float(held[k - 1]) if k else 0.0,
+        "conformal": max(float(held[k - 1]) if k else 0.0, LEAST_LIKELY),
         "lapse": LAPSE,
         "words": words,
         "sets": len(cases),

@@ -30,8 +30,8 @@ RANKING = GroupSpec(
     required=True,
     datasets=(
         column("name", "str", ("name",), "1", "effect, none or unknown"),
-        column("elpd_gain", "float64", ("name",), "1", "held-out log predictive density over the refit nominal model [nats]"),
-        column("marginal", "float64", ("name",), "1", "log ratio of marginal likelihoods of all data [nats]", nan_means="not fitted, or no effect", required=False),
+        column("elpd_gain", "float64", ("name",), "1", "held-out log predictive density over the refit nominal model, a piece 6 nats at most [nats]"),
+        column("marginal", "float64", ("name",), "1", "log ratio of marginal likelihoods of all data, a piece 6 nats at most [nats]", nan_means="not fitted, or no effect", required=False),
         column("parity", "float64", ("name",), "1", "what the parity stage says for it [nats]", required=False),
         column("probability", "float64", ("name",), "1", "of the name"),
         column("rmse", "float64", ("name",), "m", "of the caps at the ends of intervals left out", nan_means="not one model"),

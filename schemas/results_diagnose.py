@@ -72,9 +72,10 @@ class PairFound(Frozen):
 
     effects: tuple[str, ...]
     elpd_gain: float
-    """As of one effect: held-out log predictive density over the refit nominal model [nats]."""
+    """Held-out log predictive density over the refit nominal model: what its first effect gains and what the second adds,
+    12 nats a piece at most [nats]."""
     marginal_nats: float | None = None
-    """As of one effect, since version 13 of `diagnose`."""
+    """The same of all data, where all that the second adds counts [nats]; since version 13 of `diagnose`."""
 
 
 class ShrinkageFound(Frozen):
@@ -144,7 +145,8 @@ class DiagnoseReport(Frozen):
     effects: tuple[str, ...]
     probability: float
     set90: tuple[str, ...]
-    """Names that hold the truth in 90 of 100 cases, where probabilities are calibrated."""
+    """Names that held the truth in nine of ten calibration sets, but none below one in fifty: effects that nothing speaks
+    for are not among them."""
     ranking: tuple[RankedName, ...]
     pairs: tuple[PairFound, ...] = ()
     """The best effect with others beside it, best first."""

@@ -149,7 +149,7 @@ def calibrate(
 ) -> None:  # fmt: skip
     """Learn from a calibration bank how gains become probabilities, and from which one on a name is committed to.
 
-    Example: r2s2r blind calibrate --published docs/blind/calibration-7.json.gz --out calibration.json
+    Example: r2s2r blind calibrate --published docs/blind/calibration-11.json.gz --out calibration.json
     """
     import json as format_json
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from r2s2r_cli.blind.score.calibrate import calibrated, learn
+from r2s2r_cli.blind.score.calibrate import LEAST_LIKELY, calibrated, learn
 from r2s2r_cli.blind.score.cases import FEW, HELD, Case, case
 from r2s2r_cli.blind.score.facts import truth_of
 from r2s2r_cli.errors import InputError
@@ -55,6 +55,32 @@ def test_planted_numbers_come_back() -> None:
     assert found["none"] == pytest.approx(TRUE.none, abs=5.0)
     assert found["stranger"] == pytest.approx(TRUE.stranger, abs=0.25)
     assert found["wider"] == pytest.approx(TRUE.wider, abs=0.12)
+
+
+def test_older_sets_teach_only_what_may_be_left() -> None:
+    """Gains of older versions mean something else: they move neither temperature nor `none`, whatever they say."""
+    sets = planted(200)
+    older = [replace(one, said=1e3 * one.said, truth="payload", left_sd=2.0) for one in sets[:40]]
+    older += [replace(sets[0], truth="unknown", left_sd=5.0)] * 3
+    plain, more = calibrated(sets, words="test"), calibrated(sets, words="test", older=older)
+    assert "unfit" not in plain
+    assert (more["unfit"], more["unfit_share"]) == (3.5, 0.8)
+    assert {name: value for name, value in more.items() if not name.startswith("unfit")} == plain
+
+
+def test_the_set_of_names_lists_none_that_nothing_speaks_for() -> None:
+    """Where a third of the truths gain nothing, holding nine of ten would take every name of the catalogue."""
+    names = tuple(f"effect_{k}" for k in range(60))
+    rng = np.random.default_rng(0)
+    sets = []
+    for k in range(60):
+        said = np.zeros(61)
+        said[k] = 0.0 if k % 3 == 0 else rng.uniform(100.0, 200.0)
+        sets.append(Case((*names, "none"), said, np.zeros(61), names[k]))
+    found = calibrated(sets, words="test")
+    assert found["conformal"] == LEAST_LIKELY
+    nothing = known(found).probabilities({name: known(found).score(name) for name in (*names, "none")})
+    assert len(known(found).within(nothing)) < 5
 
 
 def test_strangers_do_not_move_what_names_are_worth() -> None:

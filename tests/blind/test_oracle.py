@@ -66,5 +66,5 @@ def test_no_interval_counts_for_more_than_the_next() -> None:
 def test_a_fall_that_pushes_bring_about_is_part_of_the_floor_of_cables_too() -> None:
     """Where pushes change lengths by centimetres, a change by one tells little."""
     still, there = looks(), looks({0: 0.01, 1: 0.01})
-    shaken = [looks({k: sign * 0.05 for k in range(2)}) for sign in (1.0, -1.0)] * 3
+    shaken = [looks(dict.fromkeys(range(2), sign * 0.05)) for sign in (1.0, -1.0)] * 3
     assert told([still], shaken)(there)[0] < 0.5 * told([still])(there)[0]

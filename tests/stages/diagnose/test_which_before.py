@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.which.before import Healthy, before, chronic
+from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH
 from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
-from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH
 from r2s2r_cli.stages.diagnose.which.score import gains, scores
 from tests.support.linear_arena import EACH, STRETCHES, LinearArena, candidate
 

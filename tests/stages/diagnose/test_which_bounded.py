@@ -35,10 +35,11 @@ def test_many_pieces_outvote_one() -> None:
 
 
 def test_the_order_of_a_piece_stays() -> None:
-    """Bounding never turns two hypotheses round, and moves none by more than ln 2 that lies within ENOUGH of the best."""
+    """Bounding turns no two hypotheses round, and moves none by more than ln 2 that is within ENOUGH of the best."""
     table = np.random.default_rng(0).normal(0.0, 8.0, (6, 50))
     found = bounded(table)
-    assert (np.argsort(found, axis=0) == np.argsort(table, axis=0)).all()
+    steps = np.diff(np.take_along_axis(found, np.argsort(table, axis=0), axis=0), axis=0)
+    assert (steps >= 0).all()
     near = table > table.max(axis=0) - ENOUGH
     assert (np.abs(found - table)[near] <= np.log(2.0) + 1e-12).all()
     assert (found >= table.max(axis=0) - ENOUGH).all()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.which import verdict as module
+from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.found import Which
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
@@ -35,20 +38,25 @@ def score(gain: float) -> Score:
 
 def said(
     by: Calibration, *, left_out: float = 20.0, left: float = 0.0, unexplained: float = 0.0, parity: float = 0.0,
-    of_payload: float = 0.0,
+    of_payload: float = 0.0, pair: tuple[float, float] | None = None,
 ) -> Which:  # fmt: skip
     """Of a payload with 90 nats on all data and 20 left out, and a lag with 40 and 60. left_out: of the payload;
-    parity: for the lag, of_payload: for the payload."""
+    parity: for the lag, of_payload: for the payload. pair: what both together gain left out, and on all data."""
     arena = LinearArena(1.0)
     zero = np.zeros((STRETCHES, 0))
     fits = [Fit(Hypothesis((candidate(name, k),)), np.zeros(2), np.ones(1), np.zeros(1), np.zeros((1, 3)), 0.0,
                 np.zeros(1), zero, []) for k, name in enumerate(("payload", "motor_lag"))]  # fmt: skip
+    scores, marginal, whole = [score(left_out), score(60.0)], [90.0, 40.0], [95.0, 40.0]
+    if pair is not None:
+        both = Hypothesis((candidate("payload", 0), candidate("motor_lag", 1)))
+        fits.append(replace(fits[0], hypothesis=both, x=np.ones(2), start=np.zeros(2)))
+        scores, marginal, whole = [*scores, score(pair[0])], [*marginal, pair[1]], [*whole, pair[1]]
     base = Fit(Hypothesis(), np.zeros(2), np.zeros(0), np.zeros(1), np.zeros((1, 2)), 0.0, np.zeros(0), zero, [])
     return concluded(Material(
-        arena=arena, base=base, refit=score(0.0), fits=tuple(fits), scores=(score(left_out), score(60.0)),  # type: ignore[arg-type]
+        arena=arena, base=base, refit=score(0.0), fits=tuple(fits), scores=tuple(scores),  # type: ignore[arg-type]
         responses=(), chance=5.0, no_gap=NoGap(0.02, 0.03, 0.01, 0.0), wider=1.0, left=Left(50.0, left, 1.0),
-        unexplained=unexplained, groups=arena.gait, calibration=by, chronic=np.zeros(2),
-        marginal=np.array([90.0, 40.0]), whole=np.array([90.0, 40.0]), asked=("payload", "motor_lag"),
+        unexplained=unexplained, groups=arena.gait, calibration=by, chronic=np.zeros(len(fits)),
+        marginal=np.array(marginal), whole=np.array(whole), asked=("payload", "motor_lag"),
         parity={"motor_lag": {None: parity}, "payload": {None: of_payload}},
     ))  # fmt: skip
 
@@ -101,3 +109,25 @@ def test_a_stranger_takes_its_share_of_all_names() -> None:
     assert p["unknown"] > 0.5 > before["unknown"]
     assert said(BY, left=4.5).verdict == "unknown" and said(BY, left=4.3).verdict == "effect"
     assert said(BY, left=4.5, unexplained=-np.inf).verdict == "effect"
+
+
+def test_what_a_second_effect_adds_counts_beyond_six_nats_a_piece() -> None:
+    """A lag beside a payload of 20 nats left out: of 12 nats more in each of the pieces more than half counts, and on
+    all data everything. What single effects gain is what it is without the pair."""
+    alone, beside = said(BY), said(BY, pair=(20.0 + 12.0 * STRETCHES, 195.0))
+    (pair,) = beside.pairs
+    payload = next(one for one in beside.ranking if one.effect == "payload")
+    assert pair.effects == ("payload", "motor_lag")
+    assert ENOUGH * STRETCHES < pair.added < 12.0 * STRETCHES
+    assert pair.gain == pytest.approx(payload.gain + pair.added)
+    assert pair.marginal == pytest.approx(90.0 + 100.0)
+    gains = [{one.effect: (one.gain, one.marginal) for one in found.ranking} for found in (alone, beside)]
+    assert gains[0] == gains[1]
+
+
+def test_a_pair_that_breaks_off_adds_nothing() -> None:
+    """Not a number would make every probability none."""
+    (pair,) = said(BY, pair=(-np.inf, -np.inf)).pairs
+    assert pair.added == -np.inf
+    found = said(BY, pair=(-np.inf, -np.inf))
+    assert sum(one.probability for one in found.ranking) == pytest.approx(1.0) and found.effects == ("payload",)

@@ -48,8 +48,11 @@ def test_laplace_is_exact_where_everything_is_linear(planted: float, monkeypatch
     )
     assert found == pytest.approx([more - plain, 0.0], abs=1e-9)
     assert (found[0] > 0) == (planted > 0.3)
-    # Of 8 pieces with five numbers each none says as much as is too much.
-    assert gains.counted == pytest.approx(found, abs=0.6 if planted < 3 else np.inf)
+    # Of 8 pieces with five numbers each none says too much of what is small, and all of them of what is large.
+    if planted < 3:
+        assert gains.counted == pytest.approx(found, abs=0.6)
+    else:
+        assert ENOUGH < gains.counted[0] < 8 * ENOUGH < found[0]
 
 
 @pytest.mark.parametrize("pieces", [4, 20])
@@ -83,3 +86,13 @@ def test_a_pair_counts_its_first_effect_and_all_that_the_second_adds() -> None:
     found = both.with_pairs(0, np.array([60.0]))
     assert found.whole == pytest.approx([34.0, 4.0, 60.0])
     assert found.counted == pytest.approx([9.0, 4.0, 9.0 + 26.0])
+
+
+def test_a_fit_that_breaks_off_gains_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where it cannot be simulated its cost is infinite: it counts as no number would, and spoils no other fit."""
+    solver(monkeypatch, pieces=4)
+    base, good = (SimpleNamespace(cost=cost, hypothesis=SimpleNamespace(stack=lambda _: np.zeros(0)), H=np.eye(0),
+                                  residual=np.full(ROWS, r)) for cost, r in ((80.0, 2.0), (20.0, 1.0)))  # fmt: skip
+    broken = SimpleNamespace(**{**vars(good), "cost": np.inf, "residual": np.r_[np.full(ROWS - 1, 1.0), np.inf]})
+    found = marginal.marginal_gains(None, base, [broken, good])  # type: ignore[arg-type, list-item]
+    assert found.counted[0] == -np.inf and 0 < found.counted[1] < 4 * ENOUGH + 0.1

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.parity.finding import Element
+from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH
 from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Hypothesis
-from r2s2r_cli.stages.diagnose.which.mixture import ENOUGH, FACTORS, density, minus_log, weight
+from r2s2r_cli.stages.diagnose.which.mixture import ENOUGH as OF_A_FIT, FACTORS, density, minus_log, weight
 from r2s2r_cli.stages.diagnose.which.rivals import chance, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score, gains, scores
 from r2s2r_cli.stages.diagnose.which.screen import Response, screen
@@ -139,7 +140,7 @@ def test_one_bad_stretch_does_not_decide() -> None:
 
     assert cost(0.8) == pytest.approx(whole(0.8))
     assert whole(1e4) - whole(1.0) > 200
-    assert cost(1e4) - cost(1.0) < ENOUGH * np.log1p(400 / ENOUGH)
+    assert cost(1e4) - cost(1.0) < OF_A_FIT * np.log1p(400 / OF_A_FIT)
     assert cost(1e4) - cost(0.9e4) < 1.0
 
 
@@ -164,7 +165,7 @@ def test_a_piece_that_one_hypothesis_explains_is_one_vote() -> None:
         for elpd in ([-500.0, 0.0, 0.0, 0.0], [0.0, -3.0, -3.0, -3.0], [-500.0, 9.0, 9.0, 9.0])
     )
     found = gains(refit, [lucky, right])
-    assert found[1] > 15 > found[0] > 0
+    assert found[1] > 15 > ENOUGH > found[0] > 0
 
 
 def test_equivalence_needs_data() -> None:

@@ -32,9 +32,9 @@ class Calibration:
     the catalogue is enough, and `unknown` has at least unfit_share.
     commit: probability from which an effect is the verdict.
     cautious: the lesser of both counts alone.
-    conformal: names whose probability is at least this are in the 90 % set. words: where it comes from; sets: how many
-    it rests on, 0 for the defaults. lapse: how often the evidence says nothing of the truth, so that no name is ever
-    certain.
+    conformal: names whose probability is at least this are in the 90 % set, one in fifty or more. words: where it comes
+    from; sets: how many it rests on, 0 for the defaults. lapse: how often the evidence says nothing of the truth, so
+    that no name is ever certain.
     """
 
     temperature: float = 25.0

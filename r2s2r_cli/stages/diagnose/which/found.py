@@ -74,10 +74,10 @@ class Screened:
 class Which:
     """verdict: effect | pair | ambiguous | no_gap | unknown. effects: ids it commits to. probability: of them;
     of `no_gap` the confidence of its bound. pairs: two effects at once, best first.
-    set90: names that hold the truth with 90 %. ranking: best first. chance: gain that the best of the catalogue reaches
-    by chance in one of twenty cases [nats]. wider: by how much the floor must grow to explain what the best effect
-    leaves; unexplained: what that gains [nats]. left: what today's runs cost more than healthy ones. within: groups
-    that were left out, in words. calibrated: where probabilities come from.
+    set90: names that hold the truth (`Calibration.conformal`). ranking: best first. chance: gain that the best of the
+    catalogue reaches by chance in one of twenty cases [nats]. wider: by how much the floor must grow to explain what
+    the best effect leaves; unexplained: what that gains [nats]. left: what today's runs cost more than healthy ones.
+    within: groups that were left out, in words. calibrated: where probabilities come from.
     """
 
     verdict: str

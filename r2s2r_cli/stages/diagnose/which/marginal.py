@@ -45,7 +45,12 @@ def marginal_gains(arena: Arena, base: Fit, fits: Sequence[Fit]) -> Gains:
     nominal = _log_marginal(solver, base)
     whole = np.array([_log_marginal(solver, fit) - nominal for fit in fits])
     pieces = -solver.nats(np.array([base.residual, *(fit.residual for fit in fits)]))
-    return Gains(whole + gains_over_first(pieces) - (pieces[1:] - pieces[0]).sum(axis=1), whole)
+    kept = np.isfinite(pieces).all(axis=1)  # the others break off at a piece
+    kept[0] = True
+    counted = np.full(len(fits), -np.inf)
+    own = pieces[kept]
+    counted[kept[1:]] = whole[kept[1:]] + gains_over_first(own) - (own[1:] - own[0]).sum(axis=1)
+    return Gains(counted, whole)
 
 
 def _log_marginal(solver: Fits, fit: Fit) -> float:

@@ -28,8 +28,9 @@ LARGEST = 60.0
 
 @dataclass(frozen=True)
 class TwoCauses:
-    """Two effects fitted together, the better single one first. gain: held out, over the refit nominal model
-    [nats]; marginal: on all data, as `marginal_gains` [nats]; added: the less of what the second one adds to both."""
+    """Two effects fitted together, the better single one first. gain: held out, over the refit nominal model: what the
+    first one alone gains and what the second adds, at most ENOUGH_OF_TWO a piece [nats]; marginal: the same on all
+    data, where all of it counts [nats]; added: the less of what the second one adds to both."""
 
     effects: tuple[str, str]
     gain: float
@@ -41,8 +42,8 @@ def with_pairs(
     probability: Mapping[str, float], pairs: Sequence[TwoCauses], alone: Mapping[str, float], chance: float,
 ) -> tuple[dict[str, float], tuple[str, str] | None]:  # fmt: skip
     """Probabilities of names once pairs are possible, and the pair that is likelier than its first effect alone, None
-    for none. alone: held-out gains of single effects [nats]; chance: what the best of the catalogue gains by chance
-    [nats]."""
+    for none. alone: held-out gains of single effects, bounded as those of pairs [nats]; chance: what the best of the
+    catalogue gains by chance [nats]."""
     found, believed = dict(probability), None
     best = 0.0
     for pair in pairs:

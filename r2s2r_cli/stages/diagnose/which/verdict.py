@@ -91,7 +91,7 @@ def concluded(m: Material) -> Which:
 def _left_out_gains(m: Material, which: Sequence[int], enough: float) -> list[float]:
     """Of some fits, less what was there before."""
     found = gains_of(m.refit, [m.scores[i] for i in which], enough) - m.chronic[list(which)]
-    return np.where(np.isnan(found), -np.inf, found).tolist()  # type: ignore[no-any-return]  # nan: all break off at one piece
+    return np.where(np.isnan(found), -np.inf, found).tolist()  # nan: all break off at one piece
 
 
 def _two(
@@ -101,8 +101,9 @@ def _two(
     first, second = m.fits[i].hypothesis.effects
     alone = best[first]
     left_out = of_two[i] - of_two[alone]
-    added = min(left_out, float(m.whole[i] - m.whole[alone]))
-    return TwoCauses((first, second), gains[alone] + left_out, float(m.marginal[i]), added)
+    all_data = float(m.whole[i] - m.whole[alone])
+    added = min(left_out, all_data) if np.isfinite([left_out, all_data]).all() else -np.inf
+    return TwoCauses((first, second), gains[alone] + left_out, float(m.marginal[alone]) + all_data, added)
 
 
 def _not_fitted(m: Material, fitted: Mapping[str, float]) -> list[Ranked]:

@@ -103,7 +103,8 @@ def compare_effects(
         arena=arena, base=base, refit=refit, fits=tuple(fits), scores=tuple(own), responses=responses,
         chance=by_chance, no_gap=no_gap(refit, floor_m, kept=kept), wider=wider,
         left=left(at_least, arena.sizes, refit, own, healthy),
-        unexplained=unexplained, groups=groups, calibration=calibration, chronic=old, marginal=said.counted, whole=said.whole,
+        unexplained=unexplained, groups=groups, calibration=calibration, chronic=old, marginal=said.counted,
+        whole=said.whole,
         asked=None if effects is None else tuple(effects), parity=told_by or {},
     )  # fmt: skip
     which = concluded(material)

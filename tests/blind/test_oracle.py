@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.blind.make import oracle
-from r2s2r_cli.blind.make.oracle import MOST, _Looks, _Told
+from r2s2r_cli.blind.make.looks import Looks
+from r2s2r_cli.blind.make.oracle import MOST, _Told
 from r2s2r_cli.blind.make.worlds import Hidden, hidden
 from r2s2r_cli.blind.split import Bank, Kind
 
 INTERVALS, LOOKS, CAPS, CABLES = 4, 12, 6, 9
-Run = list[list[_Looks]]
+Run = list[list[Looks]]
 
 
 def world() -> Hidden:
@@ -28,7 +29,7 @@ def looks(by: dict[int, float] | None = None, *, moved: int | None = None) -> Ru
     if moved is not None:
         drawn = np.random.default_rng(moved).normal(0.0, 1e-5, drawn.shape)
     return [[
-        _Looks(t, p + drawn[k], np.outer(t / t[-1], np.full(CABLES, (by or {}).get(k, 0.0))))
+        Looks(t, p + drawn[k], np.outer(t / t[-1], np.full(CABLES, (by or {}).get(k, 0.0))))
         for k in range(INTERVALS)
     ]]  # fmt: skip
 

@@ -21,33 +21,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from r2s2r_cli.blind.make.body import body_of
 from r2s2r_cli.blind.make.drive import Driven
-from r2s2r_cli.blind.make.observe import through
-from r2s2r_cli.blind.make.worlds import DAY_SD_M, OFFSET_SHARE, Hidden
+from r2s2r_cli.blind.make.looks import LET_OUT_M, LOOK_S, Looks, recorded, replayed
+from r2s2r_cli.blind.make.worlds import OFFSET_SHARE, Hidden
 from schemas.robot import Robot
 
 FLOOR_M, GROWN_M = 0.002, 0.006
 """Floor of a cap's coordinate [m]: constant over a target interval, and a random walk that has grown to so much at its
 end: what another engine's numerics make of a motion."""
-LENGTH_SD_M, LENGTH_FLOOR_M, LENGTH_GROWN_M = 0.0015, 0.0015, 0.003
-"""The same of a sensor; its noise is a count of its converter, and what its lag makes of a moving cable."""
-LOOK_S = 0.1
-"""Between two instants that are compared."""
+LENGTH_SD_M, LENGTH_GROWN_M = 0.0015, 0.003
+"""Of a sensor [m]: its noise is a count of its converter; a random walk as that of caps, beside LET_OUT_M all along."""
 STEP = 0.05
 """Relative change of friction and speed for their sensitivities."""
 PUSHES = 6
 """Of every interval's start: what of it nobody knows, and how far the robot repeats itself."""
-PUSH_M_PER_S, PUSH_RAD_PER_S, PUSHED_M = 0.02, 0.1, 0.001
-"""Sd of the least push in every coordinate of a rod, and what it comes to: cables stop it within a twentieth of a
-second, a millimetre or a third of a degree away."""
 MINUTE, MINUTES = 0.003, 4
-"""Size of the pushes that are next to nothing, in the least ones, and how many of them there are."""
-START_SHARE = 0.4
-"""Of the camera's noise, to which a start pose is known: errors that stay over an interval are 0.3 of it, and some
-frames before the start leave as much of the rest."""
-LET_OUT_M = float(np.hypot(LENGTH_FLOOR_M, DAY_SD_M))
-"""Of every winch at a start: what its sensor does not tell. It decides when a robot that is about to fall does."""
+"""Size of the pushes that are next to nothing, in units of the least push, and how many of them there are."""
 CLOCK_S = 0.005
 """Floor of time: on a ramp two engines, and two clocks, differ as fast as the ramp."""
 MOST = 10.0
@@ -71,16 +60,6 @@ class Detectable:
 
 
 @dataclass(frozen=True)
-class _Looks:
-    """Of one interval, every LOOK_S: t [s], (look,); p: end caps as placed [m], (look, cap, 3); length [m], (look,
-    cable)."""
-
-    t: np.ndarray
-    p: np.ndarray
-    length: np.ndarray
-
-
-@dataclass(frozen=True)
 class _Reach:
     """Floor at the end of an interval of a coordinate of a cap, and of a length [m]."""
 
@@ -91,20 +70,20 @@ class _Reach:
 def detectability(robot: Robot, hidden: Hidden, runs: list[Driven]) -> Detectable:
     """Of a set whose gaits ran as `runs`. Raises NumericalError as the rig does."""
     plain = hidden.healthy()
-    base = [_replayed(robot, plain, run, g) for g, run in enumerate(runs)]
-    rub = [_replayed(robot, replace(plain, friction=plain.friction * (1 + STEP)), run, g) for g, run in enumerate(runs)]
-    fast = [_replayed(robot, replace(plain, speed=plain.speed * (1 + STEP)), run, g) for g, run in enumerate(runs)]
+    base = [replayed(robot, plain, run, g) for g, run in enumerate(runs)]
+    rub = [replayed(robot, replace(plain, friction=plain.friction * (1 + STEP)), run, g) for g, run in enumerate(runs)]
+    fast = [replayed(robot, replace(plain, speed=plain.speed * (1 + STEP)), run, g) for g, run in enumerate(runs)]
     rng = np.random.default_rng([hidden.seed, 17])
-    pushed = [[_replayed(robot, plain, run, g, rng) for g, run in enumerate(runs)] for _ in range(PUSHES)]
-    minute = [[_replayed(robot, plain, run, g, rng, MINUTE) for g, run in enumerate(runs)] for _ in range(MINUTES)]
-    whole, later = ([_recorded(hidden, run, g, by) for g, run in enumerate(runs)] for by in (0.0, CLOCK_S))
+    pushed = [[replayed(robot, plain, run, g, rng) for g, run in enumerate(runs)] for _ in range(PUSHES)]
+    minute = [[replayed(robot, plain, run, g, rng, MINUTE) for g, run in enumerate(runs)] for _ in range(MINUTES)]
+    whole, later = ([recorded(hidden, run, g, by) for g, run in enumerate(runs)] for by in (0.0, CLOCK_S))
     told = _Told(hidden, base, (rub, fast), pushed, (whole, later), minute)
     d, gap = told(whole)
     d = float(np.hypot(d, _lost(hidden, runs)))
     each = []
     for one in hidden.planted:
         alone = replace(hidden, planted=(one,))
-        apart = [_replayed(robot, alone, run, g) for g, run in enumerate(runs)] if len(hidden.planted) > 1 else whole
+        apart = [replayed(robot, alone, run, g) for g, run in enumerate(runs)] if len(hidden.planted) > 1 else whole
         each.append(float(np.hypot(told(apart)[0], _lost(alone, runs))))
     return Detectable(d, tuple(each), 1e3 * gap)
 
@@ -121,9 +100,9 @@ class _Told:
     """The length of a difference from `base` off the nuisances."""
 
     def __init__(
-        self, hidden: Hidden, base: list[list[_Looks]], varied: tuple[list[list[_Looks]], ...],
-        pushed: list[list[list[_Looks]]], clocks: tuple[list[list[_Looks]], list[list[_Looks]]],
-        minute: list[list[list[_Looks]]],
+        self, hidden: Hidden, base: list[list[Looks]], varied: tuple[list[list[Looks]], ...],
+        pushed: list[list[list[Looks]]], clocks: tuple[list[list[Looks]], list[list[Looks]]],
+        minute: list[list[list[Looks]]],
     ) -> None:  # fmt: skip
         self._hidden, self._base = hidden, base
         # The pushes of an interval are few directions of many: how far they reach counts in all of them.
@@ -140,7 +119,7 @@ class _Told:
         self._own = [_poses(looks) for run in base for looks in run]
         self._by_nothing = np.mean([self._squares(one) for one in minute], axis=0)
 
-    def __call__(self, other: list[list[_Looks]]) -> tuple[float, float]:
+    def __call__(self, other: list[list[Looks]]) -> tuple[float, float]:
         """d, and the root mean square at key frames [m]."""
         last = [(b.p[-1] - a.p[-1]).ravel() for x, y in zip(self._base, other, strict=True)
                 for a, b in zip(x, y, strict=True)]  # fmt: skip
@@ -148,7 +127,7 @@ class _Told:
         each = np.minimum(each, np.sort(each)[-2:][0])
         return float(np.sqrt(each.sum())), float(np.sqrt(3 * np.mean(np.concatenate(last) ** 2)))
 
-    def _squares(self, other: list[list[_Looks]]) -> np.ndarray:
+    def _squares(self, other: list[list[Looks]]) -> np.ndarray:
         """Square of what is left of every interval, MOST at most, (interval,)."""
         white = self._white(other)
         r = np.concatenate([part for part, _ in white])
@@ -171,7 +150,7 @@ class _Told:
         of_known = (left[len(r) :] ** 2).reshape(len(white), -1).sum(axis=1)
         return np.asarray(np.minimum(np.add.reduceat(left[: len(r)] ** 2, begins) + of_known, MOST**2))
 
-    def _white(self, other: list[list[_Looks]]) -> list[tuple[np.ndarray, int]]:
+    def _white(self, other: list[list[Looks]]) -> list[tuple[np.ndarray, int]]:
         """Whitened difference from the base of every interval, and how much of it is caps."""
         found = []
         for mine, theirs, reach in zip(self._base, other, self._grown, strict=True):
@@ -198,73 +177,17 @@ def _root(n: int, sd: float, ar: float, constant: float, grown: float) -> np.nda
     return np.asarray(np.linalg.cholesky(sd**2 * np.where(lag == 0, 1.0, ar**lag) + constant**2 + walk))
 
 
-def _reach(base: _Looks, pushed: list[_Looks]) -> _Reach:
+def _reach(base: Looks, pushed: list[Looks]) -> _Reach:
     """Of engines, and of how far pushes carry them: what a fall is to the caps it is to the cables."""
     caps = np.sqrt(np.mean([(one.p[-1] - base.p[-1]) ** 2 for one in pushed]))
     length = np.sqrt(np.mean([(one.length[-1] - base.length[-1]) ** 2 for one in pushed]))
     return _Reach(float(np.hypot(GROWN_M, caps)), float(np.hypot(LENGTH_GROWN_M, length)))
 
 
-def _poses(looks: _Looks) -> np.ndarray:
+def _poses(looks: Looks) -> np.ndarray:
     """Sensitivity of the caps to x, y [1] and heading [m/rad] at the start, (look, coordinate, 3)."""
     about = looks.p - looks.p[0].mean(axis=0)
     turned = np.stack([-about[..., 1], about[..., 0], np.zeros_like(about[..., 0])], axis=-1)
     x, y = np.zeros_like(about), np.zeros_like(about)
     x[..., 0], y[..., 1] = 1.0, 1.0
     return np.stack([one.reshape(len(looks.t), -1) for one in (x, y, turned)], axis=-1)
-
-
-def _recorded(hidden: Hidden, run: Driven, gait: int, later: float = 0.0) -> list[_Looks]:
-    """What really happened, seen by the camera of that world without noise. later: by a clock so far off [s]."""
-    camera = hidden.world(gait, run.gait.position, run.gait.heading).seen()
-    late = camera.clock.stamp_delay_s
-    found = []
-    for t in _times(run):
-        at = _between(t - late + later, run.t, run.caps)
-        found.append(_Looks(t, through(camera, t - late, at), _between(t + later, run.t, run.sensed)))
-    return found
-
-
-def _replayed(
-    robot: Robot, hidden: Hidden, run: Driven, gait: int, pushes: np.random.Generator | None = None,
-    size: float | None = None,
-) -> list[_Looks]:  # fmt: skip
-    """Every interval of a run in another world, from its true start under its duties. pushes: draws what a start is
-    pushed by; size: of the push, in the least; None: as well as the camera's noise tells a start."""
-    body = body_of(robot, hidden, gait, run.gait.position, run.gait.heading)
-    world = hidden.world(gait, run.gait.position, run.gait.heading)
-    camera, late = world.seen(), world.seen().clock.stamp_delay_s
-    found = []
-    for t, moment, first in zip(_times(run), run.moments, run.starts, strict=True):
-        body.restore(moment)
-        if pushes is not None:
-            rods, by = run.caps.shape[1] // 2, size or max(1.0, START_SHARE * hidden.noise_m / PUSHED_M)
-            body.push(by * PUSH_M_PER_S * pushes.standard_normal((rods, 3)),
-                      by * PUSH_RAD_PER_S * pushes.standard_normal((rods, 3)),
-                      (size or 1.0) * LET_OUT_M * pushes.standard_normal(len(robot.actuated)))  # fmt: skip
-        k, now = int(first), float(run.t[first])
-        p, length = [], []
-        for due in t:
-            while k < len(run.t) and run.t[k] <= due + 1e-9:
-                body.advance(float(run.t[k]) - now, run.duty[k - 1] if k > first else run.duty[k])
-                now = float(run.t[k])
-                k += 1
-            body.advance(float(due) - now, run.duty[k - 1])
-            now = float(due)
-            p.append(body.caps())
-            length.append(body.sensed())
-        caps = _between(np.maximum(t - late, t[0]), t, np.array(p))
-        found.append(_Looks(t, through(camera, t - late, caps), np.array(length)))
-    return found
-
-
-def _times(run: Driven) -> list[np.ndarray]:
-    """Instants that are compared, by interval: from its start, every LOOK_S, and its end [s]."""
-    ends = [*run.t[run.starts[1:]], run.t[-1]]
-    return [np.append(np.arange(a, b - LOOK_S / 2, LOOK_S), b) for a, b in zip(run.t[run.starts], ends, strict=True)]
-
-
-def _between(t: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Values (known, ...) at times t by straight lines, constant beyond the ends."""
-    flat = values.reshape(len(known), -1)
-    return np.stack([np.interp(t, known, column) for column in flat.T], axis=-1).reshape(len(t), *values.shape[1:])

@@ -1,4 +1,4 @@
-"""How target intervals look: as they were recorded, or simulated again in another world, from their starts or pushed."""
+"""How target intervals look: as recorded, or simulated again in another world, from their starts or pushed ones."""
 
 from __future__ import annotations
 

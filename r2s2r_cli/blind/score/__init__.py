@@ -116,26 +116,25 @@ def _cases(pool: Pool) -> list[tuple[Truth, Case]]:
 
 def _calibration(pool: Pool, where: str, older: Sequence[Path]) -> dict[str, Any]:
     _must_teach(pool, where)
-    before = pooled([read_published(path) for path in older]) if older else None
-    if before is not None:
-        _must_teach(before, ", ".join(map(str, older)))
-        twice = {one.index_sha256 for one in pool.shards} & {one.index_sha256 for one in before.shards}
-        if twice:
-            raise InputError(
-                "a shard teaches twice", where="--older", expected="other shards than those that teach all",
-                received=", ".join(sorted(twice)),
-                hint="r2s2r blind calibrate --published FILE --older OTHER --out calibration.json",
-            )  # fmt: skip
     cases = [one for _, one in _cases(pool)]
-    banks = " + ".join(one.index_sha256[:12] for one in pool.shards)
-    words = f"{len(cases)} sets of the calibration bank {banks}"
-    if before is None:
+    words = f"{len(cases)} sets of the calibration bank {_banks(pool)}"
+    if not older:
         return calibrated(cases, words=words)
-    others = " + ".join(one.index_sha256[:12] for one in before.shards)
-    return calibrated(
-        cases, words=f"{words}; what the best effect may leave from {others} too",
-        older=[one for _, one in _cases(before)],
-    )  # fmt: skip
+    before = pooled([read_published(path) for path in older])
+    _must_teach(before, ", ".join(map(str, older)))
+    twice = {one.index_sha256 for one in pool.shards} & {one.index_sha256 for one in before.shards}
+    if twice:
+        raise InputError(
+            "a shard teaches twice", where="--older", expected="other shards than those that teach all",
+            received=", ".join(sorted(twice)),
+            hint="r2s2r blind calibrate --published FILE --older OTHER --out calibration.json",
+        )  # fmt: skip
+    words = f"{words}; what the best effect may leave from {_banks(before)} too"
+    return calibrated(cases, words=words, older=[one for _, one in _cases(before)])
+
+
+def _banks(pool: Pool) -> str:
+    return " + ".join(one.index_sha256[:12] for one in pool.shards)
 
 
 def _score(pool: Pool, again: Sequence[Path]) -> BlindScoreResult:

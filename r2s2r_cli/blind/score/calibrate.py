@@ -111,7 +111,7 @@ def calibrated(cases: Sequence[Case], *, words: str, older: Sequence[Case] = ())
         "none": learned["none"] / sharp,
         **dict(zip(("stranger", "wider"), own.strange.tolist(), strict=True)),
         "few": FEW,
-        **(_unfit([*cases, *older]) if older else own.unfit),
+        **_unfit([*cases, *older]),
         "commit": own.commit,
         "conformal": max(float(held[k - 1]) if k else 0.0, LEAST_LIKELY),
         "lapse": LAPSE,

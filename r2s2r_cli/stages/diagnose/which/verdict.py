@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -45,8 +45,7 @@ def concluded(m: Material) -> Which:
     best: dict[str, int] = {}
     for i in sorted(singles, key=lambda i: -worth[i]):
         best.setdefault(m.fits[i].hypothesis.effects[0], i)
-    names = {name: gains[i] for name, i in best.items()}
-    others = _not_fitted(m, names)
+    others = _not_fitted(m, best)
     table = {name: worth[i] for name, i in best.items()}
     table |= {one.effect: calibration.score(one.effect, parity=one.parity) for one in others}
     table[NONE] = calibration.score(NONE)
@@ -83,7 +82,7 @@ def concluded(m: Material) -> Which:
         confusable=confusable(m, [i for i in best.values() if m.fits[i].moved][:ALIKE]),
         not_testable=_not_testable(m.responses), shifts=() if top is None else _shifts(m, m.fits[top]),
         within=_left_out(m), calibrated=calibration.words,
-        warnings=(*unwitnessed(ranking, calibration, pair), *warnings_of(m, [best[name] for name in names])),
+        warnings=(*unwitnessed(ranking, calibration, pair), *warnings_of(m, list(best.values()))),
         pairs=tuple(both),
     )  # fmt: skip
 
@@ -106,7 +105,7 @@ def _two(
     return TwoCauses((first, second), gains[alone] + left_out, float(m.marginal[alone]) + all_data, added)
 
 
-def _not_fitted(m: Material, fitted: Mapping[str, float]) -> list[Ranked]:
+def _not_fitted(m: Material, fitted: Container[str]) -> list[Ranked]:
     """Effects that the screening left out, and those that change no prediction. They gain nothing, or lose what the
     screening says; the parity stage may speak for them all the same."""
     screened: dict[str, float] = {name: 0.0 for name in NO_REPLAY if m.asked is None or name in m.asked}

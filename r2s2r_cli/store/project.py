@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -64,7 +65,7 @@ class Project:
             where=str(origin),
             expected=f"a directory with {PROJECT_FILE}" + ("" if explicit else ", here or above"),
             received="none",
-            hint="r2s2r init myrobot && cd myrobot",
+            hint="r2s2r init myrobot && cd myrobot" if explicit else _into(origin),
         )
 
     @property
@@ -161,6 +162,15 @@ class Project:
     def journals(self) -> list[Path]:
         """Recordings that were not sealed."""
         return sorted((self.root / ITERATIONS).glob(f"*/*{JOURNAL_SUFFIX}"))
+
+
+def _into(folder: Path) -> str:
+    """How to come to a project from a folder above it: into the first one that lies there, else by a new one."""
+    try:
+        below = sorted(one.name for one in folder.iterdir() if (one / PROJECT_FILE).is_file())
+    except OSError:
+        below = []
+    return f"cd {shlex.quote(below[0])}" if below else "r2s2r init myrobot && cd myrobot"
 
 
 def root_of(path: Path) -> Path | None:

@@ -1,0 +1,41 @@
+"""A project is found from inside it, and from above it one is shown the way into it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.store.project import PROJECT_FILE, Project
+
+NEW = "r2s2r init myrobot && cd myrobot"
+
+
+def hinted(folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """What a command that is given in this folder hints, where it finds no project."""
+    monkeypatch.chdir(folder)
+    with pytest.raises(ArtifactError) as raised:
+        Project.find()
+    assert raised.value.where == str(folder)
+    return raised.value.hint
+
+
+def test_from_above_the_way_leads_into_the_first_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One of several is enough, and its name may have spaces."""
+    assert hinted(tmp_path, monkeypatch) == NEW
+    (tmp_path / "notes").mkdir()
+    assert hinted(tmp_path, monkeypatch) == NEW
+    for name in ("second robot", "first robot"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / PROJECT_FILE).touch()
+    assert hinted(tmp_path, monkeypatch) == "cd 'first robot'"
+
+
+def test_a_project_that_was_named_is_not_looked_for_elsewhere(tmp_path: Path) -> None:
+    """`--project` says which one is meant."""
+    (tmp_path / "robot").mkdir()
+    (tmp_path / "robot" / PROJECT_FILE).touch()
+    with pytest.raises(ArtifactError) as raised:
+        Project.find(tmp_path)
+    assert raised.value.hint == NEW

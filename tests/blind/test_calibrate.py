@@ -134,10 +134,12 @@ def test_a_verdict_becomes_a_case() -> None:
     }  # fmt: skip
     one = case(truth_of(label), document)
     assert one is not None and one.names == ("payload", "motor_lag", "dropout", "none") and one.truth == "payload"
-    assert one.said.tolist() == [11.0, 0.0, 0.0, 0.0] and one.parity.tolist() == [2.5, 8.0, 95.0, 0.0]
+    assert one.said.tolist() == [11.0, 0.0, 0.0, 0.0] and one.parity.tolist() == [2.5, 95.0, 95.0, 0.0]
     assert one.strange == pytest.approx(np.log(4.0)) and one.left_sd == 2.0
     assert one.left_out is not None and one.left_out.tolist() == [0.0, 3.0, 0.0, 0.0]
     assert one.gain.tolist() == pytest.approx([(1.0 - HELD) * 11.0, HELD * 3.0, 0.0, 0.0])
+    assert one.heard.tolist() == pytest.approx([2.5, HELD * 3.0, 95.0, 0.0])  # no replay tells of a dropout
+    assert replace(one, replayed=False).heard[1] == 95.0
     assert one.may_name("payload") and one.may_name("motor_lag") and not one.may_name("none")
     assert not replace(one, parity=np.zeros(4)).may_name("payload")
     pair = next(each for each in blind_bank.bank() if each["kind"] == "pair" and each["d"] > 3)

@@ -1,11 +1,11 @@
 """From verdicts on a calibration bank to the numbers that turn gains into probabilities.
 
 Where the catalogue has the cause, p(name) ~ exp(score / temperature): of an effect what it gains, on all data together
-and for a part (HELD) on gaits that were left out, and `parity` times what the parity stage says for it, of `none` one
-number. Linear in 1 / temperature and the products with it: a multinomial regression, in which any name is the truth
-once in 50 sets (LAPSE). How probable it is that the catalogue does not have the cause is a regression of its own, on
-what a wider floor explains: how much is left under the best effect says nothing of that, but for what strangers alone
-leave (`unfit`).
+and for a part (HELD) on gaits that were left out, and `parity` times what counts of what the parity stage says for it,
+of `none` one number. Linear in 1 / temperature and the products with it: a multinomial regression, in which any name is
+the truth once in 50 sets (LAPSE). How probable it is that the catalogue does not have the cause is a regression of its
+own, on what a wider floor explains: how much is left under the best effect says nothing of that, but for what strangers
+alone leave (`unfit`).
 
 Thresholds come from probabilities of sets left out of the fit. That of names is for sets in which the catalogue has the
 cause; how often strangers are taken for one of them is another figure.
@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from r2s2r_cli.blind.score.cases import FEW, HELD, MOST, Case
+from r2s2r_cli.blind.score.cases import FEW, HELD, Case
 from r2s2r_cli.blind.score.facts import NONE, UNKNOWN
 from r2s2r_cli.errors import InputError
 from schemas.results_diagnose import BY_CHANCE
@@ -106,7 +106,6 @@ def calibrated(cases: Sequence[Case], *, words: str, older: Sequence[Case] = ())
         "temperature": 1.0 / sharp,
         "parity": learned["parity"] / sharp,
         "by_chance": BY_CHANCE,
-        "most": MOST,
         "held": HELD,
         "none": learned["none"] / sharp,
         **dict(zip(("stranger", "wider"), own.strange.tolist(), strict=True)),
@@ -145,7 +144,7 @@ def _design(one: Case) -> np.ndarray:
     """What multiplies LEARNED in the exponent of every name, (name, LEARNED)."""
     none = np.array([name == NONE for name in one.names])
     return np.stack(
-        [np.where(none, 0.0, one.gain * SHARPNESS), np.where(none, 0.0, one.parity), none.astype(float)], axis=1
+        [np.where(none, 0.0, one.gain * SHARPNESS), np.where(none, 0.0, one.heard), none.astype(float)], axis=1
     )
 
 

@@ -86,7 +86,7 @@ def _row(what: str, found: Sequence[Ranked], everything: Sequence[Ranked]) -> Bl
 
 
 def _parity_alone(one: Case) -> Case:
-    return replace(one, said=np.zeros_like(one.said), left_out=None, strange=0.0, left_sd=0.0)
+    return replace(one, said=np.zeros_like(one.said), left_out=None, strange=0.0, left_sd=0.0, replayed=False)
 
 
 def _all_data_alone(one: Case) -> Case:

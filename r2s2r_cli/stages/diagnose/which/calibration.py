@@ -22,10 +22,9 @@ class Calibration:
     """What turns evidence into probabilities.
 
     temperature [nats]: of the softmax over `none` and the effects. parity: nats of gain that a nat of the parity stage
-    is worth, which needs no simulator and errs far less, beyond by_chance [nats], which it says for the best of a whole
-    catalogue where nothing is wrong; most [nats]: of them that count, since a finding that stands out says that
-    something is wrong, and which of its look-alikes it is the replay tells better, where there is one. held: share of a
-    gain that left-out gaits must say, the rest is of all data. none [nats]: what the best effect must exceed.
+    is worth, which needs no simulator, beyond by_chance [nats], which it says for the best of a whole catalogue where
+    nothing is wrong; where a replay can tell, no more of them than the effect gains in it. held: share of a gain that
+    left-out gaits must say, the rest is of all data. none [nats]: what the best effect must exceed.
     stranger: log odds of a cause that the catalogue does not have; wider: by what ln(1 + x / few) raises them, x what a
     wider floor gains beside the best effect [nats]; few [nats]: from about where on it says something.
     unfit: how far beyond those of healthy runs pieces may lie under the best effect of each [sd]: farther, no effect of
@@ -40,7 +39,6 @@ class Calibration:
     temperature: float = 25.0
     parity: float = 15.0
     by_chance: float = 0.0
-    most: float = float("inf")
     held: float = 0.3
     none: float = 20.0
     stranger: float = -2.0
@@ -58,14 +56,15 @@ class Calibration:
     def score(self, name: str, marginal: float = 0.0, *, left_out: float = 0.0, parity: float = 0.0) -> float:
         """What a name is worth [nats]. marginal: what the effect gains on all data, left_out: on gaits that were left
         out; nothing where it loses: how much it would harm does not say how little it is there. parity: what the parity
-        stage says for it."""
+        stage says for it: a finding is an error of the comparison where an effect that would show in the replay gains
+        nothing there (ADR 19)."""
         if name == NONE:
             return self.none
         if self.cautious:
             marginal = left_out = min(marginal, left_out)
-        most = float("inf") if name in NO_REPLAY else self.most
         gain = (1.0 - self.held) * max(marginal, 0.0) + self.held * max(left_out, 0.0)
-        return gain + self.parity * min(max(parity - self.by_chance, 0.0), most)
+        heard = max(parity - self.by_chance, 0.0)
+        return gain + self.parity * (heard if name in NO_REPLAY else min(heard, gain))
 
     def witnessed(self, left_out: float, parity: float) -> bool:
         """Whether anything speaks for an effect that did not help to fit it: gaits that were left out, or the parity

@@ -107,7 +107,7 @@ def _two(
 
 def _not_fitted(m: Material, fitted: Container[str]) -> list[Ranked]:
     """Effects that the screening left out, and those that change no prediction. They gain nothing, or lose what the
-    screening says; the parity stage may speak for them all the same."""
+    screening says; for those that no replay tells the parity stage may speak all the same."""
     screened: dict[str, float] = {name: 0.0 for name in NO_REPLAY if m.asked is None or name in m.asked}
     for one in m.responses:
         if one.testable:

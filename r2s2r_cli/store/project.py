@@ -23,6 +23,7 @@ MAX_ITERATION = 9999
 """A larger number is a slip of the finger that would become "the latest"."""
 ITERATIONS = "iterations"
 JOURNAL_SUFFIX = ".journal"
+_A_NEW_ONE = "r2s2r init myrobot && cd myrobot"
 _HEAD_KEYS = ("schema_version", "name", "robot", "link")
 
 
@@ -65,7 +66,7 @@ class Project:
             where=str(origin),
             expected=f"a directory with {PROJECT_FILE}" + ("" if explicit else ", here or above"),
             received="none",
-            hint="r2s2r init myrobot && cd myrobot" if explicit else _into(origin),
+            hint=_A_NEW_ONE if explicit else _into(origin),
         )
 
     @property
@@ -170,7 +171,7 @@ def _into(folder: Path) -> str:
         below = sorted(one.name for one in folder.iterdir() if (one / PROJECT_FILE).is_file())
     except OSError:
         below = []
-    return f"cd {shlex.quote(below[0])}" if below else "r2s2r init myrobot && cd myrobot"
+    return f"cd {shlex.quote(below[0])}" if below else _A_NEW_ONE
 
 
 def root_of(path: Path) -> Path | None:

@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from r2s2r_cli.blind.score import calibration_published
 from r2s2r_cli.blind.score.calibrate import LEAST_LIKELY, calibrated, learn
 from r2s2r_cli.blind.score.cases import FEW, HELD, Case, case
 from r2s2r_cli.blind.score.facts import truth_of
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
+from tests.guards.listing import ROOT
 from tests.support import blind_bank
 
 EFFECTS = ("backlash", "payload", "motor_lag", "soft_ground")
@@ -55,6 +57,14 @@ def test_planted_numbers_come_back() -> None:
     assert found["none"] == pytest.approx(TRUE.none, abs=5.0)
     assert found["stranger"] == pytest.approx(TRUE.stranger, abs=0.25)
     assert found["wider"] == pytest.approx(TRUE.wider, abs=0.12)
+
+
+def test_no_shard_teaches_twice() -> None:
+    """As what teaches all and as an older one: its strangers would count twice."""
+    shard = ROOT / "docs/blind/calibration-10.json.gz"
+    with pytest.raises(InputError, match="a shard teaches twice") as raised:
+        calibration_published([shard], older=[shard])
+    assert raised.value.where == "--older" and "2af6f7a4f9cd" in raised.value.received
 
 
 def test_older_sets_teach_only_what_may_be_left() -> None:

@@ -214,9 +214,9 @@ def _settings(items: list[str] | None, without: str | None) -> dict[str, object]
             raise UsageError("a setting has no value", where="--set", expected="KEY=VALUE", received=item,
                              hint="--set with_parity=false")  # fmt: skip
     if without is not None:
-        from r2s2r_cli.effects import CATALOGUE
+        from r2s2r_cli.effects.known import known_effects
 
-        ids = [effect.name for effect in CATALOGUE]
+        ids = [effect.name for effect in known_effects()]
         if without not in ids:
             raise UsageError("the catalogue has no such effect", where="--without", expected=", ".join(ids),
                              received=without, hint="r2s2r effects")  # fmt: skip

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 
 from r2s2r_cli.effects.base import Effect
 from r2s2r_cli.engine.errors import EngineInputError
-
-GROUP = "r2s2r.effects"
-"""The group of entry points. Each names an instance of a subclass of Effect, or the class itself."""
+from r2s2r_cli.installed import GROUP, installed
 
 
 @lru_cache
@@ -19,7 +17,7 @@ def known_effects() -> tuple[Effect, ...]:
     from r2s2r_cli.effects import CATALOGUE
 
     found = list(CATALOGUE)
-    for entry in sorted(entry_points(group=GROUP), key=lambda one: one.name):
+    for entry in installed():
         effect = loaded(entry)
         if effect.name in {one.name for one in found}:
             raise _bad(entry, "an effect of this id is there already", f"another id than {effect.name}", effect.name)

@@ -12,10 +12,11 @@ import pytest
 import torch
 
 from r2s2r_cli.effects import known_effects
-from r2s2r_cli.effects.known import GROUP, loaded
+from r2s2r_cli.effects.known import loaded
 from r2s2r_cli.effects.words import page
 from r2s2r_cli.engine.errors import EngineInputError
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.installed import GROUP
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.effects import all_effects
 from r2s2r_cli.stages.identified import nominal

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from r2s2r_cli.effects import CATALOGUE
 from r2s2r_cli.stages.diagnose.which import verdict as module
 from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
@@ -16,6 +18,7 @@ from r2s2r_cli.stages.diagnose.which.left import Left
 from r2s2r_cli.stages.diagnose.which.material import Material
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap
 from r2s2r_cli.stages.diagnose.which.score import Score
+from r2s2r_cli.stages.diagnose.which.screen import LEAST_RESPONSE, Response
 from r2s2r_cli.stages.diagnose.which.verdict import concluded
 from tests.support.linear_arena import STRETCHES, LinearArena, candidate
 
@@ -38,10 +41,12 @@ def score(gain: float) -> Score:
 
 def said(
     by: Calibration, *, left_out: float = 20.0, left: float = 0.0, unexplained: float = 0.0, parity: float = 0.0,
-    of_payload: float = 0.0, pair: tuple[float, float] | None = None,
+    of_payload: float = 0.0, pair: tuple[float, float] | None = None, screened: tuple[Response, ...] = (),
+    asked: tuple[str, ...] | None = ("payload", "motor_lag"),
 ) -> Which:  # fmt: skip
     """Of a payload with 90 nats on all data and 20 left out, and a lag with 40 and 60. left_out: of the payload;
-    parity: for the lag, of_payload: for the payload. pair: what both together gain left out, and on all data."""
+    parity: for the lag, of_payload: for the payload. pair: what both together gain left out, and on all data.
+    screened: other effects, of those `asked` for."""
     arena = LinearArena(1.0)
     zero = np.zeros((STRETCHES, 0))
     fits = [Fit(Hypothesis((candidate(name, k),)), np.zeros(2), np.ones(1), np.zeros(1), np.zeros((1, 3)), 0.0,
@@ -54,9 +59,9 @@ def said(
     base = Fit(Hypothesis(), np.zeros(2), np.zeros(0), np.zeros(1), np.zeros((1, 2)), 0.0, np.zeros(0), zero, [])
     return concluded(Material(
         arena=arena, base=base, refit=score(0.0), fits=tuple(fits), scores=tuple(scores),  # type: ignore[arg-type]
-        responses=(), chance=5.0, no_gap=NoGap(0.02, 0.03, 0.01, 0.0), wider=1.0, left=Left(50.0, left, 1.0),
+        responses=screened, chance=5.0, no_gap=NoGap(0.02, 0.03, 0.01, 0.0), wider=1.0, left=Left(50.0, left, 1.0),
         unexplained=unexplained, groups=arena.gait, calibration=by, chronic=np.zeros(len(fits)),
-        marginal=np.array(marginal), whole=np.array(whole), asked=("payload", "motor_lag"),
+        marginal=np.array(marginal), whole=np.array(whole), asked=asked,
         parity={"motor_lag": {None: parity}, "payload": {None: of_payload}},
     ))  # fmt: skip
 
@@ -131,3 +136,13 @@ def test_a_pair_that_breaks_off_adds_nothing() -> None:
     assert pair.added == -np.inf
     found = said(BY, pair=(-np.inf, -np.inf))
     assert sum(one.probability for one in found.ranking) == pytest.approx(1.0) and found.effects == ("payload",)
+
+
+def test_an_effect_of_a_package_may_be_screened_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It stands in the ranking with its channel, as those of the catalogue do, not fitted."""
+    wind = SimpleNamespace(name="side_wind", channel="wrench")
+    monkeypatch.setattr("r2s2r_cli.effects.known.known_effects", lambda: (*CATALOGUE, wind))
+    one = np.ones(1)
+    response = Response(candidate("side_wind", 0), -2.0, one, one, one, 2 * LEAST_RESPONSE, 0.0, one)
+    ranked = {found.effect: found for found in said(BY, screened=(response,), asked=None).ranking}
+    assert (ranked["side_wind"].channel, ranked["side_wind"].fitted) == ("wrench", False)

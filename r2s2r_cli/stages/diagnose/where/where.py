@@ -181,9 +181,9 @@ def _probe(
 def _said(found: Parity | None) -> dict[str, tuple[float, Element | None]]:
     """What parity says for each channel: log likelihood ratio of its strongest significant finding [nats], halved for
     what look-alikes share of it, and the element."""
-    from r2s2r_cli.effects import CATALOGUE
+    from r2s2r_cli.effects.known import known_effects
 
-    channel = {effect.name: str(effect.channel) for effect in CATALOGUE}
+    channel = {effect.name: str(effect.channel) for effect in known_effects()}
     made: dict[str, tuple[float, Element | None]] = {}
     for one in () if found is None else found.significant:
         for suspicion in one.suspicions:

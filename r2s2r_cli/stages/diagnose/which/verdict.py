@@ -128,9 +128,9 @@ def _not_fitted(m: Material, fitted: Container[str]) -> list[Ranked]:
 
 
 def _channel(name: str) -> str:
-    from r2s2r_cli.effects import CATALOGUE
+    from r2s2r_cli.effects.known import known_effects
 
-    return next(str(effect.channel) for effect in CATALOGUE if effect.name == name)
+    return next(str(effect.channel) for effect in known_effects() if effect.name == name)
 
 
 def verdict_of(

@@ -79,7 +79,7 @@ def _shrunk(found: Diagnosis) -> str:
     before, after = 1e3 * (much.rmse("refit") or 0.0), 1e3 * (much.rmse("effect") or 0.0)
     shrinks = much.share is not None and after < before
     if found.which.verdict in ("ambiguous", "unknown"):
-        names = f"the likeliest effect, {names},"
+        names = f"the likeliest {_of(found.which, much.effects)}, {names},"
     count = len(much.names)
     some = f"{count - len(much.set_aside)} of " if much.set_aside else ""
     held = f" On {some}{count} held-out interval{'s' * (count != 1)}{' of the same run' if much.within_run else ''}"
@@ -93,11 +93,21 @@ def _shrunk(found: Diagnosis) -> str:
         beside = "" if was is None or 1e3 * was >= after else f"; as identified it is {1e3 * was:.1f} mm"
         return f"{text}: it closes none of the gap{beside}."
     wide = "" if much.ci90 is None else f" ({round(100 * much.ci90[0])} .. {round(100 * much.ci90[1])})"
-    told = "" if much.predicted is None else f"; predicted {round(100 * much.predicted)} %"
+    told = "" if much.predicted is None else f"; predicted {_percent(much.predicted)}"
     text += f", which closes {round(100 * much.share)} %{wide} of the gap above the floor{told}"
     if much.ci90 is not None and much.ci90[0] <= 0.0:
         text += "; that it helps is not shown, so do not act on it yet"
     return f"{text}."
+
+
+def _of(which: Which, fitted: tuple[str, ...]) -> str:
+    """What the effect that was measured is the likeliest of: one that no replay tells may be likelier."""
+    return "effect" if which.best is None or which.best.effect in fitted else "of the effects that were fitted"
+
+
+def _percent(share: float) -> str:
+    """A share of a gap; that one would grow is no share."""
+    return f"{round(100 * share)} %" if share > 0.0 else "none"
 
 
 def _alike(which: Which, name: str) -> list[str]:

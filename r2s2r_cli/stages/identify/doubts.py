@@ -49,9 +49,10 @@ def contradicted(parameters: Sequence[ParameterFound], profiles: Sequence[Profil
         value, (low, high) = parameters[one.row].value, one.interval
         if value < low or value > high:  # false beside NaN, where the profile does not end
             ends = "..".join(f"{end:.4g}" if math.isfinite(end) else "" for end in (low, high))
+            said = "The interval reported holds both" if parameters[one.row].identifiable else "No interval is reported"
             found.append(
                 f"{parameters[one.row].free.name} {value:.4g} lies outside the 95 % interval of its own profile "
-                f"likelihood, {ends}: the loss is rough there. The interval reported holds both"
+                f"likelihood, {ends}: the loss is rough there. {said}"
             )
     return tuple(found)
 

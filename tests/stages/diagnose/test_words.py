@@ -119,3 +119,16 @@ def test_every_effect_that_no_replay_tells_has_advice() -> None:
     said = sentence(knocked)  # type: ignore[arg-type]
     assert said.startswith("The gap is caused by camera_pose (p = 0.90). That changes what is seen")
     assert said.endswith("set the camera up anew, and leave out what was recorded since.")
+
+
+def test_what_was_measured_is_not_called_likelier_than_what_no_fit_tells() -> None:
+    """An effect that only the logs show may be first, and no interval can be measured with it."""
+    one = found("ambiguous", best=SimpleNamespace(effect="dropout", element=None, probability=0.4))
+    assert "the likeliest of the effects that were fitted, payload, takes" in sentence(one)  # type: ignore[arg-type]
+
+
+def test_a_gap_that_would_grow_is_no_share() -> None:
+    """A prediction below nothing closes nothing, by however much."""
+    one = found("ambiguous")
+    one.much.predicted = -10.2
+    assert "of the gap above the floor; predicted none;" in sentence(one)  # type: ignore[arg-type]

@@ -100,6 +100,9 @@ def test_a_value_outside_its_own_profile_is_told() -> None:
         "friction 0.6 lies outside the 95 % interval of its own profile likelihood, 0.42..0.58"
     )
     assert "0.7..:" in said(0.7, math.nan)[0]
+    assert said(0.42, 0.58)[0].endswith("The interval reported holds both")
+    free = (replace(free[0], trust=Trust.NOT_IDENTIFIABLE),)
+    assert said(0.42, 0.58)[0].endswith("No interval is reported")
 
 
 def test_a_range_beyond_its_interval_is_told() -> None:

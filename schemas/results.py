@@ -57,6 +57,8 @@ class ArtifactState(Frozen):
     artifact: str
     state: Literal["fresh", "stale", "damaged", "unsealed", "recording", "interrupted", "running"]
     reasons: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+    """What else is to be known of it, whatever its state: runs that were cut off."""
     overrides: dict[str, Any] = Field(default_factory=dict)
     """Settings that came from `--set` when it was made: the same command without them makes it again."""
     bytes: int

@@ -18,7 +18,7 @@ from r2s2r_cli.store.brief import brief
 from r2s2r_cli.store.header import read_header, sealed_header, whole_header
 from r2s2r_cli.store.lock import writer
 from r2s2r_cli.store.project import Iteration, Project
-from schemas.header import Header
+from schemas.header import Header, Provenance
 from schemas.results import ArtifactState, StatusResult
 
 if TYPE_CHECKING:
@@ -35,7 +35,8 @@ def status(
 ) -> None:
     """Show the artifacts of the project: fresh or stale and why, and the disk they take.
 
-    Decided by content hashes, settings and stage versions; file times and comments do not count.
+    Decided by content hashes, settings and stage versions; file times and comments do not count. Of each file the head
+    and the size are read: bytes that changed inside are seen with --check alone.
 
     Example: r2s2r status --check
     """
@@ -143,7 +144,7 @@ def _state(
     made = header.provenance if header else None
     line = {
         "stage": made.stage if made else "?", "iteration": iteration.number if iteration else None, "artifact": name,
-        "state": state, "reasons": tuple(why), "overrides": made.overrides if made else {},
+        "state": state, "reasons": tuple(why), "notes": _notes(made), "overrides": made.overrides if made else {},
         "bytes": path.stat().st_size, "content_sha256": header.content_sha256 if header else None,
     }  # fmt: skip
     return ArtifactState.model_validate(line), mend
@@ -161,7 +162,18 @@ def _reasons(
 
 def _remarks(state: ArtifactState) -> str:
     made = [f"made with --set {key}={value}" for key, value in state.overrides.items()]
-    return "; ".join([*brief(state.reasons), *made])
+    return "; ".join([*brief(state.reasons), *state.notes, *made])
+
+
+def _notes(made: Provenance | None) -> tuple[str, ...]:
+    """Runs of a recording that ended before their last target. They are measurements: nothing is stale by it."""
+    from r2s2r_cli.commands.wanted import MEASURED
+
+    runs = made.report.get("runs", ()) if made is not None and made.stage in MEASURED else ()
+    return tuple(
+        f"{run['run']} ended at target {run['targets_done'] + 1} of {run['targets']}: {run['ended']}"
+        for run in runs if run.get("ended", "complete") != "complete"
+    )  # fmt: skip
 
 
 def _forward(project: Project) -> str:

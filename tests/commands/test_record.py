@@ -14,8 +14,10 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.commands import record_run
+from r2s2r_cli.commands.status import survey
 from r2s2r_cli.devices.link import LinkError, Sample
 from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.read import read_artifact
 from schemas.robot import Robot
 from tests.commands.conftest import document, invoke
@@ -165,6 +167,9 @@ def test_ctrl_c_seals_what_there_is(robot_project: Path, link: Maker) -> None:
     assert result.exit_code == 130 and "sealed" in result.stderr
     assert not made.driven.any()
     assert read_header(robot_project / RECORDING).provenance.report["runs"][0]["ended"] == "interrupted"
+    (line,) = survey(Project.find(robot_project)).artifacts
+    assert line.state == "fresh" and line.notes[0].endswith(": interrupted")
+    assert "ended at target" in invoke("status").stdout
 
 
 def test_a_stuck_sensor_stops_the_robot(robot_project: Path, link: Maker) -> None:

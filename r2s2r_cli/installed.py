@@ -13,8 +13,8 @@ def installed() -> tuple[EntryPoint, ...]:
     return tuple(sorted(entry_points(group=GROUP), key=lambda one: one.name))
 
 
-def installed_versions() -> dict[str, str]:
-    """`package version` of every installed effect, by its id."""
-    return {
-        one.name: "no package" if one.dist is None else f"{one.dist.name} {one.dist.version}" for one in installed()
-    }
+def installed_words() -> str:
+    """`side_wind (windy 1.0)`, with package and version, of every one of them; empty: there are none."""
+    return ", ".join(
+        one.name if one.dist is None else f"{one.name} ({one.dist.name} {one.dist.version})" for one in installed()
+    )

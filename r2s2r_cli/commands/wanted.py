@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from r2s2r_cli.installed import installed_versions
+from r2s2r_cli.installed import installed_words
 from r2s2r_cli.store.project import Iteration, Project
 from r2s2r_cli.store.staleness import Wanted
 from schemas.header import Provenance
@@ -58,7 +58,7 @@ def wanted(
     """What `stage` would use if it ran now. Raises InputError or UsageError for wrong settings."""
     config = project.config(iteration, overrides).model_dump(mode="json", by_alias=True)
     settings = {**config.get(stage, {}), "flags": dict(flags)}
-    own = installed_versions() if stage == "diagnose" else {}
+    own = installed_words() if stage == "diagnose" else ""
     if own:  # it looks for them beside the catalogue's
         settings["installed_effects"] = own
     return Wanted(STAGE_VERSIONS.get(stage, 1), settings, robot_part(stage, project.robot()))

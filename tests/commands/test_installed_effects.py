@@ -29,5 +29,5 @@ def test_an_installed_effect_makes_a_diagnosis_stale(
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: windy\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(f"[{GROUP}]\nside_wind = windy:SideWind\n")
     monkeypatch.syspath_prepend(str(info.parent))
-    assert settings("diagnose") == {**before["diagnose"], "installed_effects": {"side_wind": "windy 1.0"}}
+    assert settings("diagnose") == {**before["diagnose"], "installed_effects": "side_wind (windy 1.0)"}
     assert settings("identify") == before["identify"]

@@ -91,10 +91,10 @@ def _judged(data: ArtifactData, report: DiagnoseReport) -> bytes:
     names = [name.decode() for name in group["name"].tolist()]
     figure = new_figure(min(13.0, 5.0 + 0.6 * len(names)), 3.8)
     each, all_ = figure.subplots(1, 2, sharey=True, width_ratios=[min(max(2.0, 0.5 * len(names)), 7.0), 1.0])
-    series = (("nominal", STALE, "as identified"), ("refit", BEFORE, "refit"),
+    known = (("nominal", STALE, "as identified"), ("refit", BEFORE, "refit"),
               ("effect", AFTER, "refit + " + (" + ".join(report.shrinkage.effects) if report.shrinkage else "effect")),
               ("ceiling", BLACK_BOX, "black box"))  # fmt: skip
-    series = tuple(one for one in series if np.isfinite(group[one[0]]).any())
+    series = tuple(one for one in known if np.isfinite(group[one[0]]).any())
     width = 0.8 / len(series)
     aside = () if report.shrinkage is None else report.shrinkage.set_aside
     counts = np.array([name not in aside for name in names], dtype=bool)

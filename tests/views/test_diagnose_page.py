@@ -28,7 +28,8 @@ def report() -> DiagnoseReport:
         probability=0.9, set90=("payload", "com_offset"),
         ranking=(
             RankedName(effect="payload", elpd_gain=31.0, probability=0.9, size={"payload.mass_kg.1": 0.04},
-                       ci90={"payload.mass_kg.1": (0.03, 0.05)}, units={"payload.mass_kg.1": "kg", "payload.place_m.1": "m"}, channel="mass",
+                       ci90={"payload.mass_kg.1": (0.03, 0.05)},
+                       units={"payload.mass_kg.1": "kg", "payload.place_m.1": "m"}, channel="mass",
                        element=element, rmse_m=0.006, on_bound=("payload.place_m.1",)),
             RankedName(effect="none", elpd_gain=0.0, probability=0.1),
         ),

@@ -9,7 +9,7 @@ from r2s2r_cli.views.diagnose_page import diagnose_tables
 from r2s2r_cli.views.diagnose_ranking import ranking_table
 from schemas.people import plain_name, quantity, rounded
 from schemas.results_diagnose import DiagnoseReport, RankedName
-from tests.views.test_diagnose_page import report
+from tests.support.diagnosed import report
 
 
 def ranked(*names: RankedName) -> DiagnoseReport:

@@ -15,7 +15,7 @@ from r2s2r_cli.views.diagnose_words import GUIDE, drawn_effects, verdict_words
 from schemas.diagnosis import VERDICTS
 from schemas.results_diagnose import DiagnoseReport, ElementFound, RankedName, WhereFound
 from tests.guards.listing import ROOT
-from tests.views.test_diagnose_page import report
+from tests.support.diagnosed import report
 
 MOTOR = ElementFound(kind="motor", index=1)
 FIRST = (RankedName(effect="none", elpd_gain=0.0, probability=0.6), *report().ranking[:1])

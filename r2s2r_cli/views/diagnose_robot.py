@@ -89,7 +89,7 @@ def _drawn(axes: Axes, group: Group, p: np.ndarray, element: ElementFound | None
                   ls="-" if group["actuated"][k] else "--", zorder=3 if bad else 1)  # fmt: skip
     middles = p[ends].mean(axis=1)
     for own, words in _labels(middles, near):
-        axes.annotate(words, middles[own[0]], fontsize=7, color=GUILTY if bad_cables & set(own) else PLAIN,
+        axes.annotate(words, middles[own[0]], fontsize=7, color=GUILTY if bad_cables >= set(own) else PLAIN,
                       ha="center", va="center", zorder=4,
                       bbox={"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none"})  # fmt: skip
     for rod in range(len(p) // 2):
@@ -98,10 +98,10 @@ def _drawn(axes: Axes, group: Group, p: np.ndarray, element: ElementFound | None
         axes.plot(caps[:, 0], caps[:, 1], color=GUILTY if bad else rod_color(2 * rod), lw=9 if bad else 5, alpha=0.9,
                   zorder=2, solid_capstyle="round")  # fmt: skip
     for own, words in _labels(p, near):
+        bad_caps = {cap for cap in own if _guilty(element, ("cap",), cap)}
         for before, cap in enumerate(own):  # one around the other where they lie on each other
-            bad = _guilty(element, ("cap",), cap)
-            axes.plot(*p[cap], "o", ms=(19 if bad else 12) + 6 * (len(own) - 1 - before),
-                      color=GUILTY if bad else rod_color(cap), zorder=5)  # fmt: skip
+            axes.plot(*p[cap], "o", ms=(19 if bad_caps else 12) + 6 * (len(own) - 1 - before),
+                      color=GUILTY if cap in bad_caps else rod_color(cap), zorder=5)  # fmt: skip
         alone = len(own) == 1
         axes.annotate(words, p[own[0]], xytext=(0, 0 if alone else -17), textcoords="offset points", ha="center",
                       va="center", fontsize=8, color="white" if alone else TEXT, weight="bold", zorder=6)  # fmt: skip

@@ -92,6 +92,8 @@ def test_parts_that_lie_on_each_other_have_one_label(figures: list[Figure]) -> N
     robot_picture(robot(), said("effect", MOTOR))
     above, side = (sorted(text.get_text() for text in axes.texts) for axes in figures[0].axes)
     assert above == ["0", "0", "1", "1", "2", "3"] and side == ["0, 1", "0, 2", "1", "3"]
+    shared = next(text for text in figures[0].axes[1].texts if text.get_text() == "0, 1")
+    assert to_hex(str(shared.get_color())) != GUILTY  # one of the two alone is accused
     assert together(np.array([[0.0, 0.0], [1.0, 0.0], [0.01, 0.0]]), 0.05) == [(0, 2), (1,)]
 
 

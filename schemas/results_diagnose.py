@@ -72,7 +72,7 @@ class PairFound(Frozen):
 
     effects: tuple[str, ...]
     elpd_gain: float
-    """Held-out log predictive density over the refit nominal model: what its first effect gains and what the second adds,
+    """Left-out log predictive density over the refit nominal model: what its first effect gains and what the second adds,
     12 nats a piece at most [nats]."""
     marginal_nats: float | None = None
     """The same of all data, where all that the second adds counts [nats]; since version 13 of `diagnose`."""

@@ -53,7 +53,7 @@ RANGES = {
 FAINT = 0.25
 LOUD_M = 0.010
 """Of noise, where the floor is two to four times that of less: effects below half of it say nothing, and are not drawn
-(diagnosis.md: sizes from half a floor on), but for the faint ones."""
+(the catalogue is of sizes from half a floor on), but for the faint ones."""
 SHARES = {Kind.NONE: 0.15, Kind.SINGLE: 0.60, Kind.PAIR: 0.10, Kind.OUTSIDE: 0.15}
 NOISE_M = (0.002, 0.005, 0.010)
 AR1 = (0.0, 0.7)

@@ -237,9 +237,11 @@ def _policy(report: DiagnoseReport) -> bytes:
 
 def _show(report: DiagnoseReport, console: Console) -> None:
     from r2s2r_cli.views.diagnose_page import diagnose_tables
+    from r2s2r_cli.views.diagnose_words import verdict_words
 
     for table in diagnose_tables(report, brief=True):
         console.table(table.title, table.columns, table.rows)
+    console.data(f"verdict {verdict_words(report)}")
     console.data(report.sentence)
     for text in report.warnings:
         console.warn(text)

@@ -192,8 +192,8 @@ def _draw(project: Project, data: ArtifactData, reports: ImportReports) -> Itera
 
 
 def _show(report: ImportReport, console: Console) -> None:
-    from r2s2r_cli.views.recording import import_rows
+    from r2s2r_cli.views.recording import import_rows, import_title
 
-    console.table(f"run {report.run}: {report.source}", ["what", "found"], import_rows(report))
+    console.table(import_title(report), ["what", "found"], import_rows(report))
     for text in report.warnings:
         console.warn(f"{report.run}: {text}")

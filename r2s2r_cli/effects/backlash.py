@@ -8,7 +8,7 @@ it has all of the play before it.
 Parameters: play_m, one a winch.
 What it looks like in data: motion of a cable is missing right after its reversals, and only there.
 What it is confused with: load_droop, camera_delay, command_latency.
-Source: play operator (Brokate and Sprekels); diagnosis.md catalogue C1.
+Source: play operator (Brokate and Sprekels).
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ since the run began, in seconds of one winch at full command: a robot that waits
 Parameters: fade_per_s, loss of speed per second of one winch; drop, loss per winch that pulls.
 What it looks like in data: all slopes fall with time, or with the number of cables that move.
 What it is confused with: motor_speed_mismatch (in a short run), load_droop.
-Source: internal resistance and discharge of a battery; diagnosis.md catalogue A5.
+Source: internal resistance and discharge of a battery.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ before the first one and after the last one nothing moves.
 Parameters: tau_s, the delay.
 What it looks like in data: end caps lag behind the sensors and commands by a constant.
 What it is confused with: command_latency (without recorded lengths the very same), backlash, load_droop.
-Source: clock synchronisation; diagnosis.md catalogue S6.
+Source: clock synchronisation.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ shifted. The robot itself moves as without it.
 Parameters: turn_x_rad, turn_y_rad (tilt), turn_z_rad (yaw); shift_x_m, shift_y_m, shift_z_m.
 What it looks like in data: all frames differ by one rigid motion; cap heights lean to one side.
 What it is confused with: ground_slope (which moves the robot), cap_radius.
-Source: extrinsic calibration; diagnosis.md catalogue S4.
+Source: extrinsic calibration.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ Where it acts: channel observation; factor on the observed end caps, about the o
 Parameters: factor.
 What it looks like in data: rods of the wrong length, from one cap to the other.
 What it is confused with: nothing that rod lengths do not tell apart; sensor_gain of all sensors alike.
-Source: intrinsic calibration; diagnosis.md catalogue S5.
+Source: intrinsic calibration.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ Where it acts: channel contact; factor on the friction coefficient of each cap.
 Parameters: factor, one a cap.
 What it looks like in data: slip residuals that follow the cap, wherever it touches.
 What it is confused with: friction_field (follows the place instead of the cap).
-Source: Coulomb friction per contact; diagnosis.md catalogue K7.
+Source: Coulomb friction per contact.
 """
 
 from __future__ import annotations

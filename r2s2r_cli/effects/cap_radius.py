@@ -5,7 +5,7 @@ Where it acts: channel contact; an offset on the radius of each cap.
 Parameters: change_m, one a cap.
 What it looks like in data: caps that touch the ground sit lower, and rolls go less far a turn.
 What it is confused with: soft_ground, camera_pose (a camera that sees everything lower).
-Source: geometry; diagnosis.md catalogue K8.
+Source: geometry.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ Where it acts: channel mass; the centre of mass of each rod moves along its axis
 Parameters: axial_m, + towards the odd cap, one a rod. Offsets across the axis are within the cap radius and left out.
 What it looks like in data: the robot tips over early or late, at the same rod in every cycle.
 What it is confused with: payload (which is heavier as well), camera_delay.
-Source: rigid-body mechanics; diagnosis.md catalogue R1.
+Source: rigid-body mechanics.
 """
 
 from __future__ import annotations

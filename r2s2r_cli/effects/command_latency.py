@@ -6,7 +6,7 @@ state of it: exact, and differentiable.
 Parameters: tau_s, the delay.
 What it looks like in data: every step of the gait starts and ends late by the same time; in closed loop ends overshoot.
 What it is confused with: motor_lag (rounds as well), camera_delay (with end caps alone the very same).
-Source: dead time of a control loop; diagnosis.md catalogue A2.
+Source: dead time of a control loop.
 """
 
 from __future__ import annotations

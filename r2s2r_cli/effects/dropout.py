@@ -6,7 +6,7 @@ frame's time chooses: no simulation draws anything, and a higher rate adds frame
 Parameters: lost, share of the caps that are missing; swapped, share of the rods with caps exchanged.
 What it looks like in data: gaps, and single frames that are off by a rod's length.
 What it is confused with: nothing: single frames, not motion.
-Source: occlusion and colour segmentation; diagnosis.md catalogue S7.
+Source: occlusion and colour segmentation.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ Parameters: gradient_x_per_m, gradient_y_per_m (the origin of the world has the 
 patch_x_m, patch_y_m, patch_radius_m.
 What it looks like in data: slip residuals tied to a place on the floor, whichever cap and phase of the gait is there.
 What it is confused with: cap_friction (follows the cap), battery_sag in one long run (where time is place).
-Source: the unexplained turning of the paper's second iteration; diagnosis.md catalogue K1.
+Source: the unexplained turning of the paper's second iteration.
 """
 
 from __future__ import annotations

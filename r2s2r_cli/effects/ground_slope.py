@@ -6,7 +6,7 @@ Where it acts: channel world; gravity in the ground's frame.
 Parameters: angle_x_rad, angle_y_rad, the ground's rotation about the x, then the y axis of the world.
 What it looks like in data: a drift downhill, in one direction of the world, whatever the gait.
 What it is confused with: camera_pose (a tilted camera leans the observations, not the motion), tether_drag.
-Source: statics; diagnosis.md catalogue E1.
+Source: statics.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ Where it acts: channel motor; winding rate inwards times 1 - b T, T the tension 
 Parameters: per_newton, b, for all winches.
 What it looks like in data: ramps are flat while the cable is tense and steep while it is slack.
 What it is confused with: backlash, battery_sag, camera_delay.
-Source: linear torque-speed line of a DC motor; diagnosis.md catalogue A6.
+Source: linear torque-speed line of a DC motor.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ Parameters: threshold, as a share of full command, one a winch; above 1 it never
 What it looks like in data: cables stall shortly before their target, or never start. Invisible where a command that
 saturates turns the winch.
 What it is confused with: sensor_bias, sensor_gain (a cable that stops off its target).
-Source: Coulomb stiction of DC gear motors; diagnosis.md catalogue A1.
+Source: Coulomb stiction of DC gear motors.
 """
 
 from __future__ import annotations

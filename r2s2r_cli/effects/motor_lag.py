@@ -5,7 +5,7 @@ Where it acts: channel motor; tau w' = u - w, implicit in the step.
 Parameters: tau_s, the time constant.
 What it looks like in data: ramps of cable length with rounded starts, and a run-on after every stop.
 What it is confused with: command_latency (a pure shift without rounding).
-Source: first-order DC motor with neglected inductance; diagnosis.md catalogue A3.
+Source: first-order DC motor with neglected inductance.
 """
 
 from __future__ import annotations

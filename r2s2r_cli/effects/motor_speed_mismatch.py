@@ -5,7 +5,7 @@ Where it acts: channel motor; factor on the winding rates of each winch.
 Parameters: factor, one a winch.
 What it looks like in data: the slope of one cable's length ramps, in every run and at every load.
 What it is confused with: load_droop, spool_buildup, battery_sag (which change the slope with tension, length and time).
-Source: scatter of no-load speeds; diagnosis.md catalogue A4.
+Source: scatter of no-load speeds.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ Where it acts: channel mass; a point mass on the axis of each rod: mass, centre 
 Parameters: mass_kg and place_m (from the nominal centre of mass, + towards the odd cap), one each a rod.
 What it looks like in data: a pair of caps is heavier: it slips less, and the robot tips over other edges.
 What it is confused with: com_offset, cap_friction and friction (a refit absorbs most of it).
-Source: rigid-body mechanics, parallel-axis theorem; diagnosis.md catalogue R2.
+Source: rigid-body mechanics, parallel-axis theorem.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ axes) and `torsion_m` (about the vertical) times the normal force of the step be
 Parameters: rolling_m, torsion_m, arms of the normal force.
 What it looks like in data: rolls and tip-overs fall short, turns on the spot as well.
 What it is confused with: soft_ground, cap_friction, and the numerics of another engine.
-Source: rolling friction (Johnson, Contact Mechanics, ch. 9); diagnosis.md catalogue K5.
+Source: rolling friction (Johnson, Contact Mechanics, ch. 9).
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ Parameters: bias_m, and drift_m_per_s from the start of the run, one each a sens
 What it looks like in data: in closed loop cables stop off their target by a constant; recorded lengths disagree with
 the end caps by as much.
 What it is confused with: tendon_set, motor_dead_zone.
-Source: drift of capacitive sensors (paper, section Calibration); diagnosis.md catalogue S1.
+Source: drift of capacitive sensors (paper, section Calibration).
 """
 
 from __future__ import annotations

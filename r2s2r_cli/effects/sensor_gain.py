@@ -7,7 +7,7 @@ Parameters: gain, one a sensor.
 What it looks like in data: recorded lengths disagree with the end caps the more the further from the middle of the
 travel; in closed loop the gait is too large or too small.
 What it is confused with: tendon_stiffness, camera_scale (with few cables).
-Source: slopes of capacitive sensors (paper, section Calibration); diagnosis.md catalogue S2.
+Source: slopes of capacitive sensors (paper, section Calibration).
 """
 
 from __future__ import annotations

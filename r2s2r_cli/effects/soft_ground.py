@@ -8,7 +8,7 @@ Parameters: compliance_m_per_n; tau_s, the time constant; creep_m_per_ns, speed 
 What it looks like in data: caps sit lower the more they carry, tip-overs come late, and feet that are pulled slide
 apart slowly though friction could hold them.
 What it is confused with: rolling_resistance, cap_radius, and the numerics of another engine.
-Source: Kelvin-Voigt foundation; creep of rubber (Persson, Sliding Friction, ch. 16); diagnosis.md catalogue K6.
+Source: Kelvin-Voigt foundation; creep of rubber (Persson, Sliding Friction, ch. 16).
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ Where it acts: channel motor; winding rate times 1 + c * wound, wound being the 
 Parameters: per_metre, c, for all winches.
 What it looks like in data: curved length ramps: steeper towards the short end.
 What it is confused with: motor_speed_mismatch (a refit of the speed absorbs most of it).
-Source: radius of a layered spool to first order; diagnosis.md catalogue A7.
+Source: radius of a layered spool to first order.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ relaxed.
 Parameters: share, of the stiffness; tau_s, time constant with which it is lost.
 What it looks like in data: the shape drifts during holds; forces depend on how fast a tendon was stretched.
 What it is confused with: tendon_stiffness (no drift), battery_sag (drifts while winches turn, not while they hold).
-Source: Maxwell branch (standard linear solid, Zener); diagnosis.md catalogue C3.
+Source: Maxwell branch (standard linear solid, Zener).
 """
 
 from __future__ import annotations

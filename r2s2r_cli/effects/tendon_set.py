@@ -5,7 +5,7 @@ Where it acts: channel cable; an offset on the rest length of each cable, on top
 Parameters: shift_m, + is longer, one a cable.
 What it looks like in data: a constant bias of the shape in every key frame, in robot axes.
 What it is confused with: tendon_stiffness (whose bias grows with the tension), sensor_bias (in closed loop).
-Source: permanent elongation of braided cable; diagnosis.md catalogue C5.
+Source: permanent elongation of braided cable.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ Where it acts: channel cable; factor on every coefficient of the force law of ea
 Parameters: factor, one a cable.
 What it looks like in data: the shape is biased along that cable in every key frame in which it is tense.
 What it is confused with: sensor_gain, tendon_set (whose bias does not grow with the tension).
-Source: scatter of tendon force-displacement curves (paper, section System Identification); diagnosis.md catalogue C2.
+Source: scatter of tendon force-displacement curves (paper, section System Identification).
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ Parameters: force_n of each rod; anchor_x_m, anchor_y_m, anchor_z_m, place of th
 What it looks like in data: a drift towards one point of the room, whose direction turns as the robot moves on; the rod
 leads the others.
 What it is confused with: ground_slope (whose direction stays, and which pulls all rods alike), payload.
-Source: statics; diagnosis.md catalogue E3.
+Source: statics.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How the gap between real and simulated robot went over the iterations: a picture and a table."""
+"""How errors of the simulators went over the iterations, beside their floor: a picture and a table."""
 
 from __future__ import annotations
 
@@ -39,7 +39,11 @@ def history_table(report: CompareReport) -> PageTable | None:
             floors.append("-" if known[0].floor is None else f"{scale * known[0].floor:.3g}")
             for row, model in zip(rows, models, strict=True):
                 row.append(_cell(by.get((number, model)), name, scale))
-    return PageTable(f"the gap over the iterations ({TRAINED} learned from these runs)", columns, [*rows, floors])
+    return PageTable(
+        f"errors over the iterations, the floor below them ({TRAINED} learned from these runs)",
+        columns,
+        [*rows, floors],
+    )
 
 
 def draw_history(report: CompareReport) -> bytes | None:
@@ -55,7 +59,7 @@ def draw_history(report: CompareReport) -> bytes | None:
         _panel(panel, report, name, models)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=9)
-    figure.suptitle("The gap over the iterations: the same real runs under every simulator")
+    figure.suptitle("Errors over the iterations, beside their floor: the same real runs under every simulator")
     return png_bytes(figure)
 
 

@@ -20,7 +20,7 @@ def comparison_page(
     page = Page(
         title=f"Real and simulated: {robot.title}", sentence=verdict(report), labels=list(report.warnings),
         tables=list(comparison_tables(report)),
-        pictures=[] if history is None else [Picture("The gap over the iterations", history)],
+        pictures=[] if history is None else [Picture("Errors over the iterations, beside their floor", history)],
     )  # fmt: skip
     shown = {
         run: (Picture("seen from above, and by interval", png), Picture("frame by frame", strips[run]))

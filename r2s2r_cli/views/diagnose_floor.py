@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData
-from r2s2r_cli.views.figure import RED, new_figure, png_bytes, rod_color
+from r2s2r_cli.views.diagnose_words import accused
+from r2s2r_cli.views.figure import RED, legend_below, new_figure, png_bytes, rod_color
 
 if TYPE_CHECKING:
     from schemas.results_diagnose import DiagnoseReport
@@ -30,7 +31,9 @@ def floor_picture(data: ArtifactData, report: DiagnoseReport) -> bytes:
             shown = axes.pcolormesh(
                 place["x"], place["y"], seen, cmap="RdBu", vmin=-limit, vmax=limit, alpha=0.6, shading="nearest"
             )
-            figure.colorbar(shown, ax=axes, label="change of friction that contacts ask for [1]", shrink=0.8)
+            figure.colorbar(
+                shown, ax=axes, label="change of friction that contacts ask for [1]\nred: less, blue: more", shrink=0.8
+            )
     xy, error = rows["xy"], rows["error"]
     for row in range(len(xy)):
         for cap in range(xy.shape[1]):
@@ -39,15 +42,17 @@ def floor_picture(data: ArtifactData, report: DiagnoseReport) -> bytes:
                               arrowprops={"arrowstyle": "->", "color": rod_color(cap), "lw": 0.9})  # fmt: skip
     for cap in range(xy.shape[1]):
         axes.plot(xy[:, cap, 0], xy[:, cap, 1], ".", ms=4, color=rod_color(cap))
-    element = report.where.element
+    for rod in range(xy.shape[1] // 2):
+        axes.plot([], [], ".-", color=rod_color(2 * rod), label=f"rod {rod}, caps {2 * rod} and {2 * rod + 1}")
+    element = accused(report)
     if element is not None and element.xy_m is not None:
         axes.plot(*element.xy_m, "x", ms=16, mew=3, color=GUILTY)
-        what = "guilty place" if report.verdict in ("effect", "pair") else "most suspect place"
-        axes.annotate(what, element.xy_m, xytext=(10, 10), textcoords="offset points", color=GUILTY,
+        axes.annotate("guilty place", element.xy_m, xytext=(10, 10), textcoords="offset points", color=GUILTY,
                       bbox={"boxstyle": "round", "fc": "white", "ec": "none", "alpha": 0.8}, zorder=6)  # fmt: skip
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="x [m]", ylabel="y [m]",
              title="dots: caps at the ends of intervals; arrows: how much farther\n"
              f"the robot went than the refit model, {ARROW:g} times enlarged")  # fmt: skip
     axes.margins(0.1)
+    legend_below(figure, [axes])
     return png_bytes(figure)

@@ -7,7 +7,9 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.views.diagnose_ranking import element_words, ranking_table
-from r2s2r_cli.views.page import Page, PageTable, Picture, render
+from r2s2r_cli.views.diagnose_words import HELD_OUT, LEFT_OUT, TWO_ERRORS, WHY_NONE, verdict_words
+from r2s2r_cli.views.page import Page, PageTable, Picture, counted, render
+from schemas.people import plain_name, quantity
 from schemas.results_diagnose import INDISTINCT
 
 if TYPE_CHECKING:
@@ -50,7 +52,8 @@ def diagnose_page(report: DiagnoseReport, pictures: Sequence[tuple[str, bytes]])
         )
     return render(
         Page(
-            title=f"Diagnosis of {report.robot}", sentence=report.sentence, labels=labels,
+            title=f"Diagnosis of {report.robot}: {report.verdict}", sentence=report.sentence,
+            notes=[f"Verdict {verdict_words(report)}"], labels=labels,
             tables=list(diagnose_tables(report)), pictures=[Picture(title, png) for title, png in pictures],
         )
     )  # fmt: skip
@@ -72,17 +75,21 @@ def _shrinkage(report: DiagnoseReport) -> PageTable:
     rows = [
         ["as identified", _mm(s.nominal), ""],
         ["refit", _mm(s.refit), ""],
-        [f"refit + {' + '.join(s.effects)}", _mm(s.refit_plus_effect), _share(s.own_share, s.ci90)],
+        *(
+            [[f"refit + {' + '.join(s.effects)}", _mm(s.refit_plus_effect), _share(s.own_share, s.ci90)]]
+            if s.effects
+            else ()
+        ),
         ["refit + a black box" + learned, _mm(s.ceiling), ""],
-        ["floor", _mm(s.floor), ""],
+        ["floor of held-out intervals", _mm(s.floor), ""],
         ["predicted before it was looked at", "", _share(s.predicted, None)],
     ]
     where = "; within the run that was fitted" if s.within_run else ""
     if s.set_aside:
         where += f"; without {', '.join(s.set_aside)}, as the floor was measured without the worst intervals"
     return PageTable(
-        f"how far the gap shrinks, {len(s.judged_on)} held-out intervals{where}",
-        ["model", "key-frame error [mm]", "own share of the refit gap above the floor"], rows,
+        f"how far the gap shrinks, {counted(len(s.judged_on), 'held-out interval')}{where}",
+        ["model", f"{HELD_OUT} at the key frame [mm]", "own share of the refit gap above the floor"], rows,
     )  # fmt: skip
 
 
@@ -147,7 +154,7 @@ def _how(report: DiagnoseReport, *, brief: bool) -> Iterator[list[str]]:
     upper = "" if report.refit_upper_m is None else f", upper 90 % bound {1e3 * report.refit_upper_m:.1f} mm"
     floor = "" if report.refit_floor_m is None else f"; floor {1e3 * report.refit_floor_m:.1f} mm"
     part = "" if report.refit_kept == 1.0 else f", all of the best {100 * report.refit_kept:.0f} % of the intervals"
-    yield ["refit error, left out", f"{1e3 * report.refit_rmse_m:.1f} mm{upper}{floor}{part}"]
+    yield [f"{LEFT_OUT} of the refit", f"{1e3 * report.refit_rmse_m:.1f} mm{upper}{floor}{part}"]
     yield [
         "floor",
         f"{1e3 * report.floor_m:.1f} mm: {report.floor_from}" + ("" if report.floor_given else " (estimated)"),
@@ -158,10 +165,13 @@ def _how(report: DiagnoseReport, *, brief: bool) -> Iterator[list[str]]:
         f"the best of the catalogue gains {report.chance_nats:.1f} nats left out by chance in one case of 20",
     ]
     yield ["probabilities", report.calibrated]
+    yield ["none and unknown", WHY_NONE]
+    yield ["two errors", TWO_ERRORS]
     if brief and report.refit:
         yield ["refit", f"{len(report.refit)} numbers: all with --json"]
     for name, (value, sd) in () if brief else report.refit.items():
-        yield [f"refit: {name}", _number(value, sd, report.refit_units.get(name, ""))]
+        unit = report.refit_units.get(name, "")
+        yield [f"refit: {plain_name(name, unit)}", _number(value, sd, unit)]
     took = f", {report.wall_s:.1f} s" if report.wall_s else ""
     yield ["work", f"{report.rollouts} simulated stretches{took}"
            + "".join(f"; {part} {seconds:.1f} s" for part, seconds in report.seconds.items())]  # fmt: skip
@@ -171,7 +181,7 @@ def _number(value: float, sd: float, unit: str) -> str:
     """Value and sd; of a factor by how much it differs from 1."""
     if unit == "log":
         return f"{100 * math.expm1(value):+.1f} % +- {100 * math.exp(value) * sd:.1f} % of the identified value"
-    return f"{value:+.4g} +- {sd:.2g}" + ("" if unit in ("", "1") else f" {unit}")
+    return f"{'+' * (value >= 0)}{quantity(value, unit)} +- {quantity(sd, unit, 2)}"
 
 
 def _mm(value: float | None) -> str:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from r2s2r_cli.views.diagnose_words import LEFT_OUT, RIVALS
 from r2s2r_cli.views.page import PageTable
+from schemas.people import plain_name, read_in, rounded
 from schemas.results_diagnose import BY_CHANCE
 
 if TYPE_CHECKING:
@@ -12,27 +14,32 @@ if TYPE_CHECKING:
 
 NOWHERE = -1e8
 """[nats] Below which a gain stands for one that was not asked for, or broke off."""
-_RIVALS = {
-    "none": "the refit nominal model; counts as much in every diagnosis",
-    "unknown": "a cause that the catalogue lacks; gain: of errors larger than the floor",
+_REMARKS = {
+    "none": "nothing is wrong: the refit nominal model; weighs the same in every diagnosis",
+    "unknown": "a cause that the catalogue lacks; the gain is of errors larger than the floor, its probability is not"
+    " from it (none and unknown, below)",
 }
+_NO_REPLAY = "not fitted: it changes nothing that is simulated, so the logs alone speak"
 COLUMNS = (
-    "name", "where", "all data: gain [nats]", "left out: gain +- sd [nats]", "parity [nats]", "probability",
-    "size (90 % interval)", "left-out error [mm]", "remarks",
+    "name", "where", "all data: gain [nats]", "left out: gain +- sd [nats]", "logs: parity [nats]", "probability",
+    "size (90 % interval)",
 )  # fmt: skip
 
 
 def ranking_table(report: DiagnoseReport, *, brief: bool = False) -> PageTable:
     """Every name, most probable first. brief: those that were fitted, are in the 90 % set or have something said for
     them by the logs alone; the others in one row."""
-    shown = [one for one in report.ranking if not brief or _said(one, report)]
-    rows = [_ranked(one) for one in shown]
+    shown = [one for one in report.ranking if not brief or said(one, report)]
+    rows = [_ranked(one, report) for one in shown]
     others = [one for one in report.ranking if one not in shown]
     if others:
         most = max(one.probability for one in others)
-        told = "not fitted: they promised too little; all with --json"
+        seen_by_logs = [one.effect for one in others if not replayed(one)]
+        beside = f", or change nothing that is simulated ({', '.join(seen_by_logs)})" if seen_by_logs else ""
+        told = f"not fitted: they promised too little{beside}; all with --json"
         rows.append([f"{len(others)} others", "", "", "-", "", f"<= {most:.2f} each", "", "", told])
-    return PageTable("what explains the gap", list(COLUMNS), rows)
+    error = f"{LEFT_OUT} [mm], floor {1e3 * report.floor_m:.1f}"
+    return PageTable("what explains the gap", [*COLUMNS, error, "remarks"], rows)
 
 
 def element_words(element: ElementFound | None) -> str:
@@ -46,27 +53,55 @@ def element_words(element: ElementFound | None) -> str:
     return f"all {element.kind}s" if element.index is None else f"{element.kind} {element.index}"
 
 
-def _said(one: RankedName, report: DiagnoseReport) -> bool:
-    return one.fitted or one.effect in (*_RIVALS, *report.set90, *report.effects) or one.parity_nats >= BY_CHANCE
+def said(one: RankedName, report: DiagnoseReport) -> bool:
+    """Whether something is known of a name: it was fitted, is in the 90 % set, or the logs speak for it."""
+    return one.fitted or one.effect in (*RIVALS, *report.set90, *report.effects) or one.parity_nats >= BY_CHANCE
 
 
-def _ranked(one: RankedName) -> list[str]:
-    sizes = []
-    for name, value in one.size.items():
-        unit = "" if one.units.get(name, "1") == "1" else f" {one.units[name]}"
-        low, high = one.ci90[name]
-        sizes.append(f"{name.split('.')[1]} {value:.3g} ({low:.3g} .. {high:.3g}){unit}")
-    remarks = [_RIVALS[one.effect]] if one.effect in _RIVALS else []
-    remarks += [] if one.fitted else ["not fitted: it promised too little"]
-    remarks += [] if one.moved else ["never left its start"]
-    remarks += [f"{name.split('.', 1)[1]} on a bound" for name in one.on_bound]
-    rmse = "" if one.rmse_m is None else f"{1e3 * one.rmse_m:.1f}"
+def replayed(one: RankedName) -> bool:
+    """Whether the simulator can show the effect, so that it could have been fitted."""
+    return one.fitted or one.seen_sd is not None
+
+
+def size_words(one: RankedName) -> str:
+    """`axial 9.66 (8.26 .. 11.1) mm`, numbers by name; empty where the fit never left its start: it says no size."""
+    if not one.moved:
+        return ""
+    words = []
+    for name, value in sorted(one.size.items()):
+        unit, factor = read_in(one.units.get(name, "1"))
+        low, high = (rounded(factor * end) for end in one.ci90[name])
+        words.append(f"{_own(name, one)} {rounded(factor * value)} ({low} .. {high}) {unit}".rstrip())
+    return "; ".join(words)
+
+
+def _own(name: str, one: RankedName) -> str:
+    """`axial` of `com_offset.axial_m.1`."""
+    return plain_name(name.split(".")[1], one.units.get(name, "1"))
+
+
+def _ranked(one: RankedName, report: DiagnoseReport) -> list[str]:
+    remarks = [_REMARKS[one.effect]] if one.effect in RIVALS else []
+    if not one.fitted:
+        remarks.append("not fitted: it promised too little" if replayed(one) else _NO_REPLAY)
+    remarks += [] if one.moved else ["never left its start, so no size"]
+    remarks += [f"{_own(name, one)} on a bound" for name in one.on_bound]
     where = element_words(one.element) or (f"channel {one.channel}" if one.channel else "")
     sd = "" if one.elpd_gain_sd is None else f" +- {one.elpd_gain_sd:.1f}"
     gain = f"{one.elpd_gain:.1f}{sd}" if one.fitted else "-"
     whole = f"{one.marginal_nats:.1f}" if one.fitted and one.size and one.marginal_nats is not None else ""
     parity = f"{one.parity_nats:.1f}"
-    if one.effect in _RIVALS:
+    if one.effect in RIVALS:
         whole, gain, parity = (f"{one.elpd_gain:.1f}" if one.elpd_gain > NOWHERE else "-"), "", ""
-    return [one.effect, where, whole, gain, parity, f"{one.probability:.2f}", "; ".join(sizes), rmse,
+    return [one.effect, where, whole, gain, parity, f"{one.probability:.2f}", size_words(one), _error(one, report),
             "; ".join(remarks)]  # fmt: skip
+
+
+def _error(one: RankedName, report: DiagnoseReport) -> str:
+    """That of `none` may be of the best intervals alone, beside the floor of as many."""
+    if one.rmse_m is None:
+        return ""
+    part = ""
+    if one.effect == "none" and report.refit_kept < 1.0 and report.refit_floor_m is not None:
+        part = f" (best {100 * report.refit_kept:.0f} % of intervals, floor {1e3 * report.refit_floor_m:.1f})"
+    return f"{1e3 * one.rmse_m:.1f}{part}"

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 _WHITENESS = "correlation of neighbouring residuals; ! not white: something is not modelled, or the tracker drifts"
 _DARK = 0.6
 """Correlations whose colour hides black signs."""
+_SPREAD = 0.7
+"""Of the distance between segments: marks stand side by side over it, so that none hides another."""
 _MARKS = ("_", "x", "+", "^", "v", "d", "s", "*")
 
 
@@ -54,14 +56,18 @@ def _bars(axes: Axes, segments: Group, measures: Group, repeats: Group | None = 
     axes.bar(x, 1e3 * segments["keyframe_cap_rmse"], color=[ROLE_COLORS[role] for role in roles], width=0.6)
     for role in sorted(set(roles)):
         axes.bar([0], [0], color=ROLE_COLORS[role], label=f"identified, {ROLE_WORDS[role]}")
-    for k, name in enumerate(words(measures, "baseline")):
-        if name == "identified":
-            continue  # the bars
-        error, mark = 1e3 * segments["baseline_cap_rmse"][:, k], _MARKS[k % len(_MARKS)]
-        axes.plot(x, error, mark, ms=11, mew=1.8, color="#303842", alpha=0.35 + 0.5 * (k % 2), label=name)
+    marked = [
+        (k, name) for k, name in enumerate(words(measures, "baseline")) if name != "identified"
+    ]  # that is the bars
     repeating = errors_with_repeats(segments, repeats)
+    aside = _SPREAD * (np.arange(len(marked) + 1) - 0.5 * len(marked)) / max(len(marked), 1)
+    for (k, name), beside in zip(marked, aside, strict=False):
+        error, mark = 1e3 * segments["baseline_cap_rmse"][:, k], _MARKS[k % len(_MARKS)]
+        axes.plot(x + beside, error, mark, ms=9, mew=1.8, color="#303842", alpha=0.35 + 0.5 * (k % 2), label=name)
     if repeating is not None:
-        axes.plot(x, 1e3 * repeating, "P", ms=10, mec="black", color="#f5c518", label="identified + what repeats")
+        axes.plot(
+            x + aside[-1], 1e3 * repeating, "P", ms=10, mec="black", color="#f5c518", label="identified + what repeats"
+        )
     floor = floor_of(measures)
     if math.isfinite(floor):
         axes.axhline(1e3 * floor, color="black", lw=1, ls="--", label=f"floor {1e3 * floor:.1f} mm")

@@ -27,6 +27,8 @@ _TEMPLATE = """\
 <body>
 <h1>{{ page.title }}</h1>
 <p class="verdict">{{ page.sentence }}</p>
+{% for note in page.notes %}<p>{{ note }}</p>
+{% endfor %}
 {% for label in page.labels %}<p class="label">{{ label }}</p>
 {% endfor %}
 {% for table in page.tables %}
@@ -70,6 +72,8 @@ class Page:
 
     title: str
     sentence: str
+    notes: Sequence[str] = ()
+    """What the sentence's words mean."""
     labels: Sequence[str] = ()
     """What a reader must not overlook: a sample without physics, a warning."""
     tables: Sequence[PageTable] = ()

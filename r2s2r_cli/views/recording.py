@@ -108,6 +108,11 @@ def _stream_rows(report: ImportReport) -> Iterator[tuple[str, str]]:
             yield title, ", ".join(f"{name} {count}" for name, count in counts.items())
 
 
+def import_title(report: ImportReport) -> str:
+    """What the source says is quoted as what its sidecar says: a path in it starts from there, not from the project."""
+    return f'run {report.run}, its sidecar beside the log says: "{report.source}"'
+
+
 def recording_page(reports: ImportReports, pictures: Mapping[str, bytes]) -> bytes:
     """The HTML page of an import: its report and its pictures."""
     frames = sum(report.kept for report in reports.runs)
@@ -121,7 +126,7 @@ def recording_page(reports: ImportReports, pictures: Mapping[str, bytes]) -> byt
             sentence=f"{counted(len(reports.runs), 'run')} with {counted(frames, 'kept frame')} in "
             f"{counted(intervals, 'target interval')}.",
             labels=[*samples, *warnings],
-            tables=[PageTable(f"run {r.run}: {r.source}", ["what", "found"], import_rows(r)) for r in reports.runs],
+            tables=[PageTable(import_title(r), ["what", "found"], import_rows(r)) for r in reports.runs],
             pictures=[Picture(f"run {run}", png) for run, png in pictures.items()],
         )
     )

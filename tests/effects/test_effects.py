@@ -233,6 +233,7 @@ def test_it_says_what_it_is(effect: Effect) -> None:
     text = sys.modules[type(effect).__module__].__doc__ or ""
     for heading in ("What it is:", "Where it acts:", "Parameters:", "What it looks like", "confused with:", "Source:"):
         assert heading in text
+    assert ".md" not in text  # a source is what a reader can open: literature, the paper, plain physics
 
 
 def test_off_values_are_filled_in(nominal: Variant) -> None:

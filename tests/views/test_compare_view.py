@@ -167,6 +167,7 @@ def test_the_history_is_told_and_drawn_where_there_are_two_simulators() -> None:
     """Runs of each iteration under each simulator; other numbers give another picture."""
     table = history_table(report())
     assert table is not None
+    assert table.title.startswith("errors over the iterations, the floor below them")  # a gap has its floor taken off
     assert list(table.columns) == ["simulator", "centre of mass at the end [mm], runs of 1",
                                    "centre of mass at the end [mm], runs of 2"]  # fmt: skip
     assert table.rows == [["initial", "80", "80"], ["refined", f"30 {TRAINED}", "30"], ["floor", "4", "4"]]

@@ -7,48 +7,17 @@ import pytest
 from matplotlib.figure import Figure
 
 from r2s2r_cli.artifact import ArtifactData, Group
-from r2s2r_cli.views.diagnose import draw_diagnosis, guilt
+from r2s2r_cli.views.diagnose import draw_diagnosis
 from r2s2r_cli.views.diagnose_page import diagnose_page, diagnose_tables, use
-from schemas.results_diagnose import (
-    DiagnoseReport,
-    ElementFound,
-    NextGaitFound,
-    PairFound,
-    RankedName,
-    ShrinkageFound,
-    WhereFound,
-)
-
-
-def report() -> DiagnoseReport:
-    """A payload on rod 1, found on three intervals."""
-    element = ElementFound(kind="rod", index=1)
-    return DiagnoseReport(
-        verdict="effect", sentence="The gap is caused by payload at rod 1 (p = 0.90).", effects=("payload",),
-        probability=0.9, set90=("payload", "com_offset"),
-        ranking=(
-            RankedName(effect="payload", elpd_gain=31.0, probability=0.9, size={"payload.mass_kg.1": 0.04},
-                       ci90={"payload.mass_kg.1": (0.03, 0.05)}, units={"payload.mass_kg.1": "kg"}, channel="mass",
-                       element=element, rmse_m=0.006, on_bound=("payload.place_m.1",)),
-            RankedName(effect="none", elpd_gain=0.0, probability=0.1),
-        ),
-        where=WhereFound(segments=("a:2",), onset_segment=None, channel="mass", element=element),
-        shrinkage=ShrinkageFound(
-            effects=("payload",), nominal=0.02, refit=0.012, refit_plus_effect=0.006, ceiling=0.01, floor=0.005,
-            own_share=0.7, ci90=(0.4, 0.9), predicted=0.65, judged_on=("b:1", "b:2"), within_run=False,
-        ),
-        not_testable=("motor_dead_zone",), confusable=(("payload", "com_offset", 2.1),), next_gait=None,
-        robot="threebar", floor_m=0.005, floor_from="repeats", floor_given=True, refit_rmse_m=0.012,
-        refit_upper_m=0.014, chance_nats=4.0, calibrated="uncalibrated: a temperature by hand", left_out="3 gaits",
-        segments=(), hidden=(), parity=("rod lengths are as built",), missing=("no sensors",),
-        refit={"friction": (0.1, 0.02)}, rollouts=100, within_run=False, warnings=("look here",),
-    )  # fmt: skip
+from schemas.results_diagnose import NextGaitFound, PairFound
+from tests.support.diagnosed import report
 
 
 def test_the_page_says_what_was_found_and_what_it_is_worth() -> None:
     """The sentence, the warning, that probabilities are by hand; nothing is loaded from elsewhere."""
     page = diagnose_page(report(), []).decode()
     assert "payload at rod 1" in page and "look here" in page
+    assert "<h1>Diagnosis of threebar: effect</h1>" in page and "Verdict effect: one effect of the catalogue" in page
     assert "uncalibrated" in page
     assert "http://" not in page and "https://" not in page
 
@@ -57,8 +26,8 @@ def test_tables_hold_the_share_beside_its_prediction_and_its_doubts() -> None:
     """Both shares, the size with its unit and interval, the bound it ended on, and who cannot be told apart."""
     text = "\n".join(" | ".join(row) for table in diagnose_tables(report()) for row in table.rows)
     assert "70 % (40 .. 90)" in text and "65 %" in text
-    assert "mass_kg 0.04 (0.03 .. 0.05) kg" in text
-    assert "place_m.1 on a bound" in text
+    assert "mass 0.0400 (0.0300 .. 0.0500) kg" in text
+    assert "place on a bound" in text
     assert "payload | com_offset | 2.1 | cannot be told apart" in text
 
 
@@ -72,10 +41,10 @@ def test_rivals_and_numbers_say_what_they_are() -> None:
     })  # fmt: skip
     text = "\n".join(" | ".join(row) for table in diagnose_tables(made) for row in table.rows)
     assert (
-        "31.0 +- 4.0" in text and "none |  | 0.0 |  |  | 0.10" in text and "counts as much in every diagnosis" in text
+        "31.0 +- 4.0" in text and "none |  | 0.0 |  |  | 0.10" in text and "weighs the same in every diagnosis" in text
     )
     assert "refit: friction | +10.5 % +- 2.2 % of the identified value" in text
-    assert "refit: motor_lag.tau_s | +0.03 +- 0.004 s" in text
+    assert "refit: motor_lag.tau | +0.0300 s +- 0.0040 s" in text
 
 
 def test_what_was_not_fitted_has_no_gain() -> None:
@@ -94,7 +63,7 @@ def test_what_was_not_fitted_has_no_gain() -> None:
     rows = {row[0]: row for row in table.rows}
     assert rows["dropout"][3] == "-" and "not fitted" in rows["dropout"][-1]
     assert rows["payload"][3].startswith("31.0") and rows["payload"][2] == "52.0" and rows["dropout"][2] == ""
-    assert rows["payload"][6] == "mass_kg 0.04 (0.03 .. 0.05) kg; place_m 0.1 (0.05 .. 0.15) m"
+    assert rows["payload"][6] == "mass 0.0400 (0.0300 .. 0.0500) kg; place 100 (50.0 .. 150) mm"
 
 
 def test_a_terminal_is_told_what_something_is_said_of() -> None:
@@ -102,7 +71,8 @@ def test_a_terminal_is_told_what_something_is_said_of() -> None:
     refitted numbers; the page has all of them."""
     first, none = report().ranking
     others = tuple(
-        none.model_copy(update={"effect": name, "fitted": False, "probability": p, "parity_nats": nats})
+        none.model_copy(update={"effect": name, "fitted": False, "probability": p, "parity_nats": nats,
+                                 "seen_sd": None if name == "dropout" else 3.0})
         for name, p, nats in (("com_offset", 0.02, 0.0), ("backlash", 0.03, 0.2), ("dropout", 0.01, 9.0),
                               ("motor_lag", 0.01, 0.0))
     )  # fmt: skip
@@ -159,26 +129,6 @@ def test_what_to_run_next_is_said_beside_what_was_run(nats: float, now: float | 
     rows = [row for table in diagnose_tables(made) for row in table.rows if row[0] == "run next"]
     command = f"r2s2r record {file} --iteration 2 --repeats 2 --port /dev/ttyUSB0 --camera realsense"
     assert rows == [["run next", f"{words}: {command}"]]
-
-
-@pytest.mark.parametrize(
-    ("verdict", "element", "channel", "words"),
-    [
-        ("effect", ElementFound(kind="rod", index=1), "mass", "guilty: rod 1"),
-        ("effect", ElementFound(kind="camera"), "observation", "guilty: the camera, nothing on the robot"),
-        ("ambiguous", ElementFound(kind="cap", index=3), "contact", "most suspect: cap 3 (verdict: ambiguous)"),
-        ("effect", None, "motor", "no single part: it acts in channel motor (verdict: effect)"),
-        ("ambiguous", None, "cable", "no single part stands out: it acts in channel cable (verdict: ambiguous)"),
-        ("unknown", None, None, "no part stands out (verdict: unknown)"),
-        ("no_gap", None, None, "no part is guilty: there is no gap"),
-    ],
-)
-def test_the_robot_is_blamed_as_surely_as_the_verdict(
-    verdict: str, element: ElementFound | None, channel: str | None, words: str
-) -> None:
-    """A part is guilty only where the verdict commits to it; without one, what is known is said."""
-    where = WhereFound(segments=(), onset_segment=None, channel=channel, element=element)
-    assert guilt(report().model_copy(update={"verdict": verdict, "where": where})) == words
 
 
 def test_no_error_lies_outside_of_its_picture(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ import pytest
 from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Value
 from r2s2r_cli.stages.import_ import import_source, merge_runs
 from r2s2r_cli.views.figure import spread_out
-from r2s2r_cli.views.recording import draw_recording, ground_offset, import_rows
+from r2s2r_cli.views.recording import draw_recording, ground_offset, import_rows, import_title
 from r2s2r_cli.views.recording_streams import panels
 from tests.support.import_samples import (
     SIDECAR,
@@ -44,6 +44,13 @@ def test_the_report_of_every_format_becomes_rows(kind: str, tmp_path: Path) -> N
     assert report.format == kind
     assert rows["frames kept"].startswith(f"{report.kept} of {report.rows} rows")
     assert ("rod 0" in rows) == ("ground offset" in rows) == (kind == "trajectory_csv")
+
+
+def test_what_a_sidecar_says_is_quoted(tmp_path: Path) -> None:
+    """A path in it is seen from there: it is not said as if it were one of the project."""
+    report = import_source(_source("trajectory_csv", tmp_path), robot=sample_robot()).report
+    said = import_title(report.model_copy(update={"source": "measured by us; see ../README.md"}))
+    assert said == 'run walk, its sidecar beside the log says: "measured by us; see ../README.md"'
 
 
 def test_the_side_of_the_ground_follows_the_sign() -> None:

@@ -1,6 +1,7 @@
 """The effects of the catalogue's first release as tables of the rig's world file, at a size that is asked for.
 
-Written from reference/diagnosis.md section 2 and the rig's own reference, without a look at `r2s2r_cli.effects`.
+Written from the catalogue as it was designed (docs/reference/effects.md lists it today) and the rig's own reference,
+without a look at `r2s2r_cli.effects`.
 """
 
 from __future__ import annotations
@@ -231,7 +232,7 @@ STARRED: dict[str, Callable[[Draw], Planted]] = {
     "sensor_bias": _bias, "sensor_gain": _gain, "camera_pose": _pose, "camera_scale": _scale, "camera_delay": _delay,
     "dropout": _dropout,
 }  # fmt: skip
-"""By id. The rig's usual size (1) is about that of the pilot in reference/diagnosis.md section 6."""
+"""By id. The rig's usual size (1) is about that of the pilot that the catalogue was designed with."""
 USUAL = {"motor_dead_zone": 1.6, "cap_friction": 1.6, "cap_radius": 1.8, "sensor_bias": 1.5, "sensor_gain": 1.5,
          "camera_pose": 1.6}  # fmt: skip
 """Effects whose size 1 tells less than that of the others (tested by d): by how much their usual size is larger."""

@@ -8,11 +8,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.identify import draw_identification, parameters_figure
 from r2s2r_cli.views.identify_data import near_zero
-from r2s2r_cli.views.identify_errors import errors_with_repeats, floor_of
+from r2s2r_cli.views.identify_errors import draw_errors, errors_with_repeats, floor_of
 from r2s2r_cli.views.identify_fits import cap_rmse
 from r2s2r_cli.views.identify_information import draw_information, information_figure
 from r2s2r_cli.views.identify_page import identify_page, report_tables, verdict
@@ -58,6 +59,20 @@ def test_what_repeats_stands_at_its_own_segment() -> None:
     assert off is not None
     assert off == pytest.approx([np.nan, 0.5 * groups["segments"]["keyframe_cap_rmse"][1]], nan_ok=True)
     assert errors_with_repeats(groups["segments"], None) is None
+
+
+def test_no_mark_lies_on_another_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Baselines that are as wrong as each other stand side by side at their segment."""
+    figures: list[Figure] = []
+
+    def kept(figure: Figure) -> bytes:
+        figures.append(figure)
+        return b""
+
+    monkeypatch.setattr("r2s2r_cli.views.identify_errors.png_bytes", kept)
+    draw_errors(builders.identification())
+    marks = [line.get_xdata()[0] for line in figures[0].axes[0].lines if line.get_linestyle() == "None"]  # type: ignore[index]
+    assert len(marks) > 2 and len(set(marks)) == len(marks) and max(map(abs, marks)) < 0.5
 
 
 def test_what_is_not_there_is_not_drawn() -> None:

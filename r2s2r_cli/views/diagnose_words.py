@@ -1,0 +1,69 @@
+"""What tables and pictures of a diagnosis have in common: the verdict, what it accuses, which effect is drawn."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from schemas.results_diagnose import DiagnoseReport, ElementFound
+
+RIVALS = ("none", "unknown")
+"""Names of a ranking that are no effects."""
+GUIDE = "docs/guides/diagnose.md"
+"""Where verdicts are explained."""
+_MEANS = {
+    "effect": ("one effect of the catalogue is the cause", "Use what was found"),
+    "pair": ("two effects of the catalogue are the cause", "Use what was found"),
+    "ambiguous": (
+        "no effect is likely enough to be named, nor is it shown that there is no gap",
+        "What to do after `ambiguous`",
+    ),
+    "no_gap": ("the refit simulator is at the floor; what is smaller may still be there", "Verdicts"),
+    "unknown": ("something is wrong that no effect of the catalogue explains", "Verdicts"),
+}
+LEFT_OUT = "left-out error"
+"""Of fitted intervals, each predicted by a fit without it."""
+HELD_OUT = "held-out error"
+"""Of judged intervals, that were used for nothing before."""
+TWO_ERRORS = (
+    f"{LEFT_OUT}: of fitted intervals, each predicted by a fit without it; {HELD_OUT}: of the judged intervals, which "
+    "were used for nothing before. They are of other intervals, each beside its own floor, so one may be at the floor "
+    "and the other not"
+)
+WHY_NONE = (
+    "a gain is what these runs say, before what is known beforehand. none gains nothing by definition: sets of known "
+    "truth taught how much an effect must gain to be likelier. unknown has the share of causes that the catalogue "
+    "lacks, whatever it gains: in calibration sets that gain did not tell such causes from others. It has more only "
+    "where the best effect leaves far more than healthy runs do. So none may be likelier than unknown, which gains more"
+)
+
+
+def verdict_words(report: DiagnoseReport) -> str:
+    """`ambiguous: no name is likely enough to be given (...)`: the word, its meaning, where to read on."""
+    means, chapter = _MEANS[report.verdict]
+    return f"{report.verdict}: {means} ({GUIDE}, chapter {chapter})"
+
+
+def commits(report: DiagnoseReport) -> bool:
+    """Whether the verdict names a cause."""
+    return report.verdict in ("effect", "pair")
+
+
+def accused(report: DiagnoseReport) -> ElementFound | None:
+    """The part that the verdict names; None where it names none."""
+    return report.where.element if commits(report) else None
+
+
+def undecided(report: DiagnoseReport) -> bool:
+    """Whether the likeliest name is an effect to which the verdict does not commit."""
+    first = report.ranking[0].effect if report.ranking else "none"
+    return report.verdict == "ambiguous" and first not in RIVALS
+
+
+def drawn_effects(report: DiagnoseReport) -> tuple[str, ...]:
+    """Whose errors are stored beside those of the refit model for every fitted interval: what was committed to, else
+    the first of the ranking that was fitted; empty where none was."""
+    fitted = [one.effect for one in report.ranking if one.fitted and one.effect not in RIVALS]
+    if report.effects and all(name in fitted for name in report.effects):
+        return report.effects
+    return tuple(fitted[:1])

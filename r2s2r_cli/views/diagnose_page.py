@@ -82,7 +82,7 @@ def _shrinkage(report: DiagnoseReport) -> PageTable:
         ),
         ["refit + a black box" + learned, _mm(s.ceiling), ""],
         ["floor of held-out intervals", _mm(s.floor), ""],
-        ["predicted before it was looked at", "", _share(s.predicted, None)],
+        ["predicted before it was looked at", "", _predicted(s.predicted)],
     ]
     where = "; within the run that was fitted" if s.within_run else ""
     if s.set_aside:
@@ -193,3 +193,8 @@ def _share(value: float | None, ends: tuple[float, float] | None) -> str:
         return "at the floor"
     wide = "" if ends is None else f" ({round(100 * ends[0])} .. {round(100 * ends[1])})"
     return f"{round(100 * value)} %{wide}"
+
+
+def _predicted(value: float | None) -> str:
+    """Left-out intervals that get worse foretell no share, by however much they do."""
+    return _share(value, None) if value is None or value > 0.0 else "none"

@@ -150,3 +150,12 @@ def test_no_error_lies_outside_of_its_picture(monkeypatch: pytest.MonkeyPatch) -
     for axes in figures[0].axes:
         low, high = axes.get_ylim()
         assert low == 0.0 and high > 100.0
+
+
+def test_a_gap_that_is_to_grow_is_no_share() -> None:
+    """What was predicted of it is none, not a percentage below nothing."""
+    made = report()
+    assert made.shrinkage is not None
+    made = made.model_copy(update={"shrinkage": made.shrinkage.model_copy(update={"predicted": -10.2})})
+    (row,) = (row for table in diagnose_tables(made) for row in table.rows if row[0].startswith("predicted"))
+    assert row[-1] == "none"

@@ -15,6 +15,9 @@ from schemas.results_diagnose import INDISTINCT
 if TYPE_CHECKING:
     from schemas.results_diagnose import DiagnoseReport, NextGaitFound, PairFound, RankedName
 
+ROBOT = "--port /dev/ttyUSB0 --protocol legacy --camera realsense"
+"""How the robot of the paper is reached, in commands that are shown."""
+
 
 def diagnose_tables(report: DiagnoseReport, *, brief: bool = False) -> Iterator[PageTable]:
     """What people read first comes first. brief: for a terminal, without effects of which nothing is said and without
@@ -117,7 +120,7 @@ def _limits(report: DiagnoseReport) -> Iterator[list[str]]:
     if command:
         yield ["use it", command]
     if report.next_gait is None:
-        yield ["run next", "nothing: no gait of the library would decide more"]
+        yield ["run next", f"no gait of the library would decide more{_healthy(report)}"]
     else:
         yield ["run next", _next(report.next_gait, _free(report))]
 
@@ -140,9 +143,21 @@ def _free(report: DiagnoseReport) -> str:
     return "" if report.free_iteration is None else f" --iteration {report.free_iteration}"
 
 
+def _healthy(report: DiagnoseReport) -> str:
+    """What is left to do where no gait helps: runs from when nothing was wrong, if there are none."""
+    if report.verdict != "ambiguous" or not any(text.startswith("healthy runs") for text in report.missing):
+        return ""
+    again = "" if report.iteration is None else f" --iteration {report.iteration}"
+    also = "" if report.free_iteration is None else f" --also {report.free_iteration}"
+    return (
+        f"; healthy runs would: r2s2r record --random 15 --repeats 2{_free(report)} {ROBOT} with the robot as it was when "
+        f"nothing was wrong, then r2s2r diagnose{again}{also} --healthy RUN for each of its runs"
+    )
+
+
 def _next(one: NextGaitFound, where: str) -> str:
     """What to run (where: the option that says in which iteration), and what it is worth beside the runs so far."""
-    how = f": r2s2r record {one.file}{where} --repeats 2 --port /dev/ttyUSB0 --camera realsense" if one.file else ""
+    how = f": r2s2r record {one.file}{where} --repeats 2 {ROBOT}" if one.file else ""
     if one.now is not None and one.nats <= one.now:
         return f"nothing separates the candidates better than these runs; the best of the library is {one.name}{how}"
     beside = "" if one.now is None else f", these runs by {one.now:.1f}"

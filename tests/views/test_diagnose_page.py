@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.diagnose import draw_diagnosis
-from r2s2r_cli.views.diagnose_page import diagnose_page, diagnose_tables, use
-from schemas.results_diagnose import NextGaitFound, PairFound
+from r2s2r_cli.views.diagnose_page import ROBOT, diagnose_page, diagnose_tables, use
+from schemas.results_diagnose import DiagnoseReport, NextGaitFound, PairFound
 from tests.support.diagnosed import report
 
 
@@ -127,7 +127,7 @@ def test_what_to_run_next_is_said_beside_what_was_run(nats: float, now: float | 
     one = NextGaitFound(name="ramps", file=file, targets=((1.0,),), nats=nats, now=now)
     made = report().model_copy(update={"next_gait": one, "free_iteration": 2})
     rows = [row for table in diagnose_tables(made) for row in table.rows if row[0] == "run next"]
-    command = f"r2s2r record {file} --iteration 2 --repeats 2 --port /dev/ttyUSB0 --camera realsense"
+    command = f"r2s2r record {file} --iteration 2 --repeats 2 {ROBOT}"
     assert rows == [["run next", f"{words}: {command}"]]
 
 
@@ -159,3 +159,17 @@ def test_a_gap_that_is_to_grow_is_no_share() -> None:
     made = made.model_copy(update={"shrinkage": made.shrinkage.model_copy(update={"predicted": -10.2})})
     (row,) = (row for table in diagnose_tables(made) for row in table.rows if row[0].startswith("predicted"))
     assert row[-1] == "none"
+
+
+def test_where_no_gait_helps_healthy_runs_would() -> None:
+    """With the commands; not where there are some, nor where a cause is named."""
+    lacking = {"missing": ("healthy runs: findings are against robot.toml",), "iteration": 1, "free_iteration": 2}
+    undecided = report().model_copy(update={"verdict": "ambiguous", **lacking})
+
+    def advice(made: DiagnoseReport) -> str:
+        return next(row[1] for table in diagnose_tables(made) for row in table.rows if row[0] == "run next")
+
+    assert f"r2s2r record --random 15 --repeats 2 --iteration 2 {ROBOT}" in advice(undecided)
+    assert "r2s2r diagnose --iteration 1 --also 2 --healthy RUN" in advice(undecided)
+    plain = "no gait of the library would decide more"
+    assert advice(undecided.model_copy(update={"missing": ()})) == plain == advice(report().model_copy(update=lacking))

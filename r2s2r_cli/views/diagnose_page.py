@@ -150,8 +150,9 @@ def _healthy(report: DiagnoseReport) -> str:
     again = "" if report.iteration is None else f" --iteration {report.iteration}"
     also = "" if report.free_iteration is None else f" --also {report.free_iteration}"
     return (
-        f"; healthy runs would: r2s2r record --random 15 --repeats 2{_free(report)} {ROBOT} with the robot as it was when "
-        f"nothing was wrong, then r2s2r diagnose{again}{also} --healthy RUN for each of its runs"
+        "; healthy runs would, of the robot as it was when nothing was wrong: "
+        f"r2s2r record --random 15 --repeats 2{_free(report)} {ROBOT}, then r2s2r estimate{_free(report)}, then "
+        f"r2s2r diagnose{again}{also} --healthy RUN (once for each of them)"
     )
 
 

@@ -70,7 +70,7 @@ def test_a_model_without_uncertainty_is_said(estimated: Path) -> None:
         (
             "--train sample:1-3 --test sample:2-4",
             "--train, --test",
-            "r2s2r diagnose --test sample:2-4 --train sample:1",
+            "r2s2r diagnose --train sample:1 --test sample:2-4",
         ),
         ("--healthy smaple --seed 4", "--healthy", "r2s2r diagnose --seed 4 --healthy sample --json --dry-run"),
         ("--also 5", "--also", "r2s2r status"),

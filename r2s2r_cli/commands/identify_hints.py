@@ -11,6 +11,7 @@ from pathlib import Path
 
 from r2s2r_cli.errors import R2S2RError
 from r2s2r_cli.store.atomic import PARTIAL
+from r2s2r_cli.store.header import NotAnArtifact
 
 FLAGS = (
     "--online",
@@ -68,6 +69,8 @@ def completed(error: R2S2RError, typed: Sequence[str], command: str = _COMMAND) 
     value that was received and has nothing in its place goes.
     """
     said, gap, remark = error.hint.partition("   #")
+    if isinstance(error, NotAnArtifact):
+        return error.hint  # about another artifact, maybe of the same stage
     if said.startswith(command):
         said = said[len(command) :]
     elif not said.startswith("--"):

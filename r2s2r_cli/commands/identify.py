@@ -145,7 +145,7 @@ def identify(
     asked = Asked(
         here, place, train=tuple(train or ()), test=tuple(test or ()), free=tuple(free or ()), fix=tuple(fix or ()),
         effects=tuple(with_effect or ()), method=method, drive=DRIVES.get(drive, drive),  # type: ignore[arg-type]
-        online=online, discrepancy=discrepancy, also=tuple(also or ()), seed=seed, typed=tuple(typed),
+        online=online, discrepancy=discrepancy, also=tuple(dict.fromkeys(also or ())), seed=seed, typed=tuple(typed),
     )  # fmt: skip
     with whole_hints([*typed, *["--resume"] * resume], asked.artifacts):
         _require_one_of(method, METHODS, "--method")

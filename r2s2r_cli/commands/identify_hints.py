@@ -24,6 +24,7 @@ FLAGS = (
     "--dry-run",
     "--force",
     "--draw",
+    "--sample",
 )
 """Options without a value."""
 SINGLE = ("--method", "--drive", "--seed", "--starts", "--iteration", "--project", "--model")

@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 
 from r2s2r_cli import __version__
 from r2s2r_cli.commands import COMMANDS, GROUPS
+from r2s2r_cli.commands.whole import whole
 from r2s2r_cli.console import PipeClosed, print_error
 from r2s2r_cli.errors import DamageWarning, ExitCode, GateError, InputError, Interrupted, R2S2RError, UsageError
 
@@ -39,17 +40,19 @@ class ErrorGroup(TyperGroup):
         arguments = list(sys.argv[1:] if args is None else args) or ["--help"]
         run = super().main
         code = run_guarded(
-            lambda: run(arguments, prog_name, complete_var, False, windows_expand_args, **extra), "--json" in arguments
+            lambda: run(arguments, prog_name, complete_var, False, windows_expand_args, **extra),
+            "--json" in arguments,
+            arguments,
         )
         sys.exit(code)
 
 
-def run_guarded(call: Callable[[], object], as_json: bool) -> int:
-    """Run `call` and return its exit code; errors and warnings are printed in our form."""
+def run_guarded(call: Callable[[], object], as_json: bool, arguments: Sequence[str] = ()) -> int:
+    """Run `call` and return its exit code; errors and warnings are printed in our form. arguments: as typed."""
     with warnings.catch_warnings():
         warnings.simplefilter("always", DamageWarning)
         warnings.showwarning = _warner(warnings.showwarning)
-        return _run_guarded(call, as_json)
+        return _run_guarded(call, as_json, arguments)
 
 
 def _warner(other: Callable[..., None]) -> Callable[..., None]:
@@ -64,7 +67,7 @@ def _warner(other: Callable[..., None]) -> Callable[..., None]:
     return show
 
 
-def _run_guarded(call: Callable[[], object], as_json: bool) -> int:
+def _run_guarded(call: Callable[[], object], as_json: bool, arguments: Sequence[str]) -> int:
     try:
         result = call()
         code = result if isinstance(result, int) else ExitCode.DONE
@@ -76,6 +79,7 @@ def _run_guarded(call: Callable[[], object], as_json: bool) -> int:
         print(f"interrupted: {error.what}\nhint: {error.hint}", file=sys.stderr)
         return error.exit_code
     except R2S2RError as error:
+        error.hint = whole(error, arguments)
         # A gate is judged on a result that was printed: stdout holds its document already.
         print_error(error, as_json=as_json and not isinstance(error, GateError))
         return error.exit_code

@@ -70,8 +70,8 @@ def completed(error: R2S2RError, typed: Sequence[str], command: str = _COMMAND) 
     value that was received and has nothing in its place goes.
     """
     said, gap, remark = error.hint.partition("   #")
-    if isinstance(error, NotAnArtifact):
-        return error.hint  # about another artifact, maybe of the same stage
+    if isinstance(error, NotAnArtifact) or said.endswith(" --show-config"):
+        return error.hint  # about another artifact, maybe of the same stage, or about none
     if said.startswith(command):
         said = said[len(command) :]
     elif not said.startswith("--"):
@@ -128,6 +128,8 @@ def _replaces(new: Option, old: Option, error: R2S2RError) -> bool:
     if new[0] != name:
         return False
     if name in SINGLE or name in FLAGS:
+        return True
+    if name == "--set" and _about(value).rpartition(".")[2] == error.received:
         return True
     return _about(new[1]) == _about(value) or value == error.received or _about(value) in error.received.split(", ")
 

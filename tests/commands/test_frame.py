@@ -134,20 +134,21 @@ def test_overrides_are_toml_values() -> None:
 
 
 @pytest.mark.parametrize(
-    ("item", "words"),
+    ("item", "words", "hint"),
     [
-        ("s.novalue", "no value"),
-        ("=3", "no value"),
-        ("", "no value"),
-        ("key=3", "no setting"),
-        ("t.key=3", "no setting"),
+        ("diagnose.members", "no value", "--set diagnose.members=16"),
+        ("=3", "no value", "r2s2r diagnose --show-config"),
+        ("", "no value", "r2s2r diagnose --show-config"),
+        ("member=32", "no setting", "--set diagnose.members=32"),
+        ("identify.starts=3", "no setting", "r2s2r diagnose --show-config"),
     ],
 )
-def test_an_override_that_would_be_ignored_is_refused(item: str, words: str) -> None:
-    """--set without KEY=VALUE, without a section or of another stage is a usage error with the right form as hint."""
+def test_an_override_that_would_be_ignored_is_refused(item: str, words: str, hint: str) -> None:
+    """--set without KEY=VALUE, without a section or of another stage is a usage error with the setting that was meant
+    as hint, or with what lists them."""
     with pytest.raises(UsageError, match=words) as caught:
-        parse_overrides([item], "s")
-    assert caught.value.hint.startswith("--set s.")
+        parse_overrides([item], "diagnose")
+    assert caught.value.hint == hint and caught.value.expected == "diagnose.KEY=VALUE"
 
 
 SHELL_CASES = {

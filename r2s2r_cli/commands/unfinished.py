@@ -42,7 +42,8 @@ def checkpoints(project: Project) -> dict[tuple[str, int | None], Kept]:
 def interrupted(project: Project, one: Kept, busy: str | None) -> ArtifactState:
     """A checkpoint. busy: who writes in the project now."""
     running = busy is not None and f"'r2s2r {one.stage}'" in busy
-    why = f"{busy} is at work" if running else f"what was worked out so far is kept: {one.command}"
+    # The option comes first: a table breaks a long command before its end, and without it the work begins anew.
+    why = f"{busy} is at work" if running else f"--resume goes on with what is kept: {one.command}"
     return ArtifactState(
         stage=one.stage, iteration=one.iteration, artifact=project.relative(one.path),
         state="running" if running else "interrupted", reasons=(why,), bytes=one.path.stat().st_size,

@@ -36,6 +36,8 @@ def test_what_was_interrupted_is_said_with_the_command_that_goes_on(bot: Project
     assert [(one.stage, one.iteration, one.state) for one in found.artifacts] == [("diagnose", 1, "interrupted")]
     assert found.next == "r2s2r diagnose --iteration 1 --healthy 'a b' --resume"
     assert found.next in found.artifacts[0].reasons[0]
+    shown = next(line for line in invoke("status").stdout.splitlines() if "70-diagnose.partial" in line)
+    assert "--resume" in shown  # in the first line of its cell, wherever that breaks the command
     assert invoke("status", "--check").exit_code == 0
 
 

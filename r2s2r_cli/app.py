@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 
 from r2s2r_cli import __version__
 from r2s2r_cli.commands import COMMANDS, GROUPS
+from r2s2r_cli.commands.parsing import usage_error
 from r2s2r_cli.commands.whole import whole
 from r2s2r_cli.console import PipeClosed, print_error
 from r2s2r_cli.errors import DamageWarning, ExitCode, GateError, InputError, Interrupted, R2S2RError, UsageError
@@ -84,7 +85,7 @@ def _run_guarded(call: Callable[[], object], as_json: bool, arguments: Sequence[
         print_error(error, as_json=as_json and not isinstance(error, GateError))
         return error.exit_code
     except typer.TyperException as error:
-        print_error(_usage_error(error), as_json=as_json)
+        print_error(usage_error(error, arguments), as_json=as_json)
         return ExitCode.USAGE
     except (KeyboardInterrupt, typer.Abort):
         print("interrupted: nothing is half-written; run the command again", file=sys.stderr)
@@ -130,15 +131,6 @@ def _open_streams() -> None:
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115 - stays open to the end
         elif hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
-
-
-def _usage_error(error: typer.TyperException) -> UsageError:
-    message = error.format_message() if hasattr(error, "format_message") else str(error)
-    context = getattr(error, "ctx", None)
-    command = context.command_path if context is not None else "r2s2r"
-    if message.startswith("Usage:"):  # a group without its subcommand: Typer's message is the whole help
-        message = "a subcommand is missing"
-    return UsageError(message.rstrip(".").strip(), where=command, hint=f"{command} --help")
 
 
 app = typer.Typer(

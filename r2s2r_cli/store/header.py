@@ -166,16 +166,14 @@ def mends(path: Path, or_else: str = "recover") -> str:
 def unreadable(path: Path, error: OSError) -> ArtifactError:
     """Say in words why `path` cannot be read."""
     if isinstance(error, FileNotFoundError):
-        return ArtifactError(
-            "there is no such file", where=str(path), expected="an artifact", hint=f"ls -la '{path.parent}'"
-        )
+        there = next((folder for folder in path.parents if folder.is_dir()), Path())
+        return ArtifactError("there is no such file", where=str(path), expected="an artifact", received="nothing",
+                             hint=f"ls -la '{there}'")  # fmt: skip
     if isinstance(error, IsADirectoryError):
-        return ArtifactError(
-            "this is a directory, not an artifact", where=str(path), expected="a file", hint=f"ls -la '{path}'"
-        )
-    return ArtifactError(
-        "the file cannot be read", where=str(path), received=error.strerror or str(error), hint=f"ls -la '{path}'"
-    )
+        return ArtifactError("this is a directory, not an artifact", where=str(path), expected="a file",
+                             received="a directory", hint=f"ls -la '{path}'")  # fmt: skip
+    return ArtifactError("the file cannot be read", where=str(path), expected="a file that may be read",
+                         received=error.strerror or str(error), hint=f"ls -la '{path}'")  # fmt: skip
 
 
 def _encode(header: Header) -> bytes:

@@ -79,7 +79,8 @@ def _value(error: Any, message: str, command: Any, words: list[str]) -> Said:
     wrong = given[0] if wrong is None and len(given) == 1 else wrong
     if wrong is None:
         return f"this is no value of {param.name}", expected, said, None
-    near = difflib.get_close_matches(wrong.value, choices, 1)
+    begun = [one for one in choices if wrong.value and one.startswith(wrong.value)]
+    near = begun if len(begun) == 1 else difflib.get_close_matches(wrong.value, choices, 1)
     usual = getattr(param.default, "value", param.default)
     right = near[0] if near else None if usual is None or param.multiple else str(usual)
     mended = None if choices and not near else wrong.replaced(words, right)

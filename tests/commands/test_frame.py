@@ -110,6 +110,7 @@ def test_misspelt_usage_names_the_cure(arguments: list[str], words: str) -> None
         ("init a --seed=x", "x", "r2s2r init a --seed=0"),
         ("export x.h5 --to mjfc", "mjfc", "r2s2r export x.h5 --to mjcf"),
         ("export x.h5 --to xml", "xml", "r2s2r export --help"),
+        ("import a.csv --format tum", "tum", "r2s2r import a.csv --format tum_rgbd"),
         ("status a b --quiet", "a b", "r2s2r status --quiet"),
         ("init a --seed", "nothing", "r2s2r init a"),
         ("status --json=1 --quiet", "1", "r2s2r status --json --quiet"),

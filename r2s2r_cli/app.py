@@ -15,6 +15,8 @@ from typer.core import TyperGroup
 
 from r2s2r_cli import __version__
 from r2s2r_cli.commands import COMMANDS, GROUPS
+from r2s2r_cli.commands.parsing import usage_error
+from r2s2r_cli.commands.whole import whole
 from r2s2r_cli.console import PipeClosed, print_error
 from r2s2r_cli.errors import DamageWarning, ExitCode, GateError, InputError, Interrupted, R2S2RError, UsageError
 
@@ -39,17 +41,19 @@ class ErrorGroup(TyperGroup):
         arguments = list(sys.argv[1:] if args is None else args) or ["--help"]
         run = super().main
         code = run_guarded(
-            lambda: run(arguments, prog_name, complete_var, False, windows_expand_args, **extra), "--json" in arguments
+            lambda: run(arguments, prog_name, complete_var, False, windows_expand_args, **extra),
+            "--json" in arguments,
+            arguments,
         )
         sys.exit(code)
 
 
-def run_guarded(call: Callable[[], object], as_json: bool) -> int:
-    """Run `call` and return its exit code; errors and warnings are printed in our form."""
+def run_guarded(call: Callable[[], object], as_json: bool, arguments: Sequence[str] = ()) -> int:
+    """Run `call` and return its exit code; errors and warnings are printed in our form. arguments: as typed."""
     with warnings.catch_warnings():
         warnings.simplefilter("always", DamageWarning)
         warnings.showwarning = _warner(warnings.showwarning)
-        return _run_guarded(call, as_json)
+        return _run_guarded(call, as_json, arguments)
 
 
 def _warner(other: Callable[..., None]) -> Callable[..., None]:
@@ -64,7 +68,7 @@ def _warner(other: Callable[..., None]) -> Callable[..., None]:
     return show
 
 
-def _run_guarded(call: Callable[[], object], as_json: bool) -> int:
+def _run_guarded(call: Callable[[], object], as_json: bool, arguments: Sequence[str]) -> int:
     try:
         result = call()
         code = result if isinstance(result, int) else ExitCode.DONE
@@ -76,11 +80,12 @@ def _run_guarded(call: Callable[[], object], as_json: bool) -> int:
         print(f"interrupted: {error.what}\nhint: {error.hint}", file=sys.stderr)
         return error.exit_code
     except R2S2RError as error:
+        error.hint = whole(error, arguments)
         # A gate is judged on a result that was printed: stdout holds its document already.
         print_error(error, as_json=as_json and not isinstance(error, GateError))
         return error.exit_code
     except typer.TyperException as error:
-        print_error(_usage_error(error), as_json=as_json)
+        print_error(usage_error(error, arguments), as_json=as_json)
         return ExitCode.USAGE
     except (KeyboardInterrupt, typer.Abort):
         print("interrupted: nothing is half-written; run the command again", file=sys.stderr)
@@ -126,15 +131,6 @@ def _open_streams() -> None:
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115 - stays open to the end
         elif hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
-
-
-def _usage_error(error: typer.TyperException) -> UsageError:
-    message = error.format_message() if hasattr(error, "format_message") else str(error)
-    context = getattr(error, "ctx", None)
-    command = context.command_path if context is not None else "r2s2r"
-    if message.startswith("Usage:"):  # a group without its subcommand: Typer's message is the whole help
-        message = "a subcommand is missing"
-    return UsageError(message.rstrip(".").strip(), where=command, hint=f"{command} --help")
 
 
 app = typer.Typer(

@@ -42,20 +42,35 @@ def parse_overrides(items: list[str] | None, stage: str) -> dict[str, Any]:
         name, equals, text = item.partition("=")
         key = name.strip()
         if not equals or not key:
-            raise UsageError("an override has no value", where="--set", expected="KEY=VALUE", received=item,
-                             hint=f"--set {stage}.key=0.1")  # fmt: skip
+            raise UsageError("an override has no value", where="--set", expected=f"{stage}.KEY=VALUE",
+                             received=item or "nothing", hint=_meant(stage, key, None))  # fmt: skip
         if key.split(".")[0] != stage or "." not in key:
-            tail = key.rpartition(".")[2]
             raise UsageError(
-                f"this is no setting of {stage}",
-                where="--set",
-                expected=f"{stage}.KEY=VALUE",
-                received=item,
-                hint=f"--set {stage}.{tail}={text}   # r2s2r {stage} --show-config lists the keys",
-            )
+                f"this is no setting of {stage}", where="--set", expected=f"{stage}.KEY=VALUE", received=item,
+                hint=_meant(stage, key, text),
+            )  # fmt: skip
         try:
             parsed = tomllib.loads(f"value = {text}")
         except tomllib.TOMLDecodeError:
             parsed = {"value": text}
         overrides[key] = parsed["value"] if len(parsed) == 1 else text
     return overrides
+
+
+def _meant(stage: str, key: str, text: str | None) -> str:
+    """The hint for an override that is none of `stage`: the setting that was probably meant, with the text that was
+    given, or without one with the value that holds; where none is near, what lists them. An option alone is completed
+    by the command."""
+    import difflib
+    import json
+    from shlex import quote
+
+    from schemas.config import RunConfig
+
+    settings = RunConfig().model_dump(mode="json", by_alias=True).get(stage, {})
+    near = difflib.get_close_matches(key.rpartition(".")[2], settings, n=1)
+    if not near:
+        return f"r2s2r {stage} --show-config"
+    usual = settings[near[0]]
+    value = text if text is not None else usual if isinstance(usual, str) else json.dumps(usual)
+    return f"--set {quote(f'{stage}.{near[0]}={value}')}"

@@ -14,6 +14,7 @@ import typer
 from r2s2r_cli.commands.interrupts import resumable
 from r2s2r_cli.commands.typed import typed_words
 from r2s2r_cli.console import Console
+from r2s2r_cli.errors import UsageError
 from r2s2r_cli.options import (
     DrawOption,
     DryRunOption,
@@ -97,7 +98,7 @@ def diagnose(
         return
     asked = Asked(
         here, place, model=model, train=tuple(train or ()), test=tuple(test or ()), healthy=tuple(healthy or ()),
-        effects=tuple(effect or ()), also=tuple(also or ()), seed=seed,
+        effects=tuple(effect or ()), also=tuple(dict.fromkeys(also or ())), seed=seed,
     )  # fmt: skip
     typed = typed_options(
         train=train, test=test, healthy=healthy, effect=effect, model=model, also=also, seed=seed or None,
@@ -132,11 +133,22 @@ def diagnose(
 
 
 def _require_effects(names: tuple[str, ...]) -> None:
+    """Raises UsageError for an effect that is not known, or with an element: here they are found, not chosen."""
     if names:
         from r2s2r_cli.stages.effects import effect_of
 
         for name in names:
-            effect_of(name, where="--effect", command="r2s2r diagnose --effect")
+            known, colon, _ = name.partition(":")
+            try:
+                effect_of(known, where="--effect", command="r2s2r diagnose --effect")
+            except UsageError as error:
+                error.received = name
+                raise
+            if colon:
+                raise UsageError(
+                    "an effect is named without its element here: diagnose finds which one it is",
+                    where="--effect", expected=known, received=name, hint=f"r2s2r diagnose --effect {known}",
+                )  # fmt: skip
 
 
 def _compute(

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.commands.identify_inputs import Asked as IdentifyAsked, Source, named_runs, require_robot
-from r2s2r_cli.commands.outcome import require_input
+from r2s2r_cli.commands.outcome import require_input, require_model
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
@@ -63,13 +63,15 @@ class Asked:
     @cached_property
     def sources(self) -> tuple[Source, ...]:
         """Where the runs lie. Raises ArtifactError, UsageError as `identify`."""
-        return IdentifyAsked(self.project, self.iteration, also=self.also).sources
+        return IdentifyAsked(self.project, self.iteration, also=self.also, command="r2s2r diagnose").sources
 
     def refs(self) -> list[InputRef]:
         """The inputs. Raises ArtifactError where one is missing or cannot be read."""
         from r2s2r_cli.store.header import whole_header
         from r2s2r_cli.store.staleness import artifact_ref
 
+        if self.model is not None:
+            require_model(self.project, self.model, "diagnose")
         require_input(self.identification, f"r2s2r identify --iteration {self.iteration.number}")
         paths = [*self.artifacts(), self.identification]
         paths += [path for path in (self.floor_file, self.plan_file) if path.exists()]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.toml import check_model, read_toml
+from r2s2r_cli.store.toml_hints import in_override, last_name, shown
 from schemas.robot import Robot
 
 if TYPE_CHECKING:
@@ -39,7 +40,9 @@ def mjcf_file(path: Path, items: list[str]) -> tuple[str, bytes]:
             _set(values, key, value)
     if items:
         try:
-            robot = check_model(values, Robot, "--set")
+            file = str(_robot_path(path))
+            mend = in_override(dict(map(_parse, items)), Robot, lambda loc: shown(file, last_name(loc)))
+            robot = check_model(values, Robot, "--set", mend)
         except InputError as error:
             raise UsageError(error.what, where=error.where, expected=error.expected, received=error.received,
                              hint=error.hint) from error  # fmt: skip

@@ -145,11 +145,13 @@ def identify(
     asked = Asked(
         here, place, train=tuple(train or ()), test=tuple(test or ()), free=tuple(free or ()), fix=tuple(fix or ()),
         effects=tuple(with_effect or ()), method=method, drive=DRIVES.get(drive, drive),  # type: ignore[arg-type]
-        online=online, discrepancy=discrepancy, also=tuple(also or ()), seed=seed, typed=tuple(typed),
+        online=online, discrepancy=discrepancy, also=tuple(dict.fromkeys(also or ())), seed=seed, typed=tuple(typed),
     )  # fmt: skip
     with whole_hints([*typed, *["--resume"] * resume], asked.artifacts):
         _require_one_of(method, METHODS, "--method")
         _require_one_of(drive, tuple(DRIVES), "--drive")
+        if starts is not None:
+            _require_starts(asked, overrides)
         if self_test:
             _plant(asked, overrides, console, dry_run)
         else:
@@ -219,6 +221,15 @@ def _require_one_of(value: str, known: tuple[str, ...], option: str) -> None:
         near = get_close_matches(value, known, 1, 0.0) or known
         raise UsageError("there is no such choice", where=option, expected=" | ".join(known), received=value,
                          hint=f"r2s2r identify {option} {near[0]}")  # fmt: skip
+
+
+def _require_starts(asked: Asked, overrides: dict[str, Any]) -> None:
+    """Raises UsageError for a number of --starts that the setting does not allow, with a hint of that option."""
+    try:
+        asked.project.config(asked.iteration, overrides)
+    except UsageError as error:
+        error.hint = error.hint.replace("--set identify.starts=", "--starts ")
+        raise
 
 
 def _answer(result: StageResult, report: IdentifyReport | None) -> IdentifyResult:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from r2s2r_cli.errors import R2S2RError
 from r2s2r_cli.store.atomic import PARTIAL
+from r2s2r_cli.store.header import NotAnArtifact
 
 FLAGS = (
     "--online",
@@ -23,6 +24,7 @@ FLAGS = (
     "--dry-run",
     "--force",
     "--draw",
+    "--sample",
 )
 """Options without a value."""
 SINGLE = ("--method", "--drive", "--seed", "--starts", "--iteration", "--project", "--model")
@@ -68,6 +70,8 @@ def completed(error: R2S2RError, typed: Sequence[str], command: str = _COMMAND) 
     value that was received and has nothing in its place goes.
     """
     said, gap, remark = error.hint.partition("   #")
+    if isinstance(error, NotAnArtifact) or said.endswith(" --show-config"):
+        return error.hint  # about another artifact, maybe of the same stage, or about none
     if said.startswith(command):
         said = said[len(command) :]
     elif not said.startswith("--"):
@@ -124,6 +128,8 @@ def _replaces(new: Option, old: Option, error: R2S2RError) -> bool:
     if new[0] != name:
         return False
     if name in SINGLE or name in FLAGS:
+        return True
+    if name == "--set" and _about(value).rpartition(".")[2] == error.received:
         return True
     return _about(new[1]) == _about(value) or value == error.received or _about(value) in error.received.split(", ")
 

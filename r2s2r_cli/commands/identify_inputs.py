@@ -101,6 +101,8 @@ class Asked:
     seed: int = 0
     typed: tuple[str, ...] = ()
     """The options as given."""
+    command: str = "r2s2r identify"
+    """Whose options they are."""
 
     def flags(self) -> dict[str, Any]:
         """What else than settings and inputs decides the result, for the provenance."""
@@ -116,13 +118,14 @@ class Asked:
 
         The main one is the iteration itself where it has an estimate of recorded runs, else the latest before it that
         has any; of an earlier one the executed runs are used as well. Raises ArtifactError where there is none,
-        UsageError for an iteration of --also that does not exist.
+        UsageError for an iteration of --also that does not exist, or is the present one.
         """
         earlier = [one for one in self.project.iterations() if one.number < self.iteration.number]
         if self.iteration.artifact("estimate").exists():
             main = [Source(self.iteration)]
         else:
             main = next((found for one in reversed(earlier) if (found := _estimated(one))), [Source(self.iteration)])
+        self._require_another(main[0].place)
         others: dict[int, list[Source]] = {}
         for number in self.also:
             if number != main[0].place.number:
@@ -134,6 +137,16 @@ class Asked:
             require_input(one.recording, f"r2s2r import run.csv --iteration {number}")
             require_input(one.estimate, f"r2s2r estimate --iteration {number}{of}")
         return tuple(found)
+
+    def _require_another(self, main: Iteration) -> None:
+        """Raises UsageError where --also names the iteration itself and its runs are those that are used anyway."""
+        if main.number in self.also and main.number == self.iteration.number:
+            others = [str(one.number) for one in self.project.iterations() if one.number != main.number]
+            raise UsageError(
+                f"the runs of iteration {main.number} are used without --also", where="--also",
+                expected="another iteration" + (f": {', '.join(others)}" if others else ", and there is none"),
+                received=str(main.number), hint=self.command,
+            )  # fmt: skip
 
     def _also(self, number: int) -> Iteration:
         """An iteration of --also. Raises UsageError where there is none."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import shlex
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from enum import StrEnum
 from importlib import resources
 from pathlib import Path
@@ -46,16 +49,22 @@ def init(
 
     Example: r2s2r init myrobot --robot threebar
     """
+    from r2s2r_cli.commands.identify_hints import typed_options
     from r2s2r_cli.stages.init.init import init_texts
     from r2s2r_cli.stages.init.project_file import project_toml
 
     console = Console(json=json, quiet=quiet)
     root = directory.absolute()
     title = name or root.name or "project"
+    typed = typed_options(
+        robot=None if robot == "threebar" else robot, sample=sample, name=name, seed=seed or None, json=json,
+        attachment=None if attachment is Attachment.SURFACE else attachment.value, quiet=quiet,
+    )  # fmt: skip
     title.encode()  # a name that is not text cannot stand in project.toml: UnicodeEncodeError says so
-    texts = init_texts(robot, attachment.value, sample_seed=seed if sample else None)
+    with _whole_hints(directory, typed):
+        texts = init_texts(robot, attachment.value, sample_seed=seed if sample else None)
     files = {PROJECT_FILE: project_toml(title), **texts, "Makefile": _makefile()}
-    _refuse_overwriting(root, files)
+    _refuse_overwriting(root, files, _command(_free(directory), typed))
     for file, text in files.items():
         write_text(root / file, text)
     (root / ITERATIONS).mkdir(exist_ok=True)
@@ -72,12 +81,36 @@ def _makefile() -> str:
     return resources.files("r2s2r_cli").joinpath("templates", "project.mk").read_text(encoding="utf-8")
 
 
-def _refuse_overwriting(root: Path, files: dict[str, str]) -> None:
+@contextmanager
+def _whole_hints(directory: Path, typed: Sequence[str]) -> Iterator[None]:
+    """An error of the stage leaves with a command for the same directory, with the other options as typed."""
+    from r2s2r_cli.commands.identify_hints import completed
+
+    try:
+        yield
+    except UsageError as error:
+        error.hint = _command(directory, shlex.split(completed(error, typed, "r2s2r init"))[2:])
+        raise
+
+
+def _command(directory: Path, options: Sequence[str]) -> str:
+    return shlex.join(["r2s2r", "init", *([] if directory == Path() else [str(directory)]), *options])
+
+
+def _free(directory: Path) -> Path:
+    """A directory beside this one that is not there yet: its name and a number."""
+    name = directory.name if directory.name not in ("", "..") else directory.resolve().name
+    beside = directory.parent if directory.name not in ("", "..") else directory / ".."
+    return next(one for k in itertools.count(2) if not (one := beside / f"{name}-{k}").exists())
+
+
+def _refuse_overwriting(root: Path, files: dict[str, str], elsewhere: str) -> None:
+    """Raises UsageError where something is in the way. elsewhere: the command that fills another directory."""
     if root.exists() and not root.is_dir():
         raise UsageError("a file is in the way of the project directory", where=str(root), expected="a directory",
-                         received="a file", hint="r2s2r init anothername")  # fmt: skip
+                         received="a file", hint=elsewhere)  # fmt: skip
     present = [name for name in files if (root / name).exists()]
     if present:
         raise UsageError("there is something here already, and init overwrites nothing", where=str(root / present[0]),
                          expected="a new or empty directory", received=", ".join(present),
-                         hint="r2s2r init anothername")  # fmt: skip
+                         hint=elsewhere)  # fmt: skip

@@ -10,6 +10,7 @@ import typer
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import GateError
 from r2s2r_cli.options import JsonOption, QuietOption
+from r2s2r_cli.store.again import command_at
 from r2s2r_cli.store.header import HDF5_SIGNATURE, NotAnArtifact
 from schemas.header import Header
 from schemas.results import InspectResult, NodeInfo
@@ -61,8 +62,8 @@ def _foreign(path: Path) -> InspectResult:
             "this is neither an artifact nor an HDF5 file",
             where=str(path),
             expected="an artifact of r2s2r",
-            received="something else",
-            hint=f"file '{path}'",
+            received="something else" if path.stat().st_size else "an empty file",
+            hint=command_at(path) or f"file '{path}'",
         )
     with IsolatedReader() as reader:
         report = reader.tree(path)

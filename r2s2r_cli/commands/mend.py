@@ -8,15 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from r2s2r_cli.errors import R2S2RError
-from r2s2r_cli.store.again import command_again
+from r2s2r_cli.store.again import BARE, command_again
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.staleness import input_reasons
 from schemas.header import Header, InputRef
 from schemas.versions import KINDS, STAGE_VERSIONS
-
-_BARE = {"estimate": "estimate", "identification": "identify", "plan": "plan"}
-"""Stages that need no argument, by what they make: what is missing of theirs is made by their name alone."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +82,7 @@ def _missing(project: Project, ref: InputRef) -> Mending:
     why = f"{ref.path} must be made first"
     path = project.root / ref.path
     place = next((one for one in project.iterations() if one.path == path.parent), None)
-    if place is None or ref.kind not in _BARE:
+    if place is None or ref.kind not in BARE:
         return Mending(why_not=why)
     executed = ref.kind == "estimate" and path.name == KINDS["estimate"].executed
     if ref.kind == "estimate":
@@ -93,7 +90,7 @@ def _missing(project: Project, ref: InputRef) -> Mending:
         found = _estimated(project, recording) if recording.exists() else Mending()
         if found is not None:
             return Mending(found.command, found.runs, why)
-    words = ["r2s2r", _BARE[ref.kind], *(["--of", "execute"] if executed else []), "--iteration", str(place.number)]
+    words = ["r2s2r", BARE[ref.kind], *(["--of", "execute"] if executed else []), "--iteration", str(place.number)]
     return Mending(shlex.join(words), why_not=why)
 
 

@@ -15,7 +15,7 @@ from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError, GateError
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from r2s2r_cli.store.brief import brief
-from r2s2r_cli.store.header import read_header, sealed_header, whole_header
+from r2s2r_cli.store.header import NotAnArtifact, read_header, sealed_header, whole_header
 from r2s2r_cli.store.lock import writer
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import Header, Provenance
@@ -132,7 +132,7 @@ def _state(
     try:
         header = sealed_header(path) if thorough else whole_header(path)
     except ArtifactError as error:
-        state, why, mend = "damaged", [error.what], Mending(f"r2s2r recover {shlex.quote(name)}")
+        state, why, mend = "damaged", [error.what], Mending(_mends(error, path, name))
     else:
         own, upstream = _reasons(project, iteration, header, stale)
         # Stale through an input alone: made from the same input again it would be the same.
@@ -148,6 +148,15 @@ def _state(
         "bytes": path.stat().st_size, "content_sha256": header.content_sha256 if header else None,
     }  # fmt: skip
     return ArtifactState.model_validate(line), mend
+
+
+def _mends(error: ArtifactError, path: Path, name: str) -> str:
+    """What brings a damaged artifact back, or, where there is nothing in it, makes it again."""
+    from r2s2r_cli.store.again import command_at
+    from r2s2r_cli.store.verify import find_body
+
+    nothing = isinstance(error, NotAnArtifact) and find_body(path) is None
+    return (command_at(path) if nothing else "") or f"r2s2r recover {shlex.quote(name)}"
 
 
 def _reasons(

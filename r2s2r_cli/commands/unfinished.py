@@ -24,25 +24,33 @@ class Kept:
     path: Path
     stage: str
     iteration: int
+    latest: bool = True
+    """Whether a command without --iteration means this one."""
 
     @cached_property
     def command(self) -> str:
         """What goes on from it: as it was typed, or, of an older r2s2r, without its options."""
         typed = command_of(self.path) or (self.stage, "--iteration", str(self.iteration))
-        return shlex.join(["r2s2r", *typed, "--resume"])
+        named = self.latest or any(word.partition("=")[0] == "--iteration" for word in typed)
+        return shlex.join(["r2s2r", *typed, *([] if named else ["--iteration", str(self.iteration)]), "--resume"])
 
 
 def checkpoints(project: Project) -> dict[tuple[str, int | None], Kept]:
     """Of every iteration, by stage and its number."""
-    places = [(one, checkpoint_of(one.artifact(kind)), stage) for one in project.iterations()
-              for kind, stage in RESUMED.items()]  # fmt: skip
-    return {(stage, one.number): Kept(path, stage, one.number) for one, path, stage in places if path.exists()}
+    every = project.iterations()
+    places = [(one, checkpoint_of(one.artifact(kind)), stage) for one in every for kind, stage in RESUMED.items()]
+    return {
+        (stage, one.number): Kept(path, stage, one.number, latest=one == every[-1])
+        for one, path, stage in places
+        if path.exists()
+    }
 
 
 def interrupted(project: Project, one: Kept, busy: str | None) -> ArtifactState:
     """A checkpoint. busy: who writes in the project now."""
     running = busy is not None and f"'r2s2r {one.stage}'" in busy
-    why = f"{busy} is at work" if running else f"what was worked out so far is kept: {one.command}"
+    # The option comes first: a table breaks a long command before its end, and without it the work begins anew.
+    why = f"{busy} is at work" if running else f"--resume goes on with what is kept: {one.command}"
     return ArtifactState(
         stage=one.stage, iteration=one.iteration, artifact=project.relative(one.path),
         state="running" if running else "interrupted", reasons=(why,), bytes=one.path.stat().st_size,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.errors import InputError, UsageError
@@ -29,7 +30,13 @@ def effect_of(name: str, *, where: str, command: str) -> Effect:
     """The effect of that id. Raises UsageError for an unknown one, with the nearest in a command to paste."""
     found = {effect.name: effect for effect in all_effects()}
     if name not in found:
-        near = difflib.get_close_matches(name, found, n=1, cutoff=0.5)
+        near = _near(name, tuple(found))
         raise UsageError(f"unknown effect {name!r}", where=where, expected=", ".join(found), received=name,
                          hint=f"{command} {near[0]}" if near else "r2s2r effects")  # fmt: skip
     return found[name]
+
+
+def _near(name: str, known: Sequence[str]) -> list[str]:
+    """The id that was probably meant: the one that has the name among its words, else one that is spelt like it."""
+    of_word = [one for one in known if name in one.split("_")]
+    return of_word if len(of_word) == 1 else difflib.get_close_matches(name, known, n=1)

@@ -1,14 +1,15 @@
-"""The command that makes an artifact again, from what it remembers of how it was made."""
+"""The command that makes an artifact again, from what it remembers of how it was made, or from where it lies."""
 
 from __future__ import annotations
 
 import json
+import os
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from r2s2r_cli.store.project import ITERATIONS
+from r2s2r_cli.store.project import ITERATIONS, root_of
 from schemas.header import Provenance
 from schemas.versions import KINDS, STAGE_VERSIONS
 
@@ -36,6 +37,27 @@ OPTIONS: dict[str, tuple[tuple[str, str, Any], ...]] = {
 }  # fmt: skip
 """Of every stage the options that change its result: name, name among the flags that its provenance has, and the value
 that need not be typed. A list is an option for each entry, a table one NAME=VALUE for each."""
+
+BARE = {"estimate": "estimate", "identification": "identify", "plan": "plan", "comparison": "compare",
+        "diagnosis": "diagnose", "floor": "floor"}  # fmt: skip
+"""Stages that need no argument, by what they make: theirs is made by their name alone."""
+
+
+def command_at(path: Path) -> str:
+    """The command that makes what belongs at `path` of a project, whatever lies there now; empty where no stage makes
+    it without being told more (a recording, a calibration), and outside a project. To be pasted where this runs."""
+    path, root = path.absolute(), root_of(path)
+    kind = next((spec for spec in KINDS.values() if path.name in spec.filenames and spec.kind in BARE), None)
+    if root is None or kind is None:
+        return ""
+    words = ["r2s2r", BARE[kind.kind]]
+    if kind.level == "iteration":
+        if path.parent.parent != root / ITERATIONS or not path.parent.name.isdigit():
+            return ""
+        words += [*(["--of", "execute"] * (path.name == kind.executed)), "--iteration", str(int(path.parent.name))]
+    elif path.parent != root:
+        return ""
+    return shlex.join([*words, *([] if Path.cwd().is_relative_to(root) else ["--project", os.path.relpath(root)])])
 
 
 def command_again(made: Provenance, artifact: Path, *, force: bool = False, dry_run: bool = False) -> str:

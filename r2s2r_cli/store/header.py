@@ -6,6 +6,7 @@ a newline. The HDF5 body follows at the next power of two from 4096 (docs/adr/00
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from pathlib import Path
 
@@ -133,7 +134,7 @@ def not_an_artifact(path: Path, head: bytes) -> NotAnArtifact:
             where=str(path),
             expected=MAGIC.decode(),
             received=repr(head[: len(MAGIC)]),
-            hint=f"r2s2r recover '{path}'",
+            hint=mends(path),
         )
     if not head:
         received = "an empty file"
@@ -146,23 +147,33 @@ def not_an_artifact(path: Path, head: bytes) -> NotAnArtifact:
         where=str(path),
         expected="a file that begins 'r2s2r-artifact'",
         received=received,
-        hint=f"r2s2r inspect '{path}'",
+        hint=mends(path, or_else="inspect"),
     )
+
+
+def mends(path: Path, or_else: str = "recover") -> str:
+    """The command for a file whose head cannot be read: what brings it back where there are data behind it, else what
+    makes it again; where nothing does, the command `or_else` of r2s2r."""
+    from r2s2r_cli.store.again import command_at
+    from r2s2r_cli.store.verify import find_body
+
+    with contextlib.suppress(OSError):
+        if find_body(path) is not None:
+            return f"r2s2r recover '{path}'"
+    return command_at(path) or f"r2s2r {or_else} '{path}'"
 
 
 def unreadable(path: Path, error: OSError) -> ArtifactError:
     """Say in words why `path` cannot be read."""
     if isinstance(error, FileNotFoundError):
-        return ArtifactError(
-            "there is no such file", where=str(path), expected="an artifact", hint=f"ls -la '{path.parent}'"
-        )
+        there = next((folder for folder in path.parents if folder.is_dir()), Path())
+        return ArtifactError("there is no such file", where=str(path), expected="an artifact", received="nothing",
+                             hint=f"ls -la '{there}'")  # fmt: skip
     if isinstance(error, IsADirectoryError):
-        return ArtifactError(
-            "this is a directory, not an artifact", where=str(path), expected="a file", hint=f"ls -la '{path}'"
-        )
-    return ArtifactError(
-        "the file cannot be read", where=str(path), received=error.strerror or str(error), hint=f"ls -la '{path}'"
-    )
+        return ArtifactError("this is a directory, not an artifact", where=str(path), expected="a file",
+                             received="a directory", hint=f"ls -la '{path}'")  # fmt: skip
+    return ArtifactError("the file cannot be read", where=str(path), expected="a file that may be read",
+                         received=error.strerror or str(error), hint=f"ls -la '{path}'")  # fmt: skip
 
 
 def _encode(header: Header) -> bytes:
@@ -186,5 +197,5 @@ def _damaged(path: Path, received: str) -> ArtifactError:
         where=str(path),
         expected="an intact header",
         received=received,
-        hint=f"r2s2r recover '{path}'",
+        hint=mends(path),
     )

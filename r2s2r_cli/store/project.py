@@ -11,6 +11,7 @@ from typing import Any
 
 from r2s2r_cli.errors import ArtifactError, InputError, UsageError
 from r2s2r_cli.store.toml import check_model, load_model, read_toml
+from r2s2r_cli.store.toml_hints import in_override
 from schemas.config import ProjectFile, RunConfig
 from schemas.robot import Robot
 from schemas.versions import KINDS
@@ -143,7 +144,10 @@ class Project:
         for key, value in overrides.items():
             values = _merge(values, _nest(key, value))
         try:
-            return check_model(values, RunConfig, "--set" if overrides else str(self.root / PROJECT_FILE))
+            if not overrides:
+                return check_model(values, RunConfig, str(self.root / PROJECT_FILE))
+            mend = in_override(overrides, RunConfig, lambda loc: f"r2s2r {loc[0]} --show-config")
+            return check_model(values, RunConfig, "--set", mend)
         except InputError as error:
             if not overrides:
                 raise

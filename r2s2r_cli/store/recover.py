@@ -12,7 +12,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from r2s2r_cli.errors import ArtifactError
-from r2s2r_cli.store.again import command_again
+from r2s2r_cli.store.again import command_again, command_at
 from r2s2r_cli.store.atomic import keep_beside, replacing
 from r2s2r_cli.store.header import NotAnArtifact, block, body_sha256, read_header, sealed_header, unreadable
 from r2s2r_cli.store.isolated import IsolatedReader
@@ -105,7 +105,8 @@ def _without_head(path: Path, reader: IsolatedReader) -> Recovered:
         raise unreadable(path, error) from error
     if offset is None:
         raise ArtifactError("there is no artifact in this file", where=str(path), expected="an artifact of r2s2r",
-                            received="neither its head nor an HDF5 body", hint=f"file '{path}'")  # fmt: skip
+                            received="neither its head nor an HDF5 body",
+                            hint=command_at(path) or f"file '{path}'")  # fmt: skip
     header = _rebuilt(path, offset, reader)
     if header is None:
         raise _lost(path, None, rescue(path, None, reader))
@@ -172,7 +173,7 @@ def _lost(path: Path, header: Header | None, found: Rescue) -> ArtifactError:
     where = f"{path}, rescued into {found.path}" if found.path else str(path)
     if header is not None:
         hint = command_again(header.provenance, path, force=True)
-    else:
+    elif (hint := command_at(path)) == "":
         hint = f"unzip -p '{found.path}' README.json" if found.path else f"ls -la '{path}'*"
     return ArtifactError(
         f"the artifact cannot be restored; {saved} of {count} datasets were rescued" if count

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar
@@ -10,6 +11,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.store.toml_hints import Mend, around, in_file
 
 Model = TypeVar("Model", bound=BaseModel)
 MAX_BYTES = 4 << 20
@@ -47,9 +49,10 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise InputError("the file is not valid TOML", where=where, expected="TOML", received=str(error)[:200],
-                         hint=f"look at the place named in {where}: values are text in quotes, numbers, true, false "
-                         "or [lists]") from error  # fmt: skip
+        line = re.search(r"at line (\d+)", str(error))
+        raise InputError("the file is not valid TOML", where=where, received=str(error)[:200],
+                         expected="TOML: values are text in quotes, numbers, true, false or [lists]",
+                         hint=around(where, int(line[1]) if line else 0)) from error  # fmt: skip
 
 
 def load_model(path: Path, model: type[Model]) -> Model:
@@ -57,12 +60,13 @@ def load_model(path: Path, model: type[Model]) -> Model:
     return check_model(read_toml(path), model, str(path))
 
 
-def check_model(values: dict[str, Any], model: type[Model], where: str) -> Model:
-    """Check parsed values against their model. Raises InputError as `load_model` does."""
+def check_model(values: dict[str, Any], model: type[Model], where: str, mend: Mend | None = None) -> Model:
+    """Check parsed values against their model. mend: makes the hints; by default `where` is a file. Raises InputError
+    as `load_model` does."""
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise _problems(error, model, where)[0] from error
+        raise _problems(error, model, where, mend or in_file(where))[0] from error
 
 
 def model_problems(values: dict[str, Any], model: type[BaseModel], where: str) -> list[InputError]:
@@ -70,38 +74,39 @@ def model_problems(values: dict[str, Any], model: type[BaseModel], where: str) -
     try:
         model.model_validate(values)
     except ValidationError as error:
-        return _problems(error, model, where)
+        return _problems(error, model, where, in_file(where))
     return []
 
 
-def _problems(error: ValidationError, model: type[BaseModel], where: str) -> list[InputError]:
+def _problems(error: ValidationError, model: type[BaseModel], where: str, mend: Mend) -> list[InputError]:
     """What pydantic found, in our form. Unknown keys come first: a misspelt one is also missing under its right name,
     which then goes without saying; and so does a list that is too short because its items are wrong."""
     everything = error.errors()
     places = [p["loc"] for p in everything]
     found = [p for p in everything if p["type"] != "too_short" or not _is_above(p["loc"], places)]
-    unknown = [_unknown_key(p["loc"], model, where) for p in found if p["type"] == "extra_forbidden"]
+    unknown = [_unknown_key(p["loc"], model, where, mend) for p in found if p["type"] == "extra_forbidden"]
     meant = {(*p["loc"][:-1], name) for p in found if p["type"] == "extra_forbidden" for name in _near(p["loc"], model)}
     rest = [p for p in found if p["type"] != "extra_forbidden" and not (p["type"] == "missing" and p["loc"] in meant)]
-    return unknown + [_wrong_value(p, where) for p in rest]
+    return unknown + [_wrong_value(p, where, mend) for p in rest]
 
 
 def _is_above(loc: tuple[int | str, ...], others: list[tuple[int | str, ...]]) -> bool:
     return any(len(other) > len(loc) and other[: len(loc)] == loc for other in others)
 
 
-def _wrong_value(problem: Any, where: str) -> InputError:
+def _wrong_value(problem: Any, where: str, mend: Mend) -> InputError:
     key = ".".join(str(part) for part in problem["loc"])
     if problem["type"] == "missing":
-        return InputError("a key is missing", where=where, expected=f"a value for {key}", received="nothing",
-                          hint=f"add '{key.rpartition('.')[2]} = ...' to {where}")  # fmt: skip
+        return InputError("a key is missing", where=where, received="nothing",
+                          expected=f"a value for {key}: {key.rpartition('.')[2]} = ...",
+                          hint=mend(problem["loc"], ""))  # fmt: skip
     received = "" if isinstance(problem["input"], dict | list) else repr(problem["input"])[:80]
     return InputError(
         f"the value of {key} is not allowed" if key else "the values do not fit together",
         where=f"{where}, key {key}" if key else where,
         expected=problem["msg"].removeprefix("Value error, "),
         received=received,
-        hint=f"correct {key or 'the named keys'} in {where}",
+        hint=mend(problem["loc"], ""),
     )
 
 
@@ -110,11 +115,11 @@ def _near(loc: tuple[int | str, ...], model: type[BaseModel]) -> list[str]:
     return difflib.get_close_matches(str(loc[-1]), _keys_at(model, loc[:-1]), n=1, cutoff=0.5)
 
 
-def _unknown_key(loc: tuple[int | str, ...], model: type[BaseModel], where: str) -> InputError:
+def _unknown_key(loc: tuple[int | str, ...], model: type[BaseModel], where: str, mend: Mend) -> InputError:
     known, near = _keys_at(model, loc[:-1]), _near(loc, model)
-    hint = f"rename it to '{near[0]}' in {where}" if near else f"remove it from {where}; known keys: {', '.join(known)}"
-    return InputError(f"unknown key {'.'.join(map(str, loc))}", where=where, received=str(loc[-1]), hint=hint,
-                      expected=near[0] if near else " | ".join(known))  # fmt: skip
+    return InputError(f"unknown key {'.'.join(map(str, loc))}", where=where, received=str(loc[-1]),
+                      expected=near[0] if near else " | ".join(known) or "no key",
+                      hint=mend(loc, near[0] if near else ""))  # fmt: skip
 
 
 def _keys_at(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:

@@ -40,6 +40,33 @@ def test_an_effect_that_does_not_exist_is_a_usage_error(estimated: Path) -> None
     assert not artifacts(estimated)
 
 
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("motor_dead_zone:3", "r2s2r diagnose --seed 4 --effect motor_dead_zone --json"),
+        ("motor_deadzone:3", "r2s2r diagnose --seed 4 --effect motor_dead_zone --json"),
+        ("slope", "r2s2r diagnose --seed 4 --effect ground_slope --json"),
+        ("none", "r2s2r effects"),
+    ],
+)
+def test_an_effect_is_named_alone(estimated: Path, name: str, hint: str) -> None:
+    """Its element is found, not chosen; what is near no effect is answered with the list."""
+    error = json.loads(invoke("diagnose", "--effect", name, "--seed", "4", "--json").stdout)
+    assert (error["exit_code"], error["where"], error["received"]) == (2, "--effect", name)
+    assert error["hint"] == hint
+    assert ("diagnose finds" in error["what"]) == (name == "motor_dead_zone:3")
+
+
+def test_a_model_that_is_not_there_is_named_so(estimated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The file of --model is missing, not the stage before; the hint has one that is there, the rest as typed."""
+    asked(estimated)
+    words = ["diagnose", "--model", "nosuch.h5", "--seed", "4"]
+    monkeypatch.setattr("sys.argv", ["r2s2r", *words])
+    refused = invoke(*words)
+    assert refused.exit_code == 4 and "there is no such identification\n  where: --model" in refused.stderr
+    assert refused.stderr.splitlines()[-1] == "hint: r2s2r diagnose --model iterations/001/30-identify.h5 --seed 4"
+
+
 def test_the_settings_are_shown_without_anything_to_diagnose(estimated: Path) -> None:
     """They are what the command would use."""
     result = invoke("diagnose", "--show-config")
@@ -70,10 +97,11 @@ def test_a_model_without_uncertainty_is_said(estimated: Path) -> None:
         (
             "--train sample:1-3 --test sample:2-4",
             "--train, --test",
-            "r2s2r diagnose --test sample:2-4 --train sample:1",
+            "r2s2r diagnose --train sample:1 --test sample:2-4",
         ),
         ("--healthy smaple --seed 4", "--healthy", "r2s2r diagnose --seed 4 --healthy sample --json --dry-run"),
         ("--also 5", "--also", "r2s2r status"),
+        ("--also 1 --seed 3", "--also", "r2s2r diagnose --seed 3 --json --dry-run"),
     ],
 )
 def test_a_wrong_request_has_a_command_as_its_hint(estimated: Path, typed: str, where: str, hint: str) -> None:

@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 import pty
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -79,15 +80,61 @@ def test_an_error_is_a_document_with_json(capsys: pytest.CaptureFixture[str]) ->
         (["export"], "path"),
         (["export", "x.h5", "--to", "xlsx"], "csv"),
         (["init", "--seed", "many"], "--seed"),
+        (["bench"], "engine"),
     ],
 )
 def test_misspelt_usage_names_the_cure(arguments: list[str], words: str) -> None:
-    """Unknown commands, options and values leave with 2, name what is near, and end with one hint line."""
+    """Unknown commands, options and values leave with 2, name what is near and what was received, and end with one
+    hint line."""
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == ExitCode.USAGE
     assert words in result.stderr
+    assert [line.split(":")[0].strip() for line in result.stderr.splitlines()] == [
+        "error", "where", "expected", "received", "hint",
+    ]  # fmt: skip
     assert result.stderr.splitlines()[-1].startswith("hint: r2s2r")
     assert result.stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("typed", "received", "hint"),
+    [
+        ("statsu --quiet", "statsu", "r2s2r status --quiet"),
+        ("bench engin", "engin", "r2s2r bench engine"),
+        ("nonsense --quiet", "nonsense", "r2s2r --help"),
+        ("status --projct 'a b' --quiet", "--projct", "r2s2r status --project 'a b' --quiet"),
+        ("status --projct=x", "--projct", "r2s2r status --project=x"),
+        ("diagnose --frobnicate", "--frobnicate", "r2s2r diagnose --help"),
+        ("diagnose --iteration abc --seed 4", "abc", "r2s2r diagnose --seed 4"),
+        ("diagnose --also 1 --also x", "x", "r2s2r diagnose --also 1"),
+        ("init a --seed=x", "x", "r2s2r init a --seed=0"),
+        ("export x.h5 --to mjfc", "mjfc", "r2s2r export x.h5 --to mjcf"),
+        ("export x.h5 --to xml", "xml", "r2s2r export --help"),
+        ("import a.csv --format tum", "tum", "r2s2r import a.csv --format tum_rgbd"),
+        ("status a b --quiet", "a b", "r2s2r status --quiet"),
+        ("init a --seed", "nothing", "r2s2r init a"),
+        ("status --json=1 --quiet", "1", "r2s2r status --json --quiet"),
+        ("export", "nothing", "r2s2r export --help"),
+        ("bench", "nothing", "r2s2r bench --help"),
+    ],
+)
+def test_the_hint_is_the_command_line_without_the_slip(typed: str, received: str, hint: str) -> None:
+    """What is near takes the place of what was wrong, and the other words stay; where nothing is near, the help."""
+    result = CliRunner().invoke(app, shlex.split(typed))
+    assert result.exit_code == ExitCode.USAGE
+    assert result.stderr.splitlines()[-2:] == [f"  received: {received}", f"hint: {hint}"]
+
+
+@pytest.mark.parametrize("command", ["inspect nosuch.h5", "validate far/away/nosuch.h5", "import nosuch.csv"])
+def test_a_file_that_is_not_there_is_said_whole(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was expected and that there is nothing; the hint lists a folder that is there."""
+    monkeypatch.chdir(tmp_path)
+    assert CliRunner().invoke(app, ["init", "."]).exit_code == 0
+    result = CliRunner().invoke(app, command.split())
+    lines = result.stderr.splitlines()
+    assert result.exit_code == ExitCode.INPUT and lines[-3].startswith("  expected: ")
+    assert lines[-2] == "  received: nothing"
+    assert lines[-1] in ("hint: ls .", "hint: ls -la '.'")
 
 
 @pytest.mark.parametrize("name", ["--help", "--version"])
@@ -134,20 +181,21 @@ def test_overrides_are_toml_values() -> None:
 
 
 @pytest.mark.parametrize(
-    ("item", "words"),
+    ("item", "words", "hint"),
     [
-        ("s.novalue", "no value"),
-        ("=3", "no value"),
-        ("", "no value"),
-        ("key=3", "no setting"),
-        ("t.key=3", "no setting"),
+        ("diagnose.members", "no value", "--set diagnose.members=16"),
+        ("=3", "no value", "r2s2r diagnose --show-config"),
+        ("", "no value", "r2s2r diagnose --show-config"),
+        ("member=32", "no setting", "--set diagnose.members=32"),
+        ("identify.starts=3", "no setting", "r2s2r diagnose --show-config"),
     ],
 )
-def test_an_override_that_would_be_ignored_is_refused(item: str, words: str) -> None:
-    """--set without KEY=VALUE, without a section or of another stage is a usage error with the right form as hint."""
+def test_an_override_that_would_be_ignored_is_refused(item: str, words: str, hint: str) -> None:
+    """--set without KEY=VALUE, without a section or of another stage is a usage error with the setting that was meant
+    as hint, or with what lists them."""
     with pytest.raises(UsageError, match=words) as caught:
-        parse_overrides([item], "s")
-    assert caught.value.hint.startswith("--set s.")
+        parse_overrides([item], "diagnose")
+    assert caught.value.hint == hint and caught.value.expected == "diagnose.KEY=VALUE"
 
 
 SHELL_CASES = {

@@ -132,7 +132,7 @@ def test_the_next_iteration_learns_from_recorded_and_executed_runs(estimated: Pa
 def test_runs_of_other_iterations_carry_their_number(estimated: Path) -> None:
     """--also adds the runs of iteration 1 to those of iteration 2, told apart by name, each once."""
     shutil.copytree(estimated / "iterations" / "001", estimated / "iterations" / "002")
-    found = asked(estimated, 2, also=(1, 1, 2))
+    found = asked(estimated, 2, also=(1, 1))
     assert [run.name for run in found.runs()] == ["sample", "001-sample"]
     assert len(found.refs()) == 4
 
@@ -155,6 +155,15 @@ def test_an_iteration_of_also_that_is_not_there_is_named_so(estimated: Path) -> 
     """Where: --also, not --iteration, which was not typed."""
     refused = invoke("identify", "--also", "5", "--dry-run")
     assert refused.exit_code == 2 and "where: --also" in refused.stderr, refused.stderr
+
+
+def test_an_iteration_is_not_added_to_itself(estimated: Path) -> None:
+    """Its runs are used anyway: exit code 2 and the same without it; a later one that learns from it may name it."""
+    error = json.loads(invoke("identify", "--also", "1", "--seed", "4", "--dry-run", "--json").stdout)
+    assert (error["exit_code"], error["where"], error["received"]) == (2, "--also", "1")
+    assert error["hint"] == "r2s2r identify --seed 4 --json --dry-run"
+    assert invoke(*shlex.split(error["hint"])[1:]).exit_code == 0
+    assert [run.name for run in asked(estimated, 2, also=(1,)).runs()] == ["sample"]
 
 
 def test_intervals_are_resolved(estimated: Path) -> None:

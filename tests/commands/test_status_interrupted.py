@@ -36,7 +36,20 @@ def test_what_was_interrupted_is_said_with_the_command_that_goes_on(bot: Project
     assert [(one.stage, one.iteration, one.state) for one in found.artifacts] == [("diagnose", 1, "interrupted")]
     assert found.next == "r2s2r diagnose --iteration 1 --healthy 'a b' --resume"
     assert found.next in found.artifacts[0].reasons[0]
+    shown = next(line for line in invoke("status").stdout.splitlines() if "70-diagnose.partial" in line)
+    assert "--resume" in shown  # in the first line of its cell, wherever that breaks the command
     assert invoke("status", "--check").exit_code == 0
+
+
+def test_an_iteration_that_is_no_longer_the_latest_is_named(project: Path) -> None:
+    """As typed it would go on with another one."""
+    found = Project.find(project)
+    place = found.iteration(1, create=True)
+    place.path.mkdir(parents=True)
+    CheckpointFile(checkpoint_of(place.artifact("plan")), "0" * 64, command=("plan", "--seed", "2")).save({"cost": 1.0})
+    assert survey(found).next == "r2s2r plan --seed 2 --resume"
+    found.iteration(2, create=True).path.mkdir()
+    assert survey(found).next == "r2s2r plan --seed 2 --iteration 1 --resume"
 
 
 def test_what_runs_is_no_wreck(bot: Project) -> None:

@@ -58,22 +58,20 @@ def split(
     if not train and not test:
         both = [default_split(run, train_share) for run in runs]
         return tuple(a for a, _ in both if a.intervals), tuple(b for _, b in both if b.intervals)
-    trained = {one.run: one.intervals for one in parse_selection(train, runs, "--train")}
-    tested = {one.run: one.intervals for one in parse_selection(test, runs, "--test")}
+    trained = {one.run: one.intervals for one in parse_selection(train, runs, "--train", test)}
+    tested = {one.run: one.intervals for one in parse_selection(test, runs, "--test", train)}
     have = {run.name: complete(run) for run in runs}
     if not train:
         trained = {name: _without(all_of, tested.get(name, ())) for name, all_of in have.items()}
     if not test:
         tested = {name: _without(have[name], chosen) for name, chosen in trained.items()}
-    for name, chosen in trained.items():
-        twice = sorted(set(chosen) & set(tested.get(name, ())))
+    for run in runs:
+        chosen, judged = trained.get(run.name, ()), tested.get(run.name, ())
+        twice = sorted(set(chosen) & set(judged))
         if twice:
-            left = _without(chosen, twice) or _without(have[name], twice)
-            first, then = (in_words(one.intervals) for one in default_split(next(r for r in runs if r.name == name)))
             raise UsageError(
                 "an interval is trained on and tested", where="--train, --test", expected="each on one side",
-                received=f"{name}:{in_words(twice)}",
-                hint=f"--train {name}:{in_words(left)}" if left else f"--train {name}:{first} --test {name}:{then}",
+                received=f"{run.name}:{in_words(twice)}", hint=_apart(run, chosen, judged),
             )  # fmt: skip
     if not any(trained.values()):
         name = max(have, key=lambda run: len(have[run]))
@@ -84,10 +82,13 @@ def split(
     return _selections(trained), _selections(tested)
 
 
-def parse_selection(texts: Sequence[str], runs: Sequence[RunData], option: str = "--train") -> tuple[Selection, ...]:
+def parse_selection(
+    texts: Sequence[str], runs: Sequence[RunData], option: str = "--train", other: Sequence[str] = ()
+) -> tuple[Selection, ...]:
     """`crawl:1-7`, `crawl:1,3,5-7`, or `crawl` (all complete intervals); texts of one run are put together.
 
-    Raises UsageError for a run or an interval that does not exist or is not complete, an empty or a backward span.
+    other: the texts of the other side, whose intervals no hint offers a second time. Raises UsageError for a run or an
+    interval that does not exist or is not complete, an empty or a backward span.
     """
     by_name = {run.name: run for run in runs}
     found: dict[str, tuple[int, ...]] = {}
@@ -99,20 +100,20 @@ def parse_selection(texts: Sequence[str], runs: Sequence[RunData], option: str =
                 "there is no such run", where=option, expected=" | ".join(by_name), received=name or "nothing",
                 hint=f"{option} {near[0]}{':' + spans if spans else ''}" if near else "r2s2r status",
             )  # fmt: skip
-        have = complete(by_name[name])
+        run = by_name[name]
+        have = complete(run)
         valid = f"{name}:{in_words(have)}" if have else "none"
-        hint = f"{option} {valid}" if have else "r2s2r inspect 20-estimate.h5"
-        asked = _numbers(spans, len(by_name[name].intervals)) if ":" in text else have
+        asked = _asked(text, run)
         if not asked:
             raise UsageError(
                 "these are no target intervals", where=option, expected=f"RUN:1-7 or RUN:1,3,5-7, of {valid}",
-                received=text, hint=hint,
+                received=text, hint=_instead(option, run, texts, other),
             )  # fmt: skip
         missing = [number for number in asked if number not in have]
         if missing:
             raise UsageError(
                 "an interval does not exist, or did not move to its end", where=option, expected=valid,
-                received=f"{name}:{in_words(missing)}", hint=hint,
+                received=f"{name}:{in_words(missing)}", hint=_instead(option, run, texts, other),
             )  # fmt: skip
         found[name] = tuple(sorted({*found.get(name, ()), *asked}))
     return _selections(found)
@@ -142,6 +143,43 @@ def _numbers(spans: str, count: int) -> tuple[int, ...]:
             return ()
         found += range(start, max(start, min(end, count + 1)) + 1)
     return tuple(found)
+
+
+def _asked(text: str, run: RunData) -> tuple[int, ...]:
+    """The intervals of `run` that a text of it names, whether they exist or not; all complete ones without a span."""
+    _, colon, spans = text.partition(":")
+    return _numbers(spans, len(run.intervals)) if colon else complete(run)
+
+
+def _of_run(texts: Sequence[str], run: RunData) -> tuple[int, ...]:
+    """The complete intervals of `run` that any of the texts names."""
+    named = {number for text in texts if text.partition(":")[0] == run.name for number in _asked(text, run)}
+    return tuple(number for number in complete(run) if number in named)
+
+
+def _instead(option: str, run: RunData, texts: Sequence[str], other: Sequence[str]) -> str:
+    """What can be asked of `run` where `texts` ask for intervals that are not there: those of them that are, else every
+    one, without what the other side has; both sides anew where that leaves none."""
+    have, taken = complete(run), _of_run(other, run)
+    free = _without(have, taken)
+    left = _without(_of_run(texts, run), taken) or free
+    if left:
+        return f"{option} {run.name}:{in_words(left)}"
+    return _both(run) if have else "r2s2r inspect 20-estimate.h5"
+
+
+def _apart(run: RunData, trained: Sequence[int], tested: Sequence[int]) -> str:
+    """Both sides of a run whose intervals stand on both: what is trained on gives way as far as something is left of
+    it, else what is tested, else both are split anew."""
+    first = _without(trained, tested) or tuple(trained)
+    then = _without(tested, first) or _without(complete(run), first)
+    return f"--train {run.name}:{in_words(first)} --test {run.name}:{in_words(then)}" if then else _both(run)
+
+
+def _both(run: RunData) -> str:
+    """Both sides of one run, split as without options."""
+    first, then = (in_words(one.intervals) for one in default_split(run))
+    return f"--train {run.name}:{first}" + (f" --test {run.name}:{then}" if then else "")
 
 
 def _without(have: Sequence[int], taken: Sequence[int]) -> tuple[int, ...]:

@@ -101,7 +101,8 @@ def list_folder(path: Path, what: str) -> list[str]:
     """Names in a folder, sorted. Raises InputError where it is missing, not a folder or unreadable."""
     status = _status(path, what)
     if not stat.S_ISDIR(status.st_mode):
-        raise InputError(f"{what} is not a folder", where=str(path), expected="a folder", hint=f"ls -l {quoted(path)}")
+        raise InputError(f"{what} is not a folder", where=str(path), expected="a folder", received="a file",
+                         hint=f"ls -l {quoted(path)}")  # fmt: skip
     try:
         return sorted(entry.name for entry in path.iterdir())
     except OSError as error:
@@ -164,10 +165,17 @@ def _status(path: Path, what: str) -> os.stat_result:
         raise InputError(
             f"{what} does not exist" + _sibling(path),
             where=str(path),
-            hint=f"ls {quoted(path.parent)}",
+            expected="a file or folder that is there",
+            received="nothing",
+            hint=f"ls {quoted(_there(path))}",
         ) from error
     except (OSError, ValueError) as error:
         raise _unreadable(path, what, error) from error
+
+
+def _there(path: Path) -> Path:
+    """The nearest folder above that is there."""
+    return next((folder for folder in path.parents if folder.is_dir()), Path())
 
 
 def _sibling(path: Path) -> str:
@@ -180,7 +188,8 @@ def _sibling(path: Path) -> str:
 def _unreadable(path: Path, what: str, error: Exception) -> InputError:
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     name = str(path) if str(path).isprintable() else shown(str(path))
-    return InputError(f"{what} cannot be read", where=name, received=reason, hint=f"ls -ld {quoted(name)}")
+    return InputError(f"{what} cannot be read", where=name, expected="a file or folder that may be read",
+                      received=reason, hint=f"ls -ld {quoted(name)}")  # fmt: skip
 
 
 def in_place(path: object, filter_command: str) -> str:

@@ -28,7 +28,7 @@ def robot_facts(name: str) -> RobotFacts:
             where="--robot",
             expected=", ".join(FACTS),
             received=name,
-            hint=f"r2s2r init --robot {near}",
+            hint=f"--robot {near}",
         )
     return FACTS[name]
 

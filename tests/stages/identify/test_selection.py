@@ -42,7 +42,7 @@ def test_selections_are_read(texts: list[str], expected: dict[str, tuple[int, ..
         ("crawl:", "RUN:1-7 or RUN:1,3,5-7, of crawl:1-11", "crawl:", "--test crawl:1-11"),
         ("crawl:1-", "RUN:1-7 or RUN:1,3,5-7, of crawl:1-11", "crawl:1-", "--test crawl:1-11"),
         ("crawl:7-1", "RUN:1-7 or RUN:1,3,5-7, of crawl:1-11", "crawl:7-1", "--test crawl:1-11"),
-        ("crawl:10-40", "crawl:1-11", "crawl:12", "--test crawl:1-11"),
+        ("crawl:10-40", "crawl:1-11", "crawl:12", "--test crawl:10-11"),
         ("crawl:1-99999999999", "crawl:1-11", "crawl:12", "--test crawl:1-11"),
         ("crawl:0", "crawl:1-11", "crawl:0", "--test crawl:1-11"),
         ("turn:4", "turn:1-3", "turn:4", "--test turn:1-3"),
@@ -83,10 +83,41 @@ def test_an_interval_on_both_sides_is_a_usage_error() -> None:
     with pytest.raises(UsageError, match="trained on and tested") as error:
         split(RUNS, ["crawl:1-7"], ["crawl:5-9"])
     assert error.value.received == "crawl:5-7"
-    assert error.value.hint == "--train crawl:1-4"
+    assert error.value.hint == "--train crawl:1-4 --test crawl:5-9"
     with pytest.raises(UsageError, match="trained on and tested") as error:
         split(RUNS, ["crawl"], ["crawl"])
     assert error.value.hint == "--train crawl:1-7 --test crawl:8-11"
+
+
+@pytest.mark.parametrize(
+    ("train", "test", "hint"),
+    [
+        ("crawl:1-7", "crawl:8-20", "--test crawl:8-11"),
+        ("crawl:1-7", "crawl:12", "--test crawl:8-11"),
+        ("crawl:1-20", "crawl:8-11", "--train crawl:1-7"),
+        ("crawl:12", "crawl:8-11", "--train crawl:1-7"),
+        ("crawl:1-7", "crawl", "--train crawl:1-7 --test crawl:8-11"),
+        ("crawl:1-5", "crawl:1-5", "--train crawl:1-5 --test crawl:6-11"),
+        ("crawl", "crawl:12", "--train crawl:1-7 --test crawl:8-11"),
+    ],
+)
+def test_the_hint_leaves_the_other_side_its_intervals(train: str, test: str, hint: str) -> None:
+    """What it says is accepted with the other option as it was: no hint leads to the next one."""
+    with pytest.raises(UsageError) as error:
+        split(RUNS, [train], [test])
+    assert error.value.hint == hint
+    sides = {"--train": train, "--test": test}
+    words = hint.split()
+    sides.update(zip(words[::2], words[1::2], strict=True))
+    trained, tested = split(RUNS, [sides["--train"]], [sides["--test"]])
+    assert trained and tested
+
+
+def test_a_hint_keeps_all_texts_of_its_run() -> None:
+    """Two texts of one run, the second too long: what exists of both stays asked for."""
+    with pytest.raises(UsageError) as error:
+        split(RUNS, ["crawl:1-3", "crawl:9-20"], ["turn:1"])
+    assert error.value.hint == "--train crawl:1-3,9-11"
 
 
 def test_nothing_to_train_on_is_a_usage_error_and_too_little_data_bad_input() -> None:

@@ -123,7 +123,7 @@ def test_a_missing_file_is_an_error_with_its_neighbour(tmp_path: Path) -> None:
     """A misspelt name is answered with the nearest file of the folder."""
     log(tmp_path, "crawl")
     assert "did you mean 'crawl.csv'" in refusal(tmp_path / "crawk.csv").what
-    assert refusal(tmp_path / "no" / "such.csv").hint == f"ls {tmp_path / 'no'}"
+    assert refusal(tmp_path / "no" / "such.csv").hint == f"ls {tmp_path}"  # a folder that is there
 
 
 def test_a_folder_where_a_file_is_expected_and_the_reverse(tmp_path: Path) -> None:

@@ -157,7 +157,7 @@ def test_unknown_robot_names_the_nearest() -> None:
     """A misspelt robot is a usage error whose hint is a command with the nearest name."""
     with pytest.raises(UsageError) as caught:
         robot_toml("threbar330")
-    assert caught.value.hint == "r2s2r init --robot threebar-330"
+    assert caught.value.hint == "--robot threebar-330"
 
 
 def test_init_texts() -> None:

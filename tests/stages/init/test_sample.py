@@ -130,7 +130,7 @@ def test_it_says_what_it_is() -> None:
     ("robot", "intervals", "hint"),
     [
         ("sixbar", 8, "r2s2r init --robot threebar --sample"),
-        ("nobody", 8, "r2s2r init --robot "),
+        ("nobody", 8, "--robot "),
         ("threebar", 0, "ask for 8"),
     ],
 )

@@ -1,0 +1,37 @@
+"""A hint that is one option alone becomes the command line as it was typed, with that option in its place."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+
+from r2s2r_cli.errors import R2S2RError
+
+
+def whole(error: R2S2RError, arguments: Sequence[str]) -> str:
+    """The hint of an error; where it reads `--name value`, the command line with it. arguments: as typed after `r2s2r`.
+
+    The option takes the place of the one that was wrong: of the same name, and with the value that the error received
+    or, of `--set KEY=VALUE`, the key. Where there is none it comes last.
+    """
+    said, gap, remark = error.hint.partition("   #")
+    try:
+        words = shlex.split(said)
+    except ValueError:
+        return error.hint
+    if len(words) != 2 or not words[0].startswith("--") or not arguments:
+        return error.hint
+    return shlex.join(["r2s2r", *_placed(arguments, words[0], words[1], error.received)]) + gap + remark
+
+
+def _placed(arguments: Sequence[str], name: str, value: str, received: str) -> list[str]:
+    key = value.partition("=")[0]
+    wrong = {received, key, f"{key.rpartition('.')[0]}.{received}"}
+    found = list(arguments)
+    for i, word in enumerate(found):
+        option, equals, behind = word.partition("=")
+        at, given = (i, behind) if equals else (i + 1, found[i + 1] if i + 1 < len(found) else "")
+        if option == name and ({given, given.partition("=")[0].strip()} & wrong or "=" not in value):
+            found[at] = f"{name}={value}" if equals else value
+            return found
+    return [*found, name, value]

@@ -1,0 +1,53 @@
+"""An artifact with nothing of ours in it: every command names the one that makes it again, and that one works."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import pytest
+
+from r2s2r_cli.store.again import command_at
+from tests.commands.conftest import document, invoke
+
+ESTIMATE = "iterations/001/20-estimate.h5"
+
+
+@pytest.mark.parametrize("content", [b"", b"not of ours", b"\x89HDF\r\n\x1a\n" + bytes(100)])
+@pytest.mark.parametrize(
+    "command", ["status", f"inspect {ESTIMATE}", f"recover {ESTIMATE}", f"validate {ESTIMATE}", "identify"]
+)
+def test_the_hint_makes_it_again(estimated: Path, content: bytes, command: str) -> None:
+    """Of an empty file and a foreign one; pasted, the hint writes the artifact."""
+    if command.startswith("inspect") and content.startswith(b"\x89HDF"):
+        command += " --same-as iterations/001/10-record.h5"  # the tree of a foreign file is shown, no error
+    (estimated / ESTIMATE).write_bytes(content)
+    last = invoke(*command.split()).stderr.splitlines()[-1]
+    assert last == "hint: r2s2r estimate --iteration 1"
+    assert invoke(*shlex.split(last)[2:], "--no-draw").exit_code == 0
+    assert document("status")["artifacts"][1]["state"] == "fresh"
+
+
+def test_what_may_be_brought_back_is_recovered(estimated: Path) -> None:
+    """A damaged head before whole data, and a recording, which nothing makes again."""
+    with (estimated / ESTIMATE).open("r+b") as file:
+        file.write(b"xxxx")
+    assert document("status")["next"] == f"r2s2r recover {ESTIMATE}"
+    assert invoke("identify").stderr.splitlines()[-1] == f"hint: r2s2r recover '{estimated / ESTIMATE}'"
+    assert invoke("recover", ESTIMATE).exit_code == 0
+    recording = "iterations/001/10-record.h5"
+    (estimated / recording).write_bytes(b"")
+    assert document("status")["next"] == f"r2s2r recover {recording}"
+
+
+def test_the_command_of_a_place(estimated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By name and folder, with the project where that is not here; nothing where a stage must be told more."""
+    folder = estimated / "iterations/007"
+    assert command_at(folder / "51-estimate.h5") == "r2s2r estimate --of execute --iteration 7"
+    assert command_at(folder / "70-diagnose.h5") == "r2s2r diagnose --iteration 7"
+    assert command_at(Path("floor.h5")) == "r2s2r floor"
+    assert command_at(folder / "10-record.h5") == command_at(estimated / "calibration.h5") == ""
+    assert command_at(estimated / "30-identify.h5") == command_at(folder / "floor.h5") == ""
+    monkeypatch.chdir(estimated.parent)
+    assert command_at(folder / "30-identify.h5") == "r2s2r identify --iteration 7 --project robot"
+    assert command_at(Path("30-identify.h5")) == ""

@@ -9,7 +9,6 @@ import typer
 
 from r2s2r_cli.commands.interrupts import resumable
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import UsageError
 from r2s2r_cli.options import (
     DrawOption,
     DryRunOption,
@@ -121,7 +120,7 @@ def identify(
 
     Example: r2s2r identify --train crawl:1-7 --test crawl:8-11
     """
-    from r2s2r_cli.commands.identify_hints import typed_options, whole_hints
+    from r2s2r_cli.commands.identify_hints import require_one_of, require_starts, typed_options, whole_hints
     from r2s2r_cli.commands.identify_inputs import Asked
     from r2s2r_cli.commands.outcome import print_config
     from r2s2r_cli.commands.wanted import wanted
@@ -148,10 +147,10 @@ def identify(
         online=online, discrepancy=discrepancy, also=tuple(dict.fromkeys(also or ())), seed=seed, typed=tuple(typed),
     )  # fmt: skip
     with whole_hints([*typed, *["--resume"] * resume], asked.artifacts):
-        _require_one_of(method, METHODS, "--method")
-        _require_one_of(drive, tuple(DRIVES), "--drive")
+        require_one_of(method, METHODS, "--method")
+        require_one_of(drive, tuple(DRIVES), "--drive")
         if starts is not None:
-            _require_starts(asked, overrides)
+            require_starts(asked, overrides)
         if self_test:
             _plant(asked, overrides, console, dry_run)
         else:
@@ -212,24 +211,6 @@ def _fit(asked: Asked, overrides: dict[str, Any], console: Console, how: _Ways) 
     show_outcome(_answer(result, report), console)
     if report is not None:
         _show(report, console)
-
-
-def _require_one_of(value: str, known: tuple[str, ...], option: str) -> None:
-    from difflib import get_close_matches
-
-    if value not in known:
-        near = get_close_matches(value, known, 1, 0.0) or known
-        raise UsageError("there is no such choice", where=option, expected=" | ".join(known), received=value,
-                         hint=f"r2s2r identify {option} {near[0]}")  # fmt: skip
-
-
-def _require_starts(asked: Asked, overrides: dict[str, Any]) -> None:
-    """Raises UsageError for a number of --starts that the setting does not allow, with a hint of that option."""
-    try:
-        asked.project.config(asked.iteration, overrides)
-    except UsageError as error:
-        error.hint = error.hint.replace("--set identify.starts=", "--starts ")
-        raise
 
 
 def _answer(result: StageResult, report: IdentifyReport | None) -> IdentifyResult:

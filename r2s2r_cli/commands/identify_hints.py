@@ -7,11 +7,16 @@ import re
 import shlex
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from difflib import get_close_matches
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from r2s2r_cli.errors import R2S2RError
+from r2s2r_cli.errors import R2S2RError, UsageError
 from r2s2r_cli.store.atomic import PARTIAL
 from r2s2r_cli.store.header import NotAnArtifact
+
+if TYPE_CHECKING:
+    from r2s2r_cli.commands.identify_inputs import Asked
 
 FLAGS = (
     "--online",
@@ -151,3 +156,20 @@ def _as_typed(new: Option, replaced: Sequence[Option], error: R2S2RError) -> Opt
 def _about(value: str | None) -> str:
     """The run, parameter or setting that a value is about."""
     return re.split("[:=,]", (value or "").removeprefix("+"), maxsplit=1)[0]
+
+
+def require_one_of(value: str, known: tuple[str, ...], option: str) -> None:
+    """Raises UsageError for a choice that an option does not have."""
+    if value not in known:
+        near = get_close_matches(value, known, 1, 0.0) or known
+        raise UsageError("there is no such choice", where=option, expected=" | ".join(known), received=value,
+                         hint=f"r2s2r identify {option} {near[0]}")  # fmt: skip
+
+
+def require_starts(asked: Asked, overrides: dict[str, Any]) -> None:
+    """Raises UsageError for a number of --starts that the setting does not allow, with a hint of that option."""
+    try:
+        asked.project.config(asked.iteration, overrides)
+    except UsageError as error:
+        error.hint = error.hint.replace("--set identify.starts=", "--starts ")
+        raise

@@ -149,11 +149,12 @@ def _healthy(report: DiagnoseReport) -> str:
         return ""
     again = "" if report.iteration is None else f" --iteration {report.iteration}"
     also = "" if report.free_iteration is None else f" --also {report.free_iteration}"
-    return (
-        "; healthy runs would, of the robot as it was when nothing was wrong: "
-        f"r2s2r record --random 15 --repeats 2{_free(report)} {ROBOT}, then r2s2r estimate{_free(report)}, then "
-        f"r2s2r diagnose{again}{also} --healthy RUN (once for each of them)"
+    commands = (
+        f"r2s2r record --random 15 --repeats 2{_free(report)} {ROBOT}",
+        f"r2s2r estimate{_free(report)}",
+        f"r2s2r diagnose{again}{also} --healthy RUN",  # once for each run
     )
+    return f"; healthy runs would, of the robot as it was when nothing was wrong: {', then '.join(commands)}"
 
 
 def _next(one: NextGaitFound, where: str) -> str:

@@ -112,9 +112,14 @@ class Rig(Closing):
         finally:
             self.latest_s = server.latest_s
 
+    @property
+    def duty(self) -> np.ndarray:
+        """Duty of every motor as on the wire, (motor,). May be asked while the rig is served, from another thread."""
+        return self._firmware.duty
+
     def truth(self) -> tuple[Truth, np.ndarray]:
-        """What is, and the duty of every motor as on the wire, (motor,)."""
-        return self._plant.truth(), self._firmware.duty
+        """What is, and the duty of every motor as on the wire, (motor,): between steps of the simulation."""
+        return self._plant.truth(), self.duty
 
     def close(self) -> None:
         """Release the ports, end the log."""

@@ -50,7 +50,7 @@ def test_the_controller_reaches_its_target_in_every_protocol_over_every_link(
             samples = follow(host, robot, TARGET, 2.0)
             truth = rig.truth()[0]
             counts = host.statistics
-        assert not rig.truth()[1].any()
+        assert not rig.duty.any()
     lengths = Lengths.of(robot)(samples[-1].capacitance)
     assert np.abs(lengths - truth.length).max() < 0.02
     wanted = robot.pid.min_length_m + 0.3 * robot.pid.range_m
@@ -79,7 +79,7 @@ def test_a_fault_of_the_sensors_stops_the_rig(fault: dict[str, object], what: st
             host.restart()
             back_and_forth(host)
         stopped = rig.truth()[0].t
-        duty = rig.truth()[1]
+        duty = rig.duty
     reached = [0, 2, 4, 5] if (fault["kind"], protocol) == ("board_silent", "boards") else range(6)
     assert not duty[reached].any(), "a board of the authors that is deaf cannot be stopped, all others are"
     assert 0.5 < stopped <= 0.5 + limit + 0.05, "two ticks for the question, the stop and the goodbye"
@@ -135,9 +135,9 @@ def test_a_link_that_goes_ends_as_one_error_and_comes_back(kind: str, link: str)
             back_and_forth(host)
         assert rig.address in caught.value.where and caught.value.hint
         deadline = time.monotonic() + 5
-        while rig.truth()[1].any() and time.monotonic() < deadline:
+        while rig.duty.any() and time.monotonic() < deadline:
             time.sleep(0.005)
-        assert not rig.truth()[1].any()
+        assert not rig.duty.any()
         if isinstance(caught.value, SafetyStop):
             host.reset()
         else:
@@ -200,7 +200,7 @@ def test_the_library_of_the_guide_works() -> None:
     robot = calibrated()
     with running_rig(robot) as rig:
         length = _guide("connect.md")["to_target"](rig.address, robot, TARGET)
-        assert not rig.truth()[1].any()
+        assert not rig.duty.any()
     position = (length[:6] - robot.pid.min_length_m) / robot.pid.range_m
     assert np.abs(position - TARGET).max() < 1.5 * robot.pid.tolerance
 

@@ -15,8 +15,6 @@ from typer.core import TyperGroup
 
 from r2s2r_cli import __version__
 from r2s2r_cli.commands import COMMANDS, GROUPS
-from r2s2r_cli.commands.parsing import usage_error
-from r2s2r_cli.commands.whole import whole
 from r2s2r_cli.console import PipeClosed, print_error
 from r2s2r_cli.errors import DamageWarning, ExitCode, GateError, InputError, Interrupted, R2S2RError, UsageError
 
@@ -80,11 +78,15 @@ def _run_guarded(call: Callable[[], object], as_json: bool, arguments: Sequence[
         print(f"interrupted: {error.what}\nhint: {error.hint}", file=sys.stderr)
         return error.exit_code
     except R2S2RError as error:
+        from r2s2r_cli.commands.whole import whole
+
         error.hint = whole(error, arguments)
         # A gate is judged on a result that was printed: stdout holds its document already.
         print_error(error, as_json=as_json and not isinstance(error, GateError))
         return error.exit_code
     except typer.TyperException as error:
+        from r2s2r_cli.commands.parsing import usage_error
+
         print_error(usage_error(error, arguments), as_json=as_json)
         return ExitCode.USAGE
     except (KeyboardInterrupt, typer.Abort):

@@ -62,15 +62,12 @@ def _meant(stage: str, key: str, text: str | None) -> str:
     given, or without one with the value that holds; where none is near, what lists them. An option alone is completed
     by the command."""
     import difflib
-    import json
-    from shlex import quote
 
+    from r2s2r_cli.store.toml_hints import override
     from schemas.config import RunConfig
 
     settings = RunConfig().model_dump(mode="json", by_alias=True).get(stage, {})
     near = difflib.get_close_matches(key.rpartition(".")[2], settings, n=1)
     if not near:
         return f"r2s2r {stage} --show-config"
-    usual = settings[near[0]]
-    value = text if text is not None else usual if isinstance(usual, str) else json.dumps(usual)
-    return f"--set {quote(f'{stage}.{near[0]}={value}')}"
+    return override(f"{stage}.{near[0]}", settings[near[0]] if text is None else text)

@@ -32,6 +32,11 @@ def rounded(value: float, digits: int = 3) -> str:
     return f"{value:.{decimals}f}"
 
 
+def share_of_gap(share: float) -> str:
+    """`63 %` of a gap that closes; `none` where it would grow, by however much."""
+    return f"{round(100 * share)} %" if share > 0.0 else "none"
+
+
 def quantity(value: float, unit: str, digits: int = 3) -> str:
     """`9.66 mm` of 0.00966 in m."""
     shown, factor = read_in(unit)

@@ -36,11 +36,11 @@ def in_override(overrides: Mapping[str, Any], model: type[BaseModel], otherwise:
     def mend(loc: Loc, near: str) -> str:
         key = ".".join(map(str, loc))
         if near and key in overrides:
-            return _option(key.rpartition(".")[0] + "." * (len(loc) > 1) + near, overrides[key])
+            return override(key.rpartition(".")[0] + "." * (len(loc) > 1) + near, overrides[key])
         usual = PydanticUndefined if near else default_at(model, loc)
         if usual is PydanticUndefined or key not in overrides:
             return otherwise(loc)
-        return _option(key, usual)
+        return override(key, usual)
 
     return mend
 
@@ -76,7 +76,8 @@ def default_at(model: type[BaseModel], loc: Loc) -> Any:
     return PydanticUndefined if isinstance(here, BaseModel) else here
 
 
-def _option(key: str, value: Any) -> str:
+def override(key: str, value: Any) -> str:
+    """`--set KEY=VALUE` of a setting, quoted: an option alone, which the command completes."""
     text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
     return f"--set {shlex.quote(f'{key}={text}')}"
 

@@ -11,14 +11,12 @@ from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.views.diagnose_floor import floor_picture
 from r2s2r_cli.views.diagnose_gains import ranking_picture
 from r2s2r_cli.views.diagnose_robot import robot_picture
-from r2s2r_cli.views.diagnose_words import HELD_OUT, LEFT_OUT, accused, drawn_effects
-from r2s2r_cli.views.figure import BLUE, GREEN, PURPLE, RED, new_figure, png_bytes
+from r2s2r_cli.views.diagnose_words import GUILTY, HELD_OUT, LEFT_OUT, PLAIN, accused, drawn_effects
+from r2s2r_cli.views.figure import BLUE, GREEN, PURPLE, new_figure, png_bytes
 
 if TYPE_CHECKING:
     from schemas.results_diagnose import DiagnoseReport
 
-GUILTY = RED
-PLAIN = "#8792a2"
 LABELS = 60
 """Letters that fit below an axis side by side."""
 _SHORT = {"nominal": "identified", "refit": "refit", "effect": "+ effect", "ceiling": "black box"}

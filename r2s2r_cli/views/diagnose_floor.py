@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData
-from r2s2r_cli.views.diagnose_words import accused
-from r2s2r_cli.views.figure import RED, legend_below, new_figure, png_bytes, rod_color
+from r2s2r_cli.views.diagnose_words import GUILTY, accused
+from r2s2r_cli.views.figure import legend_below, new_figure, png_bytes, rod_color
 
 if TYPE_CHECKING:
     from schemas.results_diagnose import DiagnoseReport
 
-GUILTY = RED
 ARROW = 5.0
 """Times that errors are drawn larger than they are."""
 

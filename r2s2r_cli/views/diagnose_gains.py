@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from r2s2r_cli.views.diagnose_ranking import NOWHERE, element_words, said
 from r2s2r_cli.views.diagnose_words import RIVALS
-from r2s2r_cli.views.figure import BLUE, PURPLE, RED, new_figure, png_bytes
+from r2s2r_cli.views.figure import BLUE, PURPLE, RED, legend_below, new_figure, png_bytes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,8 +46,7 @@ def ranking_picture(report: DiagnoseReport) -> bytes:
     if more:
         left.set_title(f"{more} others, of which little is known: in the table", fontsize=8, loc="left")
     _legend(left, report)
-    handles, labels = left.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncol=2, fontsize=8, frameon=False)
+    legend_below(figure, [left], columns=2)
     return png_bytes(figure)
 
 

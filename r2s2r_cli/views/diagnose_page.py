@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 from r2s2r_cli.views.diagnose_ranking import element_words, ranking_table
 from r2s2r_cli.views.diagnose_words import HELD_OUT, LEFT_OUT, TWO_ERRORS, WHY_NONE, verdict_words
 from r2s2r_cli.views.page import Page, PageTable, Picture, counted, render
-from schemas.people import plain_name, quantity
+from schemas.people import plain_name, quantity, share_of_gap
 from schemas.results_diagnose import INDISTINCT
 
 if TYPE_CHECKING:
     from schemas.results_diagnose import DiagnoseReport, NextGaitFound, PairFound, RankedName
 
+AT_FLOOR = "at the floor"
+"""Instead of a share, where there is no gap to close."""
 ROBOT = "--port /dev/ttyUSB0 --protocol legacy --camera realsense"
 """How the robot of the paper is reached, in commands that are shown."""
 
@@ -85,7 +87,11 @@ def _shrinkage(report: DiagnoseReport) -> PageTable:
         ),
         ["refit + a black box" + learned, _mm(s.ceiling), ""],
         ["floor of held-out intervals", _mm(s.floor), ""],
-        ["predicted before it was looked at", "", _predicted(s.predicted)],
+        [
+            "predicted before it was looked at",
+            "",
+            AT_FLOOR if s.predicted is None else share_of_gap(s.predicted),
+        ],
     ]
     where = "; within the run that was fitted" if s.within_run else ""
     if s.set_aside:
@@ -207,11 +213,6 @@ def _mm(value: float | None) -> str:
 
 def _share(value: float | None, ends: tuple[float, float] | None) -> str:
     if value is None:
-        return "at the floor"
+        return AT_FLOOR
     wide = "" if ends is None else f" ({round(100 * ends[0])} .. {round(100 * ends[1])})"
     return f"{round(100 * value)} %{wide}"
-
-
-def _predicted(value: float | None) -> str:
-    """Left-out intervals that get worse foretell no share, by however much they do."""
-    return _share(value, None) if value is None or value > 0.0 else "none"

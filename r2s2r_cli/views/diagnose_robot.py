@@ -9,16 +9,14 @@ import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.diagnose_ranking import element_words
-from r2s2r_cli.views.diagnose_words import accused, commits, undecided
-from r2s2r_cli.views.figure import RED, new_figure, png_bytes, rod_color
+from r2s2r_cli.views.diagnose_words import GUILTY, PLAIN, accused, commits, undecided
+from r2s2r_cli.views.figure import new_figure, png_bytes, rod_color
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from schemas.results_diagnose import DiagnoseReport, ElementFound
 
-GUILTY = RED
-PLAIN = "#8792a2"
 TEXT = "#1c2430"
 TOGETHER = 0.03
 """Parts nearer to each other than this share of the picture have one label."""

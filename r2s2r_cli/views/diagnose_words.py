@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from r2s2r_cli.views.figure import RED
+
 if TYPE_CHECKING:
     from schemas.results_diagnose import DiagnoseReport, ElementFound
 
+GUILTY, PLAIN = RED, "#8792a2"
+"""Colours of what is accused, and of what is not."""
 RIVALS = ("none", "unknown")
 """Names of a ranking that are no effects."""
 GUIDE = "docs/guides/diagnose.md"

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.diagnosis import Diagnosis
-from r2s2r_cli.stages.diagnose.findings import finding_words
 from r2s2r_cli.stages.diagnose.parity.finding import Element
 from r2s2r_cli.stages.diagnose.which.found import Ranked
 from r2s2r_cli.stages.diagnose.which.numbers import NUISANCES
@@ -115,7 +114,7 @@ def _segments(found: Diagnosis) -> tuple[SegmentFound, ...]:
 def _parity(found: Diagnosis) -> tuple[str, ...]:
     if found.parity is None:
         return ()
-    return tuple(finding_words(one) for one in found.parity.significant[:FINDINGS])
+    return tuple(f"{one.what} ({one.z:+.1f} sd)" for one in found.parity.significant[:FINDINGS])
 
 
 def _missing(found: Diagnosis) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Which
+from schemas.people import share_of_gap
 from schemas.results_diagnose import INDISTINCT
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def _shrunk(found: Diagnosis) -> str:
         beside = "" if was is None or 1e3 * was >= after else f"; as identified it is {1e3 * was:.1f} mm"
         return f"{text}: it closes none of the gap{beside}."
     wide = "" if much.ci90 is None else f" ({round(100 * much.ci90[0])} .. {round(100 * much.ci90[1])})"
-    told = "" if much.predicted is None else f"; predicted {_percent(much.predicted)}"
+    told = "" if much.predicted is None else f"; predicted {share_of_gap(much.predicted)}"
     text += f", which closes {round(100 * much.share)} %{wide} of the gap above the floor{told}"
     if much.ci90 is not None and much.ci90[0] <= 0.0:
         text += "; that it helps is not shown, so do not act on it yet"
@@ -103,11 +104,6 @@ def _shrunk(found: Diagnosis) -> str:
 def _of(which: Which, fitted: tuple[str, ...]) -> str:
     """What the effect that was measured is the likeliest of: one that no replay tells may be likelier."""
     return "effect" if which.best is None or which.best.effect in fitted else "of the effects that were fitted"
-
-
-def _percent(share: float) -> str:
-    """A share of a gap; that one would grow is no share."""
-    return f"{round(100 * share)} %" if share > 0.0 else "none"
 
 
 def _alike(which: Which, name: str) -> list[str]:

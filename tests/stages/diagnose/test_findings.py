@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import pytest
 
-from r2s2r_cli.stages.diagnose.findings import LOGARITHMS, RATIOS, SHARES, finding_words
 from r2s2r_cli.stages.diagnose.parity.expected import EXPECTED
-from r2s2r_cli.stages.diagnose.parity.finding import Element, Finding
+from r2s2r_cli.stages.diagnose.parity.parity import finding_of
+from r2s2r_cli.stages.diagnose.parity.quantities import Key
+from r2s2r_cli.stages.diagnose.parity.series import Measured
+from r2s2r_cli.stages.diagnose.report import _parity
 
 
-def found(check: str, value: float, *, more: str = "", differential: bool = False) -> Finding:
-    """A finding of that check, 3 sd from what is expected."""
-    scale = EXPECTED[check]
-    return Finding(check, Element("cap", 2), value, 0.01, scale.unit, scale.nominal, scale.built, differential, 3.0,
-                   0.003, f"what is measured{more}")  # fmt: skip
+def said(check: str, value: float, *, knock: object = None, healthy: bool = False) -> str:
+    """What a report says of that check of cap 2, as if it were 3 sd from what is expected."""
+    key: Key = (check, "cap", 2)
+    base = SimpleNamespace(of={key: Measured(0.0, 0.001)}) if healthy else None
+    made = finding_of(key, Measured(value, 0.01), base, SimpleNamespace(gain={}, knock=knock))  # type: ignore[arg-type]
+    assert made is not None
+    (words,) = _parity(SimpleNamespace(parity=SimpleNamespace(significant=[replace(made, z=3.0)])))  # type: ignore[arg-type]
+    return words
 
 
 @pytest.mark.parametrize(
@@ -30,16 +38,16 @@ def found(check: str, value: float, *, more: str = "", differential: bool = Fals
 )
 def test_a_number_has_its_unit_and_few_digits(check: str, value: float, words: str) -> None:
     """Of a length, a time, an angle, a share, a logarithm and a ratio."""
-    assert words in finding_words(found(check, value))
+    assert words in said(check, value)
 
 
 def test_a_knock_says_when() -> None:
     """What follows the number is kept; healthy runs are said."""
-    words = finding_words(found("knock", 0.008, more="; at 2.00 s of a they move by 9 mm", differential=True))
+    words = said("knock", 0.008, knock=SimpleNamespace(t=2.0, run="a", whole=0.009), healthy=True)
     assert words.endswith("is 8.0 mm, 0 mm in healthy runs; at 2.00 s of a they move by 9 mm (+3.0 sd)")
 
 
 def test_every_check_without_a_unit_is_a_share_a_logarithm_or_a_ratio() -> None:
     """So that no bare number is shown."""
     bare = {name for name, one in EXPECTED.items() if one.unit == "1"}
-    assert bare == {*SHARES, *LOGARITHMS, *RATIOS}
+    assert bare == {name for name, one in EXPECTED.items() if one.reads}

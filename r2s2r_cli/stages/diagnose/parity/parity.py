@@ -100,8 +100,8 @@ def finding_of(key: Key, value: Measured, base: Quantities | None, found: Quanti
         if check in ("latency", "lag", "play") and difference < 0:
             suspected = ()
     against = "in healthy runs" if differential else "as built"
-    what = f"{scale.words.format(element=element.words())} is {value.value:.4g} {scale.unit}".removesuffix(" 1")
-    what += f", {expected.value:.4g} {against}"
+    measured, usual = scale.number(value.value), scale.number(expected.value)
+    what = f"{scale.words.format(element=element.words())} is {measured}, {usual} {against}"
     if check == "knock" and found.knock is not None:
         what += f"; at {found.knock.t:.2f} s of {found.knock.run} they move by {1e3 * found.knock.whole:.0f} mm"
     return Finding(

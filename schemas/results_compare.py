@@ -78,7 +78,7 @@ class CompareRun(Frozen):
     com_end_error_m: float | None
     heading_end_error_rad: float | None
     keyframe_cap_rmse_m: float | None
-    """By command replay, each interval from its own start (design.md, Measures)."""
+    """By command replay, each interval from its own start (docs/concepts/measures.md)."""
     cap_rmse_m: float | None
     """In closed loop, at equal shares of each target interval."""
     path_error_m: float | None
@@ -173,5 +173,5 @@ class CompareReport(Frozen):
     repeatability: tuple[CompareRepeatability, ...]
     floor: CompareFloor
     srcc: dict[str, float | None] = Field(default_factory=dict)
-    """`srcc_com` by simulator (design.md); None: too few gaits."""
+    """`srcc_com` by simulator; None: too few gaits."""
     warnings: tuple[str, ...] = ()

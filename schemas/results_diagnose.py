@@ -1,4 +1,4 @@
-"""What `diagnose` says: printed in words, and at the top of its `--json` document (design.md section 5). SI."""
+"""What `diagnose` says: printed in words, and at the top of its `--json` document. SI."""
 
 from __future__ import annotations
 
@@ -200,7 +200,7 @@ class DiagnoseReport(Frozen):
 
 
 class DiagnoseResult(StageResult):
-    """What `diagnose` prints: as every stage, and design.md section 5 at the top. None where it did not run."""
+    """What `diagnose` prints: as every stage, and what it found at the top. None where it did not run."""
 
     schema_: Literal["r2s2r.diagnose/1"] = Field(default="r2s2r.diagnose/1", alias="schema")  # type: ignore[assignment]
     verdict: Verdict | None = None

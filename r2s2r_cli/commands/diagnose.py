@@ -208,7 +208,7 @@ def _shown(console: Console, seconds: dict[str, float]) -> Iterator[Callable[[st
 
 
 def _answer(result: Any, report: DiagnoseReport | None) -> DiagnoseResult:
-    """The document: what every stage says, and design.md section 5 at the top."""
+    """The document: what every stage says, and what was found at the top."""
     from schemas.results_diagnose import DiagnoseResult
 
     shared: dict[str, Any] = result.model_dump(exclude={"schema_"})

@@ -61,4 +61,4 @@ CATALOGUE: tuple[Effect, ...] = (
     CameraDelay(),
     Dropout(),
 )
-"""Every effect, in the order of design.md section 5."""
+"""Every effect, in the order of the way of the data."""

@@ -47,7 +47,7 @@ class EffectParameter:
 class Effect(Hooks):
     """An entry of the catalogue. Concrete effects are final: they set the class attributes and override hooks.
 
-    name: the id of design.md section 5. channel: where it acts. look_alikes: ids it is confused with.
+    name: its id (docs/reference/effects.md). channel: where it acts. look_alikes: ids it is confused with.
     """
 
     channel: ClassVar[Channel]

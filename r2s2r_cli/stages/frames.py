@@ -10,7 +10,7 @@ KEPT, DUPLICATE, BACKWARDS, NOT_FINITE = 0, 1, 2, 3
 """Codes of `drop_reason`, as in `schemas.recording.DROP_REASONS`."""
 
 MIN_GAP_S = 0.020
-"""Two frames closer than this are one observation stamped twice (design.md, Measures)."""
+"""Two frames closer than this are one observation stamped twice."""
 _STAMP_ROUNDING_S = 1e-6
 """Logs round stamps to milliseconds: a gap written as 0.020 must not fall below 20 ms by binary rounding."""
 

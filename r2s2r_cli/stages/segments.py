@@ -1,4 +1,4 @@
-"""Target intervals and segments of a run (words: design.md section 1). Frames are indices among kept frames."""
+"""Target intervals and segments of a run (docs/concepts/words.md). Frames are indices among kept frames."""
 
 from __future__ import annotations
 

@@ -92,7 +92,7 @@ def test_a_dry_run_says_what_it_would_read(estimated: Path) -> None:
 
 
 def test_the_document_has_the_numbers_at_the_top() -> None:
-    """The keys of design.md, section 5, beside those of every stage."""
+    """Its own keys beside those of every stage."""
     said = report(builders.identification())
     stage = StageResult(stage="identify", state="done", artifact="a.h5", content_sha256=None, reasons=(), inputs=(),
                         report=said.model_dump(mode="json"))  # fmt: skip

@@ -32,7 +32,7 @@ STARRED = {
     "friction_field", "rolling_resistance", "soft_ground", "cap_friction", "cap_radius", "ground_slope", "tether_drag",
     "sensor_bias", "sensor_gain", "camera_pose", "camera_scale", "camera_delay",
 }  # fmt: skip
-"""The effects of the first release, design.md section 5."""
+"""The effects of the first release."""
 
 OTHERS = {
     "tendon_hysteresis", "capstan_friction", "attachment_offset", "friction_anisotropy", "stribeck", "viscous_contact",

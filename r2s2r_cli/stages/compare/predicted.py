@@ -91,7 +91,7 @@ def _closed_loop(
 def _keyframes(
     driver: Driver, model: Model, run: RealRun, settings: SimulateSettings
 ) -> tuple[KeyframeErrors | None, list[str]]:
-    """Key frames by command replay, each interval from its own causal start (design.md, Measures)."""
+    """Key frames by command replay, each interval from its own causal start (docs/concepts/measures.md)."""
     if run.data is None:
         return None, []
     predictor = Predictor(model.numbers.mapping, step=settings.step_s)

@@ -20,7 +20,7 @@ from schemas.results_floor import CableFloor, CapFloor, FloorReport, LengthFloor
 __all__ = ["Numerics", "SeenRun", "SensedRun", "floor", "seen_run", "sensed_run"]
 
 REPEATS = 3
-"""Fewer repeats of a policy than this are no basis of their own (design.md, section 2)."""
+"""Fewer repeats of a policy than this are no basis of their own (docs/concepts/measures.md)."""
 APART = 1.5
 """Floor over all iterations to that within each beyond which the report warns."""
 FEW = 6

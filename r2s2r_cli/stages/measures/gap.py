@@ -1,4 +1,4 @@
-"""What is left above the floor, and how much of that an effect explains (design.md, Measures)."""
+"""What is left above the floor, and how much of that an effect explains (docs/concepts/measures.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Key-frame and free-run errors of end caps (design.md, Measures)."""
+"""Key-frame and free-run errors of end caps (docs/concepts/measures.md)."""
 
 from __future__ import annotations
 

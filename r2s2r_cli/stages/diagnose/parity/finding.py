@@ -42,7 +42,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Suspicion:
-    """An effect that a finding speaks for. effect: its id (design.md section 5). size: start values of its own
+    """An effect that a finding speaks for. effect: its id. size: start values of its own
     parameters in their units, by `parameter` or `parameter.index` as `r2s2r effects` names them; empty where the
     finding says that and not how large. share: of the finding's weight, 0 to 1; look-alikes have a share each."""
 

@@ -139,8 +139,8 @@ def verdict_of(
     """What the first of the ranking is worth. Where the best effect leaves too much (left_sd, `Calibration.refuses`)
     that is a verdict of its own: no effect of the catalogue is enough. A name that nothing speaks for but what it was
     fitted to is none (`Calibration.witnessed`), alone or first of a pair: what both gain is no witness of either.
-    Where no cause is named, that there is no gap is a claim about its size (design.md, Measures), not about causes that
-    hide below the floor."""
+    Where no cause is named, that there is no gap is a claim about its size (docs/concepts/measures.md), not about
+    causes that hide below the floor."""
     first = ranking[0]
     named = first.effect not in (NONE, UNKNOWN) and calibration.witnessed(first.gain, first.parity)
     if first.effect == UNKNOWN and calibration.refuses(left_sd):

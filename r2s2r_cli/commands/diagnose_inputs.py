@@ -8,7 +8,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from r2s2r_cli.commands.identify_inputs import Asked as IdentifyAsked, Source, named_runs, require_robot
+from r2s2r_cli.commands.identify_inputs import Asked as IdentifyAsked
+from r2s2r_cli.commands.named_runs import Source, named_runs, require_robot
 from r2s2r_cli.commands.outcome import require_input, require_model
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.store.project import Iteration, Project

@@ -3,83 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from r2s2r_cli.commands.named_runs import Source, estimated, named_runs, require_robot
 from r2s2r_cli.commands.outcome import require_input
-from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.errors import UsageError
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
 
 if TYPE_CHECKING:
-    from r2s2r_cli.artifact import ArtifactData
     from r2s2r_cli.stages.identify.data import RunData
     from r2s2r_cli.stages.identify.request import Drive, Method, Request
     from schemas.config import IdentifySettings
-
-
-@dataclass(frozen=True)
-class Source:
-    """Runs of one iteration: the recorded ones, or those that executed its plan."""
-
-    place: Iteration
-    executed: bool = False
-
-    @property
-    def recording(self) -> Path:
-        """What came from the robot."""
-        return self.place.artifact("recording", executed=self.executed)
-
-    @property
-    def estimate(self) -> Path:
-        """Their states."""
-        return self.place.artifact("estimate", executed=self.executed)
-
-
-def _estimated(place: Iteration) -> list[Source]:
-    """The runs of an iteration that have states, recorded ones first."""
-    return [one for one in (Source(place), Source(place, executed=True)) if one.estimate.exists()]
-
-
-@dataclass(frozen=True)
-class NamedRun:
-    """A run of both artifacts, where it is called `run`, and its name among those of all sources."""
-
-    name: str
-    recording: ArtifactData
-    estimate: ArtifactData
-    run: str
-
-
-def named_runs(sources: Sequence[Source]) -> Iterator[NamedRun]:
-    """The runs of all sources: those of another iteration than the first are called NNN-RUN, an executed one with the
-    name of a recorded one executed-RUN. Raises ArtifactError."""
-    from r2s2r_cli.store.read import read_artifact
-
-    taken: set[str] = set()
-    for source in sources:
-        recording = read_artifact(source.recording, "recording")[1]
-        estimate = read_artifact(source.estimate, "estimate")[1]
-        prefix = "" if source.place == sources[0].place else f"{source.place.number:03d}-"
-        for run in estimate.runs():
-            name = prefix + run
-            name = f"executed-{name}" if name in taken else name
-            taken.add(name)
-            yield NamedRun(name, recording, estimate, run)
-
-
-def require_robot(recording: ArtifactData | None, run: str, name: str) -> None:
-    """Raises InputError where a run says that it is of another robot than `name`."""
-    own = None if recording is None else recording.groups.get(f"runs/{run}")
-    told = name if own is None else str(own.attributes.get("robot", name))
-    if told != name:
-        raise InputError(
-            f"run {run} is of another robot", where=f"runs/{run}, robot", expected=f"{name}, as robot.toml says",
-            received=told, hint="r2s2r status   # another iteration may have runs of this robot alone",
-        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -124,13 +63,13 @@ class Asked:
         if self.iteration.artifact("estimate").exists():
             main = [Source(self.iteration)]
         else:
-            main = next((found for one in reversed(earlier) if (found := _estimated(one))), [Source(self.iteration)])
+            main = next((found for one in reversed(earlier) if (found := estimated(one))), [Source(self.iteration)])
         self._require_another(main[0].place)
         others: dict[int, list[Source]] = {}
         for number in self.also:
             if number != main[0].place.number:
                 place = self._also(number)
-                others[number] = _estimated(place) or [Source(place)]
+                others[number] = estimated(place) or [Source(place)]
         found = [*main, *(one for part in others.values() for one in part)]
         for one in found:
             number, of = one.place.number, " --of execute" * one.executed

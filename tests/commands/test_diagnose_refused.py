@@ -9,7 +9,7 @@ import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.commands.diagnose_inputs import Asked
-from r2s2r_cli.commands.identify_inputs import require_robot
+from r2s2r_cli.commands.named_runs import require_robot
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.write import write_artifact

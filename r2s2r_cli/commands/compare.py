@@ -121,7 +121,8 @@ def _draw(data: ArtifactData, report: CompareReport, robot: Robot) -> Iterator[t
 
 
 def _show(report: CompareReport, console: Console) -> None:
-    from r2s2r_cli.views.compare_tables import comparison_tables, verdict
+    from r2s2r_cli.views.compare_tables import comparison_tables
+    from r2s2r_cli.views.compare_verdict import verdict
 
     for table in comparison_tables(report):
         console.table(table.title, table.columns, table.rows)

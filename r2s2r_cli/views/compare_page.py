@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.views.compare_playback import playback_page
-from r2s2r_cli.views.compare_tables import comparison_tables, verdict
+from r2s2r_cli.views.compare_tables import comparison_tables
+from r2s2r_cli.views.compare_verdict import verdict
 from r2s2r_cli.views.page import Page, Picture
 from schemas.results_compare import CompareReport
 from schemas.robot import Robot

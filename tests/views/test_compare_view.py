@@ -17,7 +17,8 @@ from r2s2r_cli.views.compare_history import draw_history, history_table
 from r2s2r_cli.views.compare_page import comparison_page
 from r2s2r_cli.views.compare_playback import playback_data
 from r2s2r_cli.views.compare_strip import COLUMNS, draw_strips, picked
-from r2s2r_cli.views.compare_tables import IN_PART, TRAINED, comparison_tables, table_one, table_two, verdict
+from r2s2r_cli.views.compare_tables import IN_PART, TRAINED, comparison_tables, table_one, table_two
+from r2s2r_cli.views.compare_verdict import verdict
 from schemas.results_compare import (
     CompareEnd,
     CompareFloor,

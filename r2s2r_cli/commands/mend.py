@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from r2s2r_cli.errors import R2S2RError
-from r2s2r_cli.store.again import BARE, command_again
+from r2s2r_cli.store.again import BARE, MEASURED, command_again
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.staleness import input_reasons
@@ -29,8 +29,6 @@ class Mending:
 
 def mending(project: Project, header: Header, path: Path, reasons: Sequence[str]) -> Mending:
     """What mends the stale artifact at `path`. reasons: why it is stale, other than through a stale input."""
-    from r2s2r_cli.commands.wanted import MEASURED
-
     made = header.provenance
     if made.stage in MEASURED:  # nothing makes it again: a robot must move
         return Mending(runs=_runs(project, header, path))

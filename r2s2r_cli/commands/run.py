@@ -190,7 +190,7 @@ def _warn_of_old(project: Project, step: Step, console: Console) -> None:
 def _cut_off(target: Path) -> str:
     """What ended a recording before its last run was through; empty: nothing, or it cannot be read, which the stage
     that reads it says."""
-    from r2s2r_cli.commands.wanted import MEASURED
+    from r2s2r_cli.store.again import MEASURED
     from r2s2r_cli.store.header import read_header
 
     try:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.installed import installed_words
+from r2s2r_cli.store.again import MEASURED
 from r2s2r_cli.store.project import Iteration, Project
 from r2s2r_cli.store.staleness import Wanted
 from schemas.header import Provenance
@@ -36,10 +37,6 @@ ROBOT_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
                  "sensors": (), "rest_caps_m": ()},
 }  # fmt: skip
 """Which part of robot.toml each stage uses; a change elsewhere does not make its results stale."""
-
-
-MEASURED = ("record", "execute")
-"""Stages whose artifacts are measurements."""
 
 
 def robot_part(stage: str, robot: Robot) -> dict[str, Any]:

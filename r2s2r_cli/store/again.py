@@ -38,6 +38,9 @@ OPTIONS: dict[str, tuple[tuple[str, str, Any], ...]] = {
 """Of every stage the options that change its result: name, name among the flags that its provenance has, and the value
 that need not be typed. A list is an option for each entry, a table one NAME=VALUE for each."""
 
+MEASURED = ("record", "execute")
+"""Stages whose artifacts are measurements: to make one again a robot must move."""
+
 BARE = {"estimate": "estimate", "identification": "identify", "plan": "plan", "comparison": "compare",
         "diagnosis": "diagnose", "floor": "floor"}  # fmt: skip
 """Stages that need no argument, by what they make: theirs is made by their name alone."""

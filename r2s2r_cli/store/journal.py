@@ -122,7 +122,10 @@ class Journal:
             raise ValueError(f"{stream}: a row of {len(payload)} bytes, at most {MAX_RECORD} are allowed")
         self._write(RECORD.pack(MARK, number, len(payload), record_crc(number, payload)) + payload)
         if time.monotonic() - self._synced > SYNC_INTERVAL_S:
-            os.fdatasync(self._descriptor)
+            try:
+                os.fdatasync(self._descriptor)
+            except OSError as error:
+                raise disk_error(error, self.path) from error
             self._synced = time.monotonic()
 
     def close(self) -> None:

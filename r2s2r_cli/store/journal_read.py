@@ -86,6 +86,31 @@ def records(path: Path) -> Iterator[Place]:
             position = place.offset + place.length
 
 
+def torn_at(path: Path, end: int) -> int:
+    """Where the torn last record of a journal begins, behind its last whole record, which ends at `end`; the size of
+    the file where it ended cleanly. What lies between is damaged: records that are all there and not what was written.
+    """
+    size = position = path.stat().st_size
+    with path.open("rb") as file:
+        at = end
+        while at < size:
+            later = _next_mark(file, at + 1, size)
+            if later == size and _is_cut(file, at, size):
+                position = at
+            at = later
+    return position
+
+
+def _is_cut(file: BinaryIO, position: int, size: int) -> bool:
+    """Whether a record begins here of which the file does not have the end."""
+    file.seek(position)
+    head = file.read(RECORD.size)
+    if len(head) < RECORD.size:
+        return head[: len(MARK)] == MARK[: len(head)]
+    mark, _, length, _ = RECORD.unpack(head)
+    return bool(mark == MARK and length <= MAX_RECORD and position + RECORD.size + length > size)
+
+
 def _record_at(file: BinaryIO, position: int) -> Place | None:
     file.seek(position)
     head = file.read(RECORD.size)

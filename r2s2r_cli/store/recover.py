@@ -12,7 +12,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from r2s2r_cli.errors import ArtifactError
-from r2s2r_cli.store.again import command_again, command_at
+from r2s2r_cli.store.again import MEASURED, command_again, command_at
 from r2s2r_cli.store.atomic import keep_beside, replacing
 from r2s2r_cli.store.header import NotAnArtifact, block, body_sha256, read_header, sealed_header, unreadable
 from r2s2r_cli.store.isolated import IsolatedReader
@@ -69,7 +69,7 @@ def _recover_journal(path: Path) -> Recovered:
     target = artifact_of(path)
     sealed = seal(path, target, recovered=True)
     if sealed.header is None:
-        kept = ", its torn first row kept as .journal-damaged" if sealed.torn_bytes else ""
+        kept = ", what there is of one kept as .journal-damaged" if sealed.torn_bytes or sealed.lost_bytes else ""
         return Recovered(f"held no whole row: removed{kept}")
     words = f"sealed as {target.name}: {sum(sealed.rows.values())} rows"
     if sealed.torn_bytes:
@@ -172,7 +172,8 @@ def _lost(path: Path, header: Header | None, found: Rescue) -> ArtifactError:
     more = f" and {len(found.lost) - 3} more" if len(found.lost) > 3 else ""
     where = f"{path}, rescued into {found.path}" if found.path else str(path)
     if header is not None:
-        hint = command_again(header.provenance, path, force=True)
+        # A hint moves no robot: of what was measured it looks, and whoever pastes it decides.
+        hint = command_again(header.provenance, path, force=True, dry_run=header.provenance.stage in MEASURED)
     elif (hint := command_at(path)) == "":
         hint = f"unzip -p '{found.path}' README.json" if found.path else f"ls -la '{path}'*"
     return ArtifactError(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import glob
+import itertools
 import json
 import shutil
 import zipfile
@@ -40,8 +42,9 @@ def rescue(path: Path, header: Header | None, reader: IsolatedReader) -> Rescue:
 
     Raises ArtifactError where the disk refuses the result.
     """
-    earlier = sorted(path.parent.glob(f"{path.name}.rescued*.npz"))
-    target = path.with_name(f"{path.name}.rescued{f'-{len(earlier) + 1}' if earlier else ''}.npz")
+    earlier = sorted(path.parent.glob(f"{glob.escape(path.name)}.rescued*.npz"))
+    names = (path.with_name(f"{path.name}.rescued{f'-{n}' if n > 1 else ''}.npz") for n in itertools.count(1))
+    target = next(name for name in names if not name.exists())
     with _openable(path, header) as source:
         found = _facts(reader, source)
         digests = header.datasets if header else dict.fromkeys(found["names"], "")

@@ -17,7 +17,7 @@ from r2s2r_cli.errors import ArtifactError
 from r2s2r_cli.store.atomic import keep_beside
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.journal import Field, JournalHead, Stream
-from r2s2r_cli.store.journal_read import fixed_place, read_field, read_head, records, unwatched
+from r2s2r_cli.store.journal_read import fixed_place, read_field, read_head, records, torn_at, unwatched
 from r2s2r_cli.store.read import checked_header, length
 from r2s2r_cli.store.write import write_artifact
 from schemas.header import Header, Provenance
@@ -37,7 +37,7 @@ class Sealed:
     torn_bytes: int
     """Length of the torn last record [byte], 0 after a clean end."""
     lost_bytes: int
-    """Damaged stretches before the last whole record [byte]; the journal is then kept as `.journal-damaged`."""
+    """Damaged stretches [byte], not the torn last record; the journal is then kept as `.journal-damaged`."""
 
 
 @dataclass(frozen=True)
@@ -77,10 +77,12 @@ def seal(journal: Path, target: Path, *, recovered: bool = False, late: Late | N
         head, start = read_head(journal)
         provenance = _with_late(_provenance(journal, head), late)
         rows, end, lost = _survey(journal, head, start)
-        torn = journal.stat().st_size - end
+        torn_from = torn_at(journal, end)
+        lost += torn_from - end
+        torn = journal.stat().st_size - torn_from
         counts = {head.streams[n].key: len(r) for n, r in sorted(rows.items())}
         if not rows:
-            _remove(journal, keep=torn > 0)
+            _remove(journal, keep=torn > 0 or lost > 0)
             return Sealed(None, counts, torn, lost)
         if target.exists():
             header = _sealed_before(target, provenance, head, rows)  # killed between sealing and tidying up

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -105,6 +106,22 @@ def test_recording_goes_on_when_there_is_space_again(disk: SmallDisk) -> None:
     _, data = read_artifact(disk.path / "10-record.h5")
     numbers = data.groups[recorder.RUN + "/sensors"]["capacitance"][:, 0]
     assert numbers[:100].tolist() == list(range(100)) and set(numbers[100:-1]) <= {-1.0} and numbers[-1] == -2
+
+
+def test_a_disk_that_refuses_to_sync_is_the_disks_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """File systems that reserve no space say so when bytes are to reach the disk: an error in words all the same."""
+    path = tmp_path / "10-record.h5.journal"
+
+    def refused(_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with Journal(path, recorder.head()) as journal:
+        recorder.append(journal, 0)
+        monkeypatch.setattr("r2s2r_cli.store.journal.SYNC_INTERVAL_S", -1.0)
+        with monkeypatch.context() as patched, pytest.raises(ArtifactError, match="disk is full"):
+            patched.setattr(os, "fdatasync", refused)
+            recorder.append(journal, 1)
+    assert seal(path, tmp_path / "10-record.h5").header is not None
 
 
 def test_a_journal_that_finds_no_space_leaves_nothing(disk: SmallDisk) -> None:

@@ -160,6 +160,28 @@ def test_rescuing_twice_gives_one_rescue(golden: Copy, reader: IsolatedReader) -
         assert len(list(path.parent.glob("*.npz"))) == number
 
 
+@pytest.mark.parametrize("name", ["policy.h5", "r[1].h5"])
+def test_no_rescue_is_lost_to_a_later_one(golden: Copy, reader: IsolatedReader, name: str) -> None:
+    """Whatever became of the first rescue, and whatever the file is called, another one takes a free name."""
+    path = golden("policy").rename(golden("policy").with_name(name))
+    original = path.read_bytes()
+    kept: list[bytes] = []
+    for value in (0.5, 0.25, 0.125):
+        path.write_bytes(original)
+        with h5py.File(path, "r+") as file:
+            file["policies/walk/target" if value == 0.5 else "policies/rest/target"][0, 0] = value
+            if value == 0.125:
+                file["policies/walk/target"][0, 0] = value
+        with pytest.raises(ArtifactError) as caught:
+            recover_file(path, reader)
+        archive = Path(caught.value.where.rpartition("rescued into ")[2])
+        assert archive.exists() and archive.read_bytes() not in kept
+        kept.append(archive.read_bytes())
+        if value == 0.25:
+            path.with_name(f"{name}.rescued.npz").rename(path.with_name("moved.npz"))
+    assert sorted(kept) == sorted(one.read_bytes() for one in path.parent.glob("*.npz"))
+
+
 @pytest.mark.parametrize("content", [b"", b"x" * 9000, b"\x89HDF\r\n\x1a\n" + bytes(9000)])
 def test_what_is_no_artifact_is_said_to_be_none(tmp_path: Path, reader: IsolatedReader, content: bytes) -> None:
     """Other files are refused and stay."""

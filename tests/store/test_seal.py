@@ -124,6 +124,26 @@ def test_a_torn_last_row_is_left_out(tmp_path: Path) -> None:
     assert result.torn_bytes > 0 and result.rows == {**counts(5), f"{RUN}/sensors": 4}
 
 
+@pytest.mark.parametrize("torn", [0, 3], ids=["whole", "torn"])
+def test_damage_at_the_end_is_no_torn_row(tmp_path: Path, torn: int) -> None:
+    """Records that are all there, with a wrong checksum, are damaged bytes, which are kept; what is cut off is not."""
+    journal, target = paths(tmp_path)
+    write(journal, 9)
+    places = list(records(journal))
+    damaged = bytearray(journal.read_bytes())
+    for place in places[-4:-1]:
+        damaged[place.offset + place.length - 1] ^= 1
+    damaged[places[-1].offset + 9] ^= 0 if torn else 1
+    journal.write_bytes(damaged[: len(damaged) - torn])
+    result = seal(journal, target)
+    last = places[-1].length + places[-1].offset - places[-1].start
+    assert result.torn_bytes == (last - torn if torn else 0)
+    assert result.lost_bytes == len(damaged) - places[-5].offset - places[-5].length - (last if torn else 0)
+    assert sum(result.rows.values()) == len(places) - 4
+    (kept,) = tmp_path.glob("*-damaged*")
+    assert kept.read_bytes() == bytes(damaged[: len(damaged) - torn])
+
+
 def test_a_damaged_stretch_keeps_the_journal(tmp_path: Path) -> None:
     """Rows around the damage are sealed, and the bytes stay, under names that overwrite nothing."""
     for number in (1, 2):

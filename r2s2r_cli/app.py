@@ -7,6 +7,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -51,7 +52,10 @@ def run_guarded(call: Callable[[], object], as_json: bool, arguments: Sequence[s
     with warnings.catch_warnings():
         warnings.simplefilter("always", DamageWarning)
         warnings.showwarning = _warner(warnings.showwarning)
-        return _run_guarded(call, as_json, arguments)
+        try:
+            return _run_guarded(call, as_json, arguments)
+        finally:
+            _leave_streams()
 
 
 def _warner(other: Callable[..., None]) -> Callable[..., None]:
@@ -93,7 +97,6 @@ def _run_guarded(call: Callable[[], object], as_json: bool, arguments: Sequence[
         print("interrupted: nothing is half-written; run the command again", file=sys.stderr)
         return ExitCode.INTERRUPTED
     except (PipeClosed, BrokenPipeError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python must not complain at its exit
         return ExitCode.DONE
     except OSError as error:
         print_error(_system_error(error), as_json=as_json)
@@ -105,6 +108,16 @@ def _run_guarded(call: Callable[[], object], as_json: bool, arguments: Sequence[
         traceback.print_exc()
         print(BUG_MESSAGE, file=sys.stderr)
         return ExitCode.BUG
+
+
+def _leave_streams() -> None:
+    """What a stream does not take goes nowhere: Python must not complain at its exit, nor change the exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            with suppress(OSError, ValueError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _system_error(error: OSError) -> InputError:

@@ -7,7 +7,7 @@ import shutil
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from io import StringIO
 from typing import TYPE_CHECKING
 
@@ -200,7 +200,8 @@ class _Lines:
 
 
 def print_error(error: R2S2RError, *, as_json: bool) -> None:
-    """The error on stderr for people, and with --json as the document on stdout as well."""
+    """The error on stderr for people, and with --json as the document on stdout as well; a stream that takes no more
+    is left out: what went wrong may be just that."""
     if as_json:
         from schemas.results import ErrorResult
 
@@ -208,8 +209,10 @@ def print_error(error: R2S2RError, *, as_json: bool) -> None:
             exit_code=int(error.exit_code), what=error.what, where=error.where, expected=error.expected,
             received=error.received, hint=error.hint,
         )  # fmt: skip
-        out(document.model_dump_json(by_alias=True, indent=2))
-    print("\n".join([f"error: {error.what}", *error.lines()[1:]]), file=sys.stderr)
+        with suppress(PipeClosed, InputError):
+            out(document.model_dump_json(by_alias=True, indent=2))
+    with suppress(OSError):
+        print("\n".join([f"error: {error.what}", *error.lines()[1:]]), file=sys.stderr)
 
 
 def _is_number(cell: str) -> bool:

@@ -51,7 +51,7 @@ def parse_overrides(items: list[str] | None, stage: str) -> dict[str, Any]:
             )  # fmt: skip
         try:
             parsed = tomllib.loads(f"value = {text}")
-        except tomllib.TOMLDecodeError:
+        except (ValueError, RecursionError):  # no TOML, a number of too many digits, too deep a list
             parsed = {"value": text}
         overrides[key] = parsed["value"] if len(parsed) == 1 else text
     return overrides

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import re
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 
 class Frozen(BaseModel):
     """Base of every model here: immutable, and an unknown key is an error, not a surprise."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @model_validator(mode="after")
+    def _without_nul(self) -> Self:
+        # HDF5 and paths end at one: what stands behind it would be lost, or refused much later.
+        for name, value in self.__dict__.items():
+            if isinstance(value, str) and "\0" in value:
+                raise ValueError(f"no NUL character in {name}")
+        return self
 
 
 Unit = Literal[

@@ -134,6 +134,8 @@ IMU = GroupSpec(
     ),
 )  # fmt: skip
 
+ROTATION_TOLERANCE = 1e-3
+"""Most that R^T R may differ from the unit matrix in an entry: rotations come as text, some with three digits."""
 CAMERA = GroupSpec(
     path="runs/{run}/camera",
     description="colour and depth frames as they came, never re-encoded",

@@ -9,13 +9,14 @@ import numpy as np
 from r2s2r_cli.artifact import Blobs
 from r2s2r_cli.checks.base import Found, check, number, worst
 from r2s2r_cli.checks.subjects import Run
+from schemas.recording import ROTATION_TOLERANCE
 
 DEPTH_SCALE_M = (1e-5, 1e-2)
 """Real cameras have 1/1000, 1/4000 or 1/5000 m a count; 65535 counts must reach 0.65 m and may not reach 655 m."""
 PAIR_GAP_S = 0.1
 """Colour and depth of one instant come within a frame or two at 30 Hz."""
-RIGID = 1e-6
-"""Rounding of a rotation matrix written as text with six digits and more."""
+LAST_ROW = 1e-6
+"""0 0 0 1, to rounding."""
 _KINDS = ("recording",)
 
 
@@ -113,12 +114,12 @@ def camera_pose_is_rigid(run: Run) -> Iterator[Found]:
         return
     R = X_WC[:3, :3]
     error = float(np.abs(R.T @ R - np.eye(3)).max())
-    if error > RIGID:
+    if error > ROTATION_TOLERANCE:
         yield Found(run.at("camera", "X_WC"), "the pose of the camera is no rotation", "R^T R = 1",
                     f"off by {number(error)}")  # fmt: skip
     elif np.linalg.det(R) < 0:
         yield Found(run.at("camera", "X_WC"), "the pose of the camera mirrors", "determinant +1", "-1")
-    if np.abs(X_WC[3] - (0, 0, 0, 1)).max() > RIGID:
+    if np.abs(X_WC[3] - (0, 0, 0, 1)).max() > LAST_ROW:
         yield Found(run.at("camera", "X_WC"), "the last row of the camera's pose is not 0 0 0 1", "0 0 0 1",
                     " ".join(number(x) for x in X_WC[3]))  # fmt: skip
 

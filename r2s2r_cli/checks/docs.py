@@ -12,8 +12,8 @@ What `r2s2r validate` looks at. Each check has a name for `--select` and `--igno
 
 {importances}
 
-The exit code is 4 where a file cannot be read at all (missing, damaged, of a newer version, TOML that its model
-refuses: the other commands refuse it too), else 3 where a check found an error, else 0. Warnings and advice do not
+The exit code is 4 where a file cannot be read at all (missing, damaged, of a newer version, no TOML), else 3 where a
+check found an error, else 0. Warnings and advice do not
 count. Checks of the values run where the form of the file is right; checks against the robot run where the data are
 of the project's robot by name and have as many caps, rods and cables as it.
 """

@@ -1,4 +1,4 @@
-"""Can the file be read at all? These checks always run; where one fails with an error, the exit code is 4."""
+"""Can the file be read at all? These checks always run; where one says no, the exit code is 4, for wrong values 3."""
 
 from __future__ import annotations
 

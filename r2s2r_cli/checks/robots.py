@@ -22,6 +22,8 @@ WINCH_SHARE = 0.1
 """A winch is a hundredth of the length of a rod in radius; a tenth is centimetres for millimetres."""
 TRAVEL_MIN_S = 0.2
 """Shortest time over a cable's whole range. The 3-bar robot takes 1.6 s; with its speed in rpm it would take 0.16 s."""
+ROUNDING_M = 1e-9
+"""0.1 + 0.2 is a little more than 0.3."""
 CAPACITANCE_F = (0.1e-12, 1e-9)
 """Stretch sensors have 10-40 pF; outside this over the cable's limits, slope or offset has another unit."""
 
@@ -198,7 +200,7 @@ def pid_range_in_limits(robot: Robot) -> Iterator[Found]:
     """A controller that asks for what the limits forbid."""
     low, high = robot.pid.min_length_m, robot.pid.min_length_m + robot.pid.range_m
     least, most = robot.limits.cable_length_min_m, robot.limits.cable_length_max_m
-    if low < least or high > most:
+    if low < least - ROUNDING_M or high > most + ROUNDING_M:
         yield Found("pid", "the controller asks for lengths outside the limits",
                     f"{number(least, 1e3)} .. {number(most, 1e3)} mm",
                     f"{number(low, 1e3)} .. {number(high, 1e3)} mm")  # fmt: skip

@@ -207,7 +207,7 @@ def _settings(items: list[str] | None, without: str | None) -> dict[str, object]
         name, equals, text = item.partition("=")
         try:
             found[name.strip()] = tomllib.loads(f"value = {text}")["value"]
-        except (tomllib.TOMLDecodeError, KeyError) as error:
+        except (ValueError, KeyError, RecursionError) as error:
             raise UsageError("this is no setting", where="--set", expected="KEY=VALUE, the value as TOML",
                              received=item, hint="--set with_parity=false") from error  # fmt: skip
         if not equals:

@@ -60,7 +60,7 @@ def diagnose(
     also: Annotated[
         list[int] | None, typer.Option("--also", metavar="N", help="Also the runs of iteration N; repeatable.")
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of filters and bootstrap.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of filters and bootstrap.")] = 0,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where the same command was interrupted.")] = False,
     project: ProjectOption = None,
     iteration: IterationOption = None,

@@ -201,10 +201,11 @@ def _require_fresh(project: Project, place: Iteration, plan: Path, console: Cons
     from r2s2r_cli.commands.wanted import wanted_again
     from r2s2r_cli.errors import InputError
     from r2s2r_cli.store.header import whole_header
-    from r2s2r_cli.store.staleness import reasons
+    from r2s2r_cli.store.staleness import joined, reasons
 
     header = whole_header(plan)
     found = reasons(project, header, wanted_again(project, place, header.provenance))
+    found += joined(project, place, header.provenance)
     if found:
         raise InputError(
             "the plan is stale: it was made for another robot or simulator than there is now",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import math
 import re
 import tomllib
 from pathlib import Path
@@ -66,7 +67,7 @@ def _parse(item: str) -> tuple[str, Any]:
                          hint="--set contact.friction=0.5")  # fmt: skip
     try:
         value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):  # no TOML, a number of too many digits, too deep a list
         value = text
     return key.strip(), value
 
@@ -89,9 +90,16 @@ def _set(values: Any, key: str, value: Any) -> None:
         if i + 1 == len(parts):
             # TOML tells 1 from 1.0; who types --set means a number.
             old = here[place] if isinstance(here, list) else here.get(place)
-            here[place] = float(value) if isinstance(value, int) and not isinstance(old, int) else value
+            here[place] = _number(value) if isinstance(value, int) and not isinstance(old, int) else value
         else:
             values = here[place]
+
+
+def _number(value: int) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # the model refuses it in words
+        return math.inf if value > 0 else -math.inf
 
 
 def _no_such(key: str, above: str, expected: str, received: str) -> UsageError:

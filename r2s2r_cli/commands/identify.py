@@ -101,7 +101,7 @@ def identify(
     starts: Annotated[
         int | None, typer.Option("--starts", metavar="N", help="Fits from N starts; same as --set identify.starts=N.")
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of starts, re-drawn noise and bootstrap.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of starts, re-drawn noise and bootstrap.")] = 0,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where the same command was interrupted.")] = False,
     project: ProjectOption = None,
     iteration: IterationOption = None,

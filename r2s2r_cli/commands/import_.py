@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from enum import StrEnum
 from pathlib import Path
@@ -89,6 +90,9 @@ def import_(
     if not sources:
         raise UsageError("no log is named", where="r2s2r import", expected="a trajectory CSV or a recorder folder",
                          received="nothing", hint="r2s2r import run.csv")  # fmt: skip
+    if depth_scale is not None and not (math.isfinite(depth_scale) and depth_scale > 0):
+        raise UsageError("this is no size of a depth count", where="--depth-scale", expected="metres, above 0",
+                         received=str(depth_scale), hint="--depth-scale 0.001")  # fmt: skip
     settings = here.config(place, overrides).imports
     flags = {"format": format_.value, "depth_scale": depth_scale}
     logs = sources

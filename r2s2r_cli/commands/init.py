@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from importlib import resources
@@ -41,7 +41,7 @@ def init(
     sample: Annotated[
         bool, typer.Option("--sample", help="Add sample.csv: closed-form kinematics, labelled so, to try import on.")
     ] = False,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the sample's noise.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the sample's noise.")] = 0,
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -65,9 +65,7 @@ def init(
         texts = init_texts(robot, attachment.value, sample_seed=seed if sample else None)
     files = {PROJECT_FILE: project_toml(title), **texts, "Makefile": _makefile()}
     _refuse_overwriting(root, files, _command(_free(directory), typed))
-    for file, text in files.items():
-        write_text(root / file, text)
-    (root / ITERATIONS).mkdir(exist_ok=True)
+    _write(root, files)
     console.document(InitResult(project=title, robot=robot, files=tuple(files)))
     for file in files:
         console.data(str(directory / file))
@@ -75,6 +73,20 @@ def init(
     console.hint(
         f"cd {shlex.quote(str(directory))} && r2s2r import {log}" if str(directory) != "." else f"r2s2r import {log}"
     )
+
+
+def _write(root: Path, files: Mapping[str, str]) -> None:
+    """All of them, or none: half a project would be in the way of the next attempt."""
+    done: list[Path] = []
+    try:
+        for file, text in files.items():
+            write_text(root / file, text)
+            done.append(root / file)
+        (root / ITERATIONS).mkdir(exist_ok=True)
+    except BaseException:
+        for path in done:
+            path.unlink(missing_ok=True)
+        raise
 
 
 def _makefile() -> str:

@@ -43,10 +43,18 @@ def _describe(path: Path) -> InspectResult:
     try:
         header = checked_header(path)
     except NotAnArtifact:
-        if not path.is_file():
+        if not path.is_file() or _ours(path):
             raise
         return _foreign(path)
     return InspectResult(path=str(path), header=header.model_dump(mode="json"), nodes=tuple(describe(path)))
+
+
+def _ours(path: Path) -> bool:
+    """Whether the file begins as ours do: then its head is damaged, and it is no file of another program."""
+    from r2s2r_cli.store.header import NAME
+
+    with path.open("rb") as file:
+        return file.read(len(NAME)) == NAME
 
 
 def _foreign(path: Path) -> InspectResult:

@@ -52,7 +52,7 @@ def plan(
             help="Also a policy that goes there: metres along the principal axis and forward, degrees; repeatable.",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of drawn numbers and start poses.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of drawn numbers and start poses.")] = 0,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where the same command was interrupted.")] = False,
     project: ProjectOption = None,
     iteration: IterationOption = None,

@@ -57,7 +57,7 @@ def record(
     levels: Annotated[
         int, typer.Option("--levels", help="Targets a cable can have in the random policy: 2 is short or long.")
     ] = 2,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the random policy; it gives it its name.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random policy; it gives it its name.")] = 0,
     excite: Annotated[
         list[Excitation] | None,
         typer.Option("--excite", help="Also a named set: single cables in ramps, holds, reversals, or repeats."),

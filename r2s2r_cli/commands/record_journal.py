@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from r2s2r_cli.commands.pictures import remove_pictures
 from r2s2r_cli.commands.typed import typed_words
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.store.lock import writer
@@ -91,12 +92,13 @@ class Recording:
         return shlex.join(["r2s2r", *words, "--iteration", str(newest + 1)])
 
     def put_aside(self) -> Path | None:
-        """The recording that is there gets another name (--force); None where there is none."""
+        """The recording that is there gets another name (--force), and its pictures go; None where there is none."""
         from r2s2r_cli.store.atomic import keep_beside
 
         if not self.target.exists():
             return None
         kept = keep_beside(self.target, ".replaced")
+        remove_pictures(self.target)
         self.target.unlink()
         return kept
 

@@ -50,7 +50,7 @@ def run(
         str | None, typer.Option("--camera", metavar="CAMERA", help="realsense[:SERIAL], open3d or rig://HOST:PORT.")
     ] = None,
     random: Annotated[int, typer.Option("--random", metavar="N", help="Targets of the random policy to record.")] = 15,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the random policy, of identify and of plan.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random policy, of identify and of plan.")] = 0,
     policy: Annotated[
         list[str] | None,
         typer.Option(

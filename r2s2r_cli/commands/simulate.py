@@ -44,7 +44,7 @@ def simulate(
     random: Annotated[
         int | None, typer.Option("--random", metavar="N", help="Also a random policy of N binary target shapes.")
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the random policy; it is named random-SEED.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random policy; it is named random-SEED.")] = 0,
     replay: Annotated[
         list[str] | None,
         typer.Option("--replay", metavar="RUN", help="Also the recorded motor commands of this run; repeatable."),

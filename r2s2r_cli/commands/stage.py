@@ -9,13 +9,13 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 from pydantic import BaseModel
 
 from r2s2r_cli.commands.freshness import same_inputs, stale_inputs
 from r2s2r_cli.commands.interrupts import whole_items
+from r2s2r_cli.commands.pictures import remove_pictures
 from r2s2r_cli.commands.wanted import wanted
 from r2s2r_cli.errors import InputError, R2S2RError, UsageError
 from r2s2r_cli.store.atomic import sweep, write_bytes
@@ -80,7 +80,7 @@ class StageRun(Generic[Report]):
         if self.guard is not None and not self.force:
             self.guard(present)
         with writing(self.project.root, self.stage):
-            return self._run_locked(compute, draw, after, present, why)
+            return self._run_locked(compute, draw, after, why)
 
     def why(self, *, drawn: bool) -> tuple[Header | None, list[str]]:
         """The header of what is there, and why it must be made (again); empty: it is fresh."""
@@ -126,7 +126,6 @@ class StageRun(Generic[Report]):
         compute: Callable[[], tuple[ArtifactData, Report]],
         draw: Callable[[ArtifactData, Report], Drawings] | None,
         after: Callable[[Report], None] | None,
-        present: Header | None,
         why: Sequence[str],
     ) -> tuple[StageResult, Report | None]:
         from r2s2r_cli.store.provenance import build_provenance
@@ -144,14 +143,8 @@ class StageRun(Generic[Report]):
             overrides=self.overrides, robot=self.wanted.robot, inputs=self.inputs, started=started, wall_s=wall_s,
             report=report.model_dump(mode="json"), drawings=[self.target.stem + suffix for suffix, _ in pictures],
         )  # fmt: skip
-        old = present.provenance.drawings if present is not None else ()
-
-        def clear() -> None:
-            # Before the artifact changes: a picture that is there must never show another artifact.
-            for name in old:
-                self.target.with_name(Path(name).name).unlink(missing_ok=True)
-
-        header = write_artifact(self.target, data, provenance, replacing_now=clear)
+        # Before the artifact changes: a picture that is there must never show another artifact.
+        header = write_artifact(self.target, data, provenance, replacing_now=lambda: remove_pictures(self.target))
         if after is not None:
             after(report)
         return self._result("done", header, why, report, self._write_drawings(pictures)), report
@@ -170,10 +163,13 @@ class StageRun(Generic[Report]):
                              hint="run the command again")  # fmt: skip
 
     def _require_same_inputs(self) -> None:
-        for before, now in zip(self.inputs, self.find_inputs(), strict=True):
-            if before.sha256 != now.sha256:
-                raise InputError("an input changed while it was read", where=before.path,
-                                 expected=f"sha256 {before.sha256[:16]}", received=now.sha256[:16],
+        before, now = ({ref.path: ref.sha256 for ref in refs} for refs in (self.inputs, self.find_inputs()))
+        for path in sorted({*before, *now}):
+            expected, received = (side.get(path, "")[:16] for side in (before, now))
+            if expected != received:
+                raise InputError("an input changed while it was read", where=path,
+                                 expected=f"sha256 {expected}" if expected else "no such input, as at the beginning",
+                                 received=received or "no such file any more",
                                  hint="run the command again")  # fmt: skip
 
     def _write_drawings(self, pictures: Sequence[tuple[str, bytes]]) -> list[str]:

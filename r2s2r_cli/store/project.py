@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -45,10 +45,12 @@ class Iteration:
 
 @dataclass(frozen=True)
 class Project:
-    """A project directory with its files."""
+    """A project directory with its files, as they were when a command first read them: what it computes with and what
+    it says that it computed with are the same, though somebody edits them meanwhile."""
 
     root: Path
     file: ProjectFile
+    _read: dict[Path, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @classmethod
     def find(cls, start: Path | None = None) -> Project:
@@ -77,7 +79,11 @@ class Project:
 
     def robot(self) -> Robot:
         """The robot description, checked. Raises InputError."""
-        return load_model(self.robot_path, Robot)
+        path = self.robot_path
+        if path not in self._read:
+            self._read[path] = load_model(path, Robot)
+        robot: Robot = self._read[path]
+        return robot
 
     @property
     def cache(self) -> Path:
@@ -137,10 +143,11 @@ class Project:
         """
         values = {k: v for k, v in self.file.model_dump(by_alias=True).items() if k not in _HEAD_KEYS}
         local = iteration.path / CONFIG_FILE if iteration else None
-        if local is not None and local.is_file():
-            own = read_toml(local)
-            check_model(own, RunConfig, str(local))
-            values = _merge(values, own)
+        if local is not None:
+            if local not in self._read:
+                self._read[local] = read_toml(local) if local.is_file() else {}
+                check_model(self._read[local], RunConfig, str(local))
+            values = _merge(values, self._read[local])
         for key, value in overrides.items():
             values = _merge(values, _nest(key, value))
         try:

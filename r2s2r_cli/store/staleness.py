@@ -17,7 +17,7 @@ from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import Header, InputRef, Provenance
 from schemas.versions import KINDS
 
-OPTIONAL = {"compare": ("floor",), "diagnose": ("floor", "plan")}
+OPTIONAL = {"plan": ("identification",), "compare": ("floor",), "diagnose": ("floor", "plan")}
 """Of every stage the kinds that it reads where they are there, of the project or of its iteration."""
 
 

@@ -317,6 +317,7 @@ EDGES: tuple[Edge, ...] = (
         "commands between the intervals",
         lambda: edited(edited(recording(), "commands/t", put(3, 0.25)), "commands/target", put((3, 0), 0.5)),
     ),
+    Edge("camera_pose_is_rigid", "text of four digits", lambda: edited(recording(), "camera/X_WC", put((0, 1), 1e-4))),
     Edge("spans_inside_frames", "the frames are not known", lambda: _only_spans()),
     Edge("intervals_enough", "none are known", lambda: dataclasses.replace(recording(), streams={})),
 )

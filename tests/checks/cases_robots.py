@@ -149,8 +149,17 @@ EDGES: tuple[Edge, ...] = (
     Edge("controls_shorten_cables", "they shorten", lambda: _breathing(-1.0)),
     Edge("controls_shorten_cables", "no command is logged", lambda: _breathing(np.nan)),
     Edge("controls_shorten_cables", "no motor runs", lambda: _breathing(0.0)),
+    Edge("pid_range_in_limits", "to the limit, in numbers that binary fractions miss", lambda: _to_the_limit()),
     Edge("rod_masses_plausible", "a heavy rod: 8 kg of lead", lambda: _part(4, mass_kg=8.0)),
     *(Edge(name, "a robot with rods of 1 m", lambda: scaled(1 / 0.325)) for name in _ROBOT_CHECKS),
     *(Edge(name, "a robot with rods of 5 m", lambda: scaled(5 / 0.325)) for name in _ROBOT_CHECKS),
     *(Edge(name, "a robot with rods of 5 cm", lambda: scaled(0.05 / 0.325)) for name in _ROBOT_CHECKS),
 )
+
+
+def _to_the_limit() -> Robot:
+    own = robot()
+    pid, limits = {"min_length_m": 0.1, "range_m": 0.2}, {"cable_length_max_m": 0.3}
+    return own.model_copy(
+        update={"pid": own.pid.model_copy(update=pid), "limits": own.limits.model_copy(update=limits)}
+    )

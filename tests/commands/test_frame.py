@@ -206,6 +206,8 @@ SHELL_CASES = {
     "closed stdout": ("{r2s2r} doctor --quick >&-", 0),
     "closed stderr": ("{r2s2r} doctor --quick 2>&-", 0),
     "ascii locale": ("PYTHONIOENCODING=ascii {r2s2r} init $'r\\xc3\\xb6bi' && cd r* && {r2s2r} status", 0),
+    "full stdout of a document": ("{r2s2r} doctor --quick --json > /dev/full", 4),
+    "an error that nobody hears": ("set -o pipefail; {r2s2r} inspect none.h5 --json 2>/dev/full | true", 4),
     "full stdout": ("{r2s2r} doctor --quick > /dev/full", 4),
     "a pipe as file": ("mkfifo pipe; {r2s2r} inspect pipe", 4),
     "a pipe to recover": ("mkfifo pipe; {r2s2r} recover pipe", 4),

@@ -78,6 +78,17 @@ def test_a_recording_is_whole_and_valid(robot_project: Path, link: Maker) -> Non
     assert {one["check"] for one in found["findings"]} == {"sensors_move"}  # the passive cables of this robot do not
 
 
+def test_pictures_never_show_another_recording(robot_project: Path, link: Maker) -> None:
+    """What was drawn of a recording that is replaced goes; the recording itself keeps another name."""
+    link()
+    document(*ASK)
+    folder = (robot_project / RECORDING).parent
+    assert list(folder.glob("10-record*.png")) and (folder / "10-record.html").exists()
+    document(*ASK, "--force", "--no-draw")
+    assert not [*folder.glob("10-record*.png"), *folder.glob("10-record.html")]
+    assert (folder / "10-record.h5.replaced").exists()
+
+
 @pytest.mark.parametrize("silent", [None, 7])
 def test_a_sensor_is_judged_by_the_messages_of_its_board(robot_project: Path, link: Maker, silent: int | None) -> None:
     """Three boards take turns, so that every sensor is missing in two rows of three: nothing to warn of. One that is

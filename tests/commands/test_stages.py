@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import shutil
 from pathlib import Path
 
 import pytest
 
+from r2s2r_cli.errors import ArtifactError
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.read import read_artifact
 from tests.commands.conftest import document, invoke
@@ -22,6 +24,23 @@ def test_init_overwrites_nothing(project: Path) -> None:
     result = invoke("init", ".")
     assert result.exit_code == 2
     assert {path: path.read_bytes() for path in before} == before
+
+
+def test_init_leaves_a_whole_project_or_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stopped half-way, it takes back what it wrote: the same command is not refused afterwards."""
+    command = importlib.import_module("r2s2r_cli.commands.init")
+    write = command.write_text
+
+    def full(path: Path, text: str) -> None:
+        if path.name == "Makefile":
+            raise ArtifactError("the disk is full", where=str(path), hint="df -h .")
+        write(path, text)
+
+    monkeypatch.setattr(command, "write_text", full)
+    assert invoke("init", str(tmp_path / "p"), "--sample").exit_code == 4
+    assert not list((tmp_path / "p").iterdir())
+    monkeypatch.undo()
+    assert invoke("init", str(tmp_path / "p"), "--sample").exit_code == 0
 
 
 @pytest.mark.parametrize("robot", ["threebar", "threebar-330", "sixbar"])
@@ -137,6 +156,16 @@ def test_pictures_never_show_another_artifact(estimated: Path) -> None:
     assert (folder / "20-estimate.html").exists()
 
 
+def test_pictures_of_a_damaged_artifact_go_with_it(estimated: Path) -> None:
+    """Its head cannot say any more what was drawn of it: what is called after it goes, and nothing else."""
+    folder = estimated / "iterations/001"
+    mine = folder / "20-notes.png"
+    mine.write_bytes(b"mine")
+    (estimated / ESTIMATE).write_bytes(b"nothing")
+    assert document("estimate", "--no-draw", "--force")["state"] == "done"
+    assert not list(folder.glob("20-estimate*.png")) and not (folder / "20-estimate.html").exists() and mine.exists()
+
+
 def test_an_input_that_changes_while_it_is_read_is_noticed(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Provenance must name what was read: a log that grows during the import is refused and nothing is written."""
     import r2s2r_cli.stages.import_ as stage
@@ -153,6 +182,43 @@ def test_an_input_that_changes_while_it_is_read_is_noticed(project: Path, monkey
     assert result.exit_code == 4
     assert "changed while it was read" in result.stderr
     assert not (project / RECORD).exists()
+
+
+def test_an_input_that_appears_while_it_is_read_is_noticed(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The facts beside a log decide what is made of it: some that come meanwhile are an error in words."""
+    import r2s2r_cli.stages.import_ as stage
+
+    merge, facts = stage.merge_runs, project / "sample.toml"
+    text = facts.read_text()
+    facts.unlink()
+
+    def appear_and_merge(runs: object) -> object:
+        facts.write_text(text)
+        return merge(runs)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(stage, "merge_runs", appear_and_merge)
+    result = invoke("import", "sample.csv")
+    assert result.exit_code == 4 and "where: sample.toml" in result.stderr
+    assert not (project / RECORD).exists()
+
+
+def test_a_robot_that_is_edited_meanwhile_is_the_one_before(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is computed with is what the provenance says: afterwards the artifact is stale, by the edit."""
+    import r2s2r_cli.stages.import_ as stage
+
+    merge, path = stage.merge_runs, project / "robot.toml"
+    before = path.read_text()
+
+    def edit_and_merge(runs: object) -> object:
+        path.write_text(before.replace("cap_radius_m = 0.0175", "cap_radius_m = 0.01"))
+        return merge(runs)  # type: ignore[arg-type]
+
+    ground = document("import", "sample.csv", "--no-draw")["report"]["runs"][0]
+    monkeypatch.setattr(stage, "merge_runs", edit_and_merge)
+    assert document("import", "sample.csv", "--no-draw", "--force")["report"]["runs"][0] == ground
+    assert path.read_text() != before
+    (reason,) = document("status")["artifacts"]
+    assert "cap_radius_m" in str(reason)
 
 
 def test_dry_run_of_a_fresh_artifact_touches_nothing(estimated: Path) -> None:

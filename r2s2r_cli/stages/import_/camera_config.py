@@ -11,12 +11,12 @@ from r2s2r_cli.artifact import Scalar
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.import_.authors_json import number, parse_json
 from r2s2r_cli.stages.import_.files import shown
+from schemas.recording import ROTATION_TOLERANCE
 
 HALF_PIXEL = 0.5
 """OpenCV and librealsense put the centre of the first pixel at 0, this project at 0.5."""
 DEPTH_SCALES_M = (1e-5, 1e-2)
 """A depth count between 10 um and 10 mm: 65535 counts then reach from 0.7 m to 655 m."""
-_ROTATION_TOLERANCE = 1e-3
 
 
 def camera_attributes(
@@ -105,7 +105,7 @@ def _pose(tree: dict[str, Any], where: str) -> np.ndarray | None:
         return None
     X_WC = _matrix(tree["cam_extr"], (4, 4), f"{where}: cam_extr")
     R_WC = X_WC[:3, :3]
-    rigid = np.abs(R_WC @ R_WC.T - np.eye(3)).max() < _ROTATION_TOLERANCE and np.linalg.det(R_WC) > 0
+    rigid = np.abs(R_WC.T @ R_WC - np.eye(3)).max() < ROTATION_TOLERANCE and np.linalg.det(R_WC) > 0
     if not rigid or not np.array_equal(X_WC[3], [0, 0, 0, 1]):
         raise _bad_matrix(f"{where}: cam_extr", "a rotation and a translation in metres, last row 0 0 0 1", X_WC)
     return X_WC

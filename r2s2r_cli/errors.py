@@ -32,6 +32,11 @@ EXIT_CODE_MEANING: dict[ExitCode, str] = {
 }
 
 
+def quoted(path: object) -> str:
+    """A path as it can be pasted into a shell, whatever its name."""
+    return quote(str(path))
+
+
 def install_extra(extra: str) -> str:
     """The command that installs an extra. From the clone that this is: no package index has r2s2r."""
     root = Path(__file__).resolve().parents[1]

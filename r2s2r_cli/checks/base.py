@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
+from r2s2r_cli.errors import quoted
 from schemas.results import Finding
 
 Importance = Literal["error", "warning", "advice"]
@@ -61,7 +62,7 @@ class Check:
             return [self._finding(found, file) for found in self.function(subject)]
 
     def _finding(self, found: Found, file: str) -> Finding:
-        hint = (found.hint or self.fix).replace("{file}", file).replace("{location}", found.location)
+        hint = (found.hint or self.fix).replace("{file}", quoted(file)).replace("{location}", quoted(found.location))
         location = found.location.removeprefix(file).lstrip(":, ")  # errors of the store name the file in their `where`
         return Finding(
             check=self.name, importance=self.importance, file=file, location=location, what=found.what,

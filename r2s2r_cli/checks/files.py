@@ -17,7 +17,7 @@ _LIBRARY = re.compile(r"(can't|cannot|unable to|unable) [\w ]+\(.*\)$")
     Reading,
     what="the file is there, and is an artifact or TOML",
     why="nothing else can be checked, and every other command refuses the file as well",
-    fix="ls -la '{file}'",
+    fix="ls -la {file}",
 )
 def file_opens(reading: Reading) -> Iterator[Found]:
     """Missing, unreadable, not an artifact, a damaged head, broken TOML."""
@@ -56,7 +56,7 @@ def version_known(reading: Reading) -> Iterator[Found]:
     Reading,
     what="every dataset, attribute and the provenance are what was sealed",
     why="a disk, a copy or an editor changed the file; the damaged dataset is named, the others may be intact",
-    fix="r2s2r recover '{file}'",
+    fix="r2s2r recover {file}",
 )
 def content_intact(reading: Reading) -> Iterator[Found]:
     """Damage behind an intact head, or together with a damaged one."""
@@ -69,7 +69,7 @@ def content_intact(reading: Reading) -> Iterator[Found]:
     Reading,
     what="the bytes of the file are those that were sealed, also those that nothing reads",
     why="the content hash proves that no value changed, but something writes to your files or your disk is failing",
-    fix="r2s2r recover '{file}'",
+    fix="r2s2r recover {file}",
 )
 def bytes_intact(reading: Reading) -> Iterator[Found]:
     """Bytes changed that nothing reads."""

@@ -84,7 +84,7 @@ def rod_length_is_the_robots(run: Run) -> Iterator[Found]:
     kinds=("recording",),
     what="the observed length of each rod stays the same within 10 mm (standard deviation)",
     why="rods are rigid: a length that changes is a tracker that confuses caps",
-    fix="r2s2r inspect '{file}'; look at the rod length over time and leave out the frames in which caps were confused",
+    fix="r2s2r inspect {file}; look at the rod length over time and leave out the frames in which caps were confused",
 )
 def rods_keep_their_length(run: Run) -> Iterator[Found]:
     """Rods whose length wanders."""

@@ -19,7 +19,7 @@ _SHOWN = 60
     Links,
     what="the head of the file says the same as its HDF5 body: kind, version, title, content hash, provenance",
     why="the head is what `status` and `inspect` read; a head of another file would lie about this one",
-    fix="r2s2r recover '{file}'",
+    fix="r2s2r recover {file}",
 )
 def head_matches_body(links: Links) -> Iterator[Found]:
     """Facts that stand twice in the file, and differ."""
@@ -107,7 +107,7 @@ def stage_not_newer(links: Links) -> Iterator[Found]:
     Links,
     what="an artifact in the place of one kind is of that kind",
     why="the next stage looks for its input by file name",
-    fix="mv '{file}' to the name of its kind, or make the artifact again",
+    fix="mv {file} to the name of its kind, or make the artifact again",
 )
 def name_fits_kind(links: Links) -> Iterator[Found]:
     """A recording under the name of an estimate, and the like."""
@@ -121,7 +121,7 @@ def name_fits_kind(links: Links) -> Iterator[Found]:
     Journals,
     what="every recording was sealed",
     why="a journal is a recording that was cut off: its rows are there, but no other command reads them",
-    fix="r2s2r recover '{location}'",
+    fix="r2s2r recover {location}",
 )
 def recordings_sealed(journals: Journals) -> Iterator[Found]:
     """Journals left behind by a killed process."""

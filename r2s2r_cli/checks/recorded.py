@@ -14,7 +14,7 @@ from r2s2r_cli.checks.subjects import Links
     kinds=("recording",),
     what="`record` had nothing to warn of: runs to their end, lines that arrived, clocks and pictures that went on",
     why="targets that were given up, lost samples or a frozen camera look like the robot's own doing later on",
-    fix="r2s2r inspect '{file}'",
+    fix="r2s2r inspect {file}",
 )
 def recorded_without_warning(links: Links) -> Iterator[Found]:
     """The warnings of the report that the recording was sealed with."""

@@ -50,7 +50,7 @@ def values_finite(content: Content) -> Iterator[Found]:
     Content,
     what="every code is one that the schema explains",
     why="an unknown code has no meaning, or comes from a newer version",
-    fix="r2s2r inspect '{file}'",
+    fix="r2s2r inspect {file}",
 )
 def codes_known(content: Content) -> Iterator[Found]:
     """Values of unit `code` without a meaning."""

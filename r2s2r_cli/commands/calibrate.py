@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import InputError, R2S2RError
+from r2s2r_cli.errors import InputError, R2S2RError, quoted
 from r2s2r_cli.options import (
     DrawOption,
     DryRunOption,
@@ -142,10 +142,10 @@ def _require_file(path: Path) -> None:
     if not path.is_file():
         raise InputError("there is no such file", where=str(path), expected="a file that can be read",
                          received="nothing" if not path.exists() else "no file",
-                         hint=f"ls -la '{path.parent}'")  # fmt: skip
+                         hint=f"ls -la {quoted(path.parent)}")  # fmt: skip
     if path.stat().st_size > MAX_SOURCE_BYTES:
         raise InputError("the file is too large for bench measurements", where=str(path), expected="at most 16 MB",
-                         received=f"{path.stat().st_size / 1e6:.0f} MB", hint=f"head '{path}'")  # fmt: skip
+                         received=f"{path.stat().st_size / 1e6:.0f} MB", hint=f"head {quoted(path)}")  # fmt: skip
 
 
 def _compute(
@@ -196,7 +196,7 @@ def _source(path: Path) -> Source:
         return Source(str(path), path.read_bytes())
     except OSError as error:
         raise InputError("the file cannot be read", where=str(path), received=error.strerror or str(error),
-                         hint=f"ls -la '{path}'") from error  # fmt: skip
+                         hint=f"ls -la {quoted(path)}") from error  # fmt: skip
 
 
 def _draw(data: ArtifactData, report: CalibrationReport, robot: Robot) -> Iterator[tuple[str, bytes]]:

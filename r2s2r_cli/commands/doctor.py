@@ -16,7 +16,7 @@ from r2s2r_cli import __version__
 from r2s2r_cli.commands.doctor_camera import camera
 from r2s2r_cli.commands.doctor_ports import NO_PORTS, ports
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import GateError, R2S2RError, install_extra
+from r2s2r_cli.errors import GateError, R2S2RError, install_extra, quoted
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from schemas.results import DoctorResult, Probe
 
@@ -113,7 +113,7 @@ def _place(project: Path | None) -> Iterator[Probe]:
     free = shutil.disk_usage(root if root.is_dir() else Path.cwd()).free
     enough = free > MIN_FREE_BYTES
     yield Probe(name="disk", state="ok" if enough else "warning", found=f"{free / 1e9:.1f} GB free",
-                hint="" if enough else f"df -h '{root}'")  # fmt: skip
+                hint="" if enough else f"df -h {quoted(root)}")  # fmt: skip
 
 
 def _outlets() -> Iterator[Probe]:

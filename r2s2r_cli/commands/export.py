@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.errors import InputError, UsageError, quoted
 from r2s2r_cli.options import ForceOption, JsonOption, QuietOption
 from r2s2r_cli.store.atomic import write_bytes
 from schemas.results import ExportResult
@@ -58,10 +58,10 @@ def export(
     if set_ and to != Format.MJCF:
         raise UsageError("only a robot has values to set; an artifact holds what was measured", where="--set",
                          expected="--to mjcf", received=f"--to {to}",
-                         hint=f"r2s2r export '{path}' --to {to}")  # fmt: skip
+                         hint=f"r2s2r export {quoted(path)} --to {to}")  # fmt: skip
     if run and to not in (Format.TRAJECTORY, Format.POLICY):
         raise UsageError("only trajectory and policy take one run", where="--run", expected="--to trajectory | policy",
-                         received=f"--to {to}", hint=f"r2s2r export '{path}' --to {to}")  # fmt: skip
+                         received=f"--to {to}", hint=f"r2s2r export {quoted(path)} --to {to}")  # fmt: skip
     files = _robot_files(path, set_ or []) if to == Format.MJCF else _artifact_files(path, to, run)
     written = [_write(out / name, content, force) for name, content in files]
     console.document(ExportResult(source=str(path), format=to, files=tuple(map(str, written))))
@@ -93,11 +93,11 @@ def _files(path: Path, to: Format, run: str | None, header: Header, data: Artifa
         return [npz_file(data, path.stem, header.model_dump_json())]
     if header.kind != "recording":
         raise InputError(f"only a recording can be exported as a {to}", where=str(path), expected="recording",
-                         received=header.kind, hint=f"r2s2r export '{path}' --to csv")  # fmt: skip
+                         received=header.kind, hint=f"r2s2r export {quoted(path)} --to csv")  # fmt: skip
     runs = [run] if run else data.runs()
     if run and run not in data.runs():
         raise UsageError("there is no such run", where=str(path), expected=" | ".join(data.runs()), received=run,
-                         hint=f"r2s2r inspect '{path}'")  # fmt: skip
+                         hint=f"r2s2r inspect {quoted(path)}")  # fmt: skip
     if to == Format.POLICY:
         return [policy_file(data, name) for name in runs]
     return [file for name in runs for file in trajectory_files(data, name)]

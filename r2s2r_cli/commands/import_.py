@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.errors import InputError, UsageError, quoted
 from r2s2r_cli.options import (
     DrawOption,
     DryRunOption,
@@ -131,7 +131,7 @@ def _refs(project: Project, sources: list[Path], format_: Format) -> list[InputR
                 where=str(path),
                 expected="a log that is there",
                 received=error.strerror or str(error),
-                hint=f"ls -la '{path.parent}'",
+                hint=f"ls -la {quoted(path.parent)}",
             ) from error
     return refs
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import GateError
+from r2s2r_cli.errors import GateError, quoted
 from r2s2r_cli.options import JsonOption, QuietOption
 from r2s2r_cli.store.again import command_at
 from r2s2r_cli.store.header import HDF5_SIGNATURE, NotAnArtifact
@@ -71,13 +71,13 @@ def _foreign(path: Path) -> InspectResult:
             where=str(path),
             expected="an artifact of r2s2r",
             received="something else" if path.stat().st_size else "an empty file",
-            hint=command_at(path) or f"file '{path}'",
+            hint=command_at(path) or f"file {quoted(path)}",
         )
     with IsolatedReader() as reader:
         report = reader.tree(path)
     if report["problem"]:
         raise ArtifactError(report["problem"], where=str(path), expected="an intact HDF5 file",
-                            received=report["received"], hint=f"r2s2r recover '{path}'")  # fmt: skip
+                            received=report["received"], hint=f"r2s2r recover {quoted(path)}")  # fmt: skip
     nodes = tuple(NodeInfo.model_validate(node) for node in report["nodes"])
     return InspectResult(path=str(path), header=None, nodes=nodes)
 
@@ -128,7 +128,7 @@ def _compare(path: Path, other: Path, console: Console) -> None:
     for line in differences:
         console.data(line)
     raise GateError("the contents differ", where=str(other), expected=one.content_sha256[:16],
-                    received=two.content_sha256[:16], hint=f"r2s2r inspect '{other}'")  # fmt: skip
+                    received=two.content_sha256[:16], hint=f"r2s2r inspect {quoted(other)}")  # fmt: skip
 
 
 def _differences(one: Header, two: Header) -> tuple[str, ...]:

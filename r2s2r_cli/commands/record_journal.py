@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.commands.pictures import remove_pictures
 from r2s2r_cli.commands.typed import typed_words
-from r2s2r_cli.errors import UsageError
+from r2s2r_cli.errors import UsageError, quoted
 from r2s2r_cli.store.lock import writer
 from r2s2r_cli.store.project import Iteration, Project, journal_of
 from schemas.versions import KINDS, STAGE_VERSIONS
@@ -70,7 +70,7 @@ class Recording:
         if journal.exists():
             raise UsageError(
                 "a recording that was cut off is in the way", where=self.project.relative(journal),
-                expected="no journal", received="one", hint=f"r2s2r recover '{journal}'",
+                expected="no journal", received="one", hint=f"r2s2r recover {quoted(journal)}",
             )  # fmt: skip
         if self.target.exists() and not force:
             raise UsageError(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from r2s2r_cli.commands.record_journal import Recording
 from r2s2r_cli.commands.record_live import Live, shown, stop_key
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import HardwareError, Interrupted, R2S2RError
+from r2s2r_cli.errors import HardwareError, Interrupted, R2S2RError, quoted
 
 if TYPE_CHECKING:
     from r2s2r_cli.devices.camera import CameraFeed
@@ -190,7 +190,7 @@ def _seal(wish: Wish, recording: Recording, session: Session, console: Console) 
             sealed = recording.seal(report, session.started, names)
     except R2S2RError as error:
         console.warn(f"what was recorded is not sealed yet: {error.what} ({error.where})")
-        console.hint(f"r2s2r recover '{recording.target}.journal'   # once: {error.hint}")
+        console.hint(f"r2s2r recover {quoted(f'{recording.target}.journal')}   # once: {error.hint}")
         return None
     if sealed.header is None:
         return None

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.commands.outcome import require_input, require_model
-from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.errors import InputError, UsageError, quoted
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
 
@@ -119,7 +119,7 @@ class Asked:
         data = self._recording
         if run not in data.runs():
             raise UsageError("there is no such run", where=option, expected=" | ".join(data.runs()), received=run,
-                             hint=f"r2s2r inspect '{self._recorded}'")  # fmt: skip
+                             hint=f"r2s2r inspect {quoted(self._recorded)}")  # fmt: skip
         return data
 
     @cached_property
@@ -177,6 +177,6 @@ def read_policies(text: str, command: str = "simulate") -> Iterator[PolicyFile]:
         raise UsageError(
             "there is no such policy" if name else "the artifact holds no policy", where=str(path),
             expected=" | ".join(found) or "a policy, or runs with targets", received=name or "none",
-            hint=typed_instead(command, name, near[0]) if near else f"r2s2r inspect '{path}'",
+            hint=typed_instead(command, name, near[0]) if near else f"r2s2r inspect {quoted(path)}",
         )  # fmt: skip
     yield from [found[name]] if name else found.values()

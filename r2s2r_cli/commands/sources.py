@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from shlex import quote
 from typing import NamedTuple
 
+from r2s2r_cli.errors import quoted
 from r2s2r_cli.store.project import JOURNAL_SUFFIX
 
 HEAD_BYTES = 64 * 1024
@@ -25,16 +25,16 @@ def what_source(path: Path) -> SourceFile | None:
     """What kind of source a file is, by its ending and its first line; None for none of them."""
     if not path.is_file():
         return None
-    name, suffix = quote(str(path)), path.suffix.lower()
+    name, suffix = quoted(path), path.suffix.lower()
     if suffix == JOURNAL_SUFFIX:
-        return SourceFile("a recording that was cut off", f"r2s2r recover '{path}'")
+        return SourceFile("a recording that was cut off", f"r2s2r recover {name}")
     if suffix == ".csv":
         header = _head(path).partition("\n")[0].lower()
         if "displacement" in header:
             return SourceFile("tendon curves, measurements for calibrate", f"r2s2r calibrate --tendons {name}")
         if "capacitance" in header and "cap0_" not in header:
             return SourceFile("points of sensors, measurements for calibrate", f"r2s2r calibrate --points {name}")
-        return SourceFile("a .csv file", f"r2s2r import '{path}'")
+        return SourceFile("a .csv file", f"r2s2r import {name}")
     if suffix == ".json":
         if "m_pF_per_mm" in _head(path):
             return SourceFile("a history of calibrations", f"r2s2r calibrate --history {name}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import stat
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -101,10 +102,19 @@ def survey(project: Project, *, thorough: bool = False) -> StatusResult:
         robot=project.robot().name,
         iterations=len(iterations),
         artifacts=tuple(states),
-        bytes=sum(p.stat().st_size for p in project.root.rglob("*") if p.is_file() and not p.is_symlink()),
+        bytes=sum(_bytes_of(path) for path in project.root.rglob("*")),
         next=again[0] if again else _forward(project) or next(iter(runs), ""),
         history=gap.history if (gap := _gap(project)) else (),
     )  # fmt: skip
+
+
+def _bytes_of(path: Path) -> int:
+    """Bytes of a file; 0 of anything else, and of what another process has removed since it was listed."""
+    try:
+        found = path.lstat()
+    except FileNotFoundError:
+        return 0
+    return found.st_size if stat.S_ISREG(found.st_mode) else 0
 
 
 def _gap(project: Project) -> CompareReport | None:

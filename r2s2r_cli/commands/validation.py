@@ -25,7 +25,7 @@ from r2s2r_cli.checks.subjects import (
 )
 from r2s2r_cli.commands.places import ROBOT_FILE, Place
 from r2s2r_cli.commands.sources import MASSES, is_masses, what_source
-from r2s2r_cli.errors import ArtifactError, InputError, R2S2RError
+from r2s2r_cli.errors import ArtifactError, InputError, R2S2RError, quoted
 from r2s2r_cli.store.canonical import source_sha256
 from r2s2r_cli.store.examine import Examined, examine
 from r2s2r_cli.store.header import read_header
@@ -166,7 +166,9 @@ def _inputs(refs: tuple[InputRef, ...], place: Place | None) -> Iterator[InputSt
 
 def _gather_toml(path: Path, place: Place | None) -> Gathered:
     if path.exists() and not path.is_file():
-        raise InputError("this is no regular file", where=str(path), expected="a TOML file", hint=f"ls -la '{path}'")
+        raise InputError(
+            "this is no regular file", where=str(path), expected="a TOML file", hint=f"ls -la {quoted(path)}"
+        )
     values = read_toml(path)
     if is_masses(values):
         return _gather_masses(path, place)

@@ -11,7 +11,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.errors import ArtifactError, quoted
 
 PARTIAL = ".partial"
 """Ending of unfinished files; nothing that bears it is ever read as an artifact."""
@@ -79,7 +79,7 @@ def keep_beside(path: Path, suffix: str) -> Path:
         sync_directory(path.parent)
         return name
     raise ArtifactError("there are too many kept copies", where=str(path), expected="fewer than 1000",
-                        received="1000", hint=f"ls -la '{path.parent}'")  # fmt: skip
+                        received="1000", hint=f"ls -la {quoted(path.parent)}")  # fmt: skip
 
 
 def temp_beside(target: Path) -> Path:
@@ -139,7 +139,7 @@ def disk_error(error: OSError, target: Path) -> ArtifactError:
             where=str(target),
             expected="free space for the whole file",
             received=f"{_free(target.parent)} free",
-            hint=f"df -h '{target.parent}'",
+            hint=f"df -h {quoted(target.parent)}",
         )
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
         return ArtifactError(
@@ -147,13 +147,13 @@ def disk_error(error: OSError, target: Path) -> ArtifactError:
             where=str(target),
             expected="write permission",
             received=os.strerror(error.errno),
-            hint=f"ls -ld '{target.parent}'",
+            hint=f"ls -ld {quoted(target.parent)}",
         )
     return ArtifactError(
         "the file could not be written",
         where=str(target),
         received=error.strerror or str(error),
-        hint=f"ls -la '{target.parent}'",
+        hint=f"ls -la {quoted(target.parent)}",
     )
 
 
@@ -181,7 +181,7 @@ def sync_directory(directory: Path) -> None:
 def _source_error(error: OSError) -> ArtifactError:
     """A file that is read while the artifact is written."""
     return ArtifactError("a file that is being read in failed", where=str(error.filename), expected="a readable file",
-                         received=error.strerror or str(error), hint=f"ls -la '{error.filename}'")  # fmt: skip
+                         received=error.strerror or str(error), hint=f"ls -la {quoted(error.filename)}")  # fmt: skip
 
 
 def _fsync(path: Path) -> None:

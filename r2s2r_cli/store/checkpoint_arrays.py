@@ -20,7 +20,7 @@ from r2s2r_cli.store.checkpoint import begin_anew
 
 _FORM = "arrays-1"
 MOST_BYTES = 48_000_000
-_RECORD = struct.Struct("<32sQI")
+RECORD = struct.Struct("<32sQI")
 """Of every result: digest of what was asked, length and CRC-32 of what follows."""
 
 
@@ -58,9 +58,11 @@ class ArrayCheckpoint:
         try:
             with self.path.open("rb") as file:
                 file.seek(self._place)
-                head = file.read(_RECORD.size)
-                found = _RECORD.unpack(head) if len(head) == _RECORD.size else None
-                body = b"" if found is None else file.read(found[1])
+                head = file.read(RECORD.size)
+                found = RECORD.unpack(head) if len(head) == RECORD.size else None
+                # A damaged length may be of any size: no more is asked for than the file has.
+                left = os.fstat(file.fileno()).st_size - file.tell()
+                body = b"" if found is None else file.read(min(found[1], left))
                 after = file.tell()
         except OSError as error:
             raise self._unreadable(error) from error
@@ -81,7 +83,7 @@ class ArrayCheckpoint:
         self._size += len(value)
         if self._size > self.most:
             return
-        record = _RECORD.pack(digest, len(value), zlib.crc32(value)) + value
+        record = RECORD.pack(digest, len(value), zlib.crc32(value)) + value
         try:
             with self.path.open("ab" if self._mine else "wb") as file:
                 if not self._mine:

@@ -11,7 +11,7 @@ from typing import Any
 import h5py
 
 from r2s2r_cli.artifact import ArtifactData
-from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.errors import ArtifactError, quoted
 from r2s2r_cli.store.hashing import PROVENANCE, attributes
 from r2s2r_cli.store.hdf5_errors import translate
 from r2s2r_cli.store.header import HDF5_SIGNATURE, NotAnArtifact, body_sha256, read_header, unreadable
@@ -102,7 +102,7 @@ def _headless(path: Path, error: ArtifactError, reader: IsolatedReader) -> Exami
     report = _ask(path, reader)
     if report["content_ok"] and report["seal_ok"]:
         error.received = f"{error.received}; the data behind it are intact"
-        error.hint = f"r2s2r recover '{path}'"
+        error.hint = f"r2s2r recover {quoted(path)}"
         return Examined(refused=error)
     unknown = Mismatch("", "the data changed too; which dataset, only the head could tell", "the sealed data", "others")
     return Examined(refused=error, damage=tuple(p for p in report["problems"] if p.where != HEAD) or (unknown,))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.errors import ArtifactError, quoted
 from r2s2r_cli.store.hashing import ForeignContent
 
 _MEANING: tuple[tuple[str, str], ...] = (
@@ -39,5 +39,5 @@ def translate(error: BaseException, path: Path, dataset: str = "") -> ArtifactEr
         where=f"{path}:/{dataset}" if dataset else str(path),
         expected="an intact artifact",
         received=" ".join(str(error).split())[:200] or type(error).__name__,
-        hint=f"r2s2r validate '{path}'",
+        hint=f"r2s2r validate {quoted(path)}",
     )

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from r2s2r_cli.errors import ArtifactError, InputError
+from r2s2r_cli.errors import ArtifactError, InputError, quoted
 from r2s2r_cli.store.canonical import canonical_json
 from schemas.header import Header
 
@@ -72,7 +72,7 @@ def read_header(path: Path) -> Header:
     try:
         if path.exists() and not path.is_dir() and not path.is_file():
             raise NotAnArtifact("this is no regular file", where=str(path), expected="an artifact",
-                                received="a pipe, socket or device", hint=f"ls -la '{path}'")  # fmt: skip
+                                received="a pipe, socket or device", hint=f"ls -la {quoted(path)}")  # fmt: skip
         with path.open("rb") as file:
             line = file.read(_LINE)
             if not line.startswith(MAGIC):
@@ -98,7 +98,7 @@ def whole_header(path: Path) -> Header:
     expected, received = header.body_offset + header.body_bytes, path.stat().st_size
     if received < expected:
         raise ArtifactError("the file was cut off", where=str(path), expected=f"{expected} bytes",
-                            received=f"{received} bytes", hint=f"r2s2r recover '{path}'")  # fmt: skip
+                            received=f"{received} bytes", hint=f"r2s2r recover {quoted(path)}")  # fmt: skip
     return header
 
 
@@ -108,7 +108,7 @@ def sealed_header(path: Path) -> Header:
     if body_sha256(path, header.body_offset) != (header.body_sha256, header.body_bytes):
         raise ArtifactError("bytes of the file changed after it was sealed", where=str(path),
                             expected=f"sha256 {header.body_sha256[:16]}", received="another",
-                            hint=f"r2s2r recover '{path}'")  # fmt: skip
+                            hint=f"r2s2r recover {quoted(path)}")  # fmt: skip
     return header
 
 
@@ -159,8 +159,8 @@ def mends(path: Path, or_else: str = "recover") -> str:
 
     with contextlib.suppress(OSError):
         if find_body(path) is not None:
-            return f"r2s2r recover '{path}'"
-    return command_at(path) or f"r2s2r {or_else} '{path}'"
+            return f"r2s2r recover {quoted(path)}"
+    return command_at(path) or f"r2s2r {or_else} {quoted(path)}"
 
 
 def unreadable(path: Path, error: OSError) -> ArtifactError:
@@ -168,12 +168,12 @@ def unreadable(path: Path, error: OSError) -> ArtifactError:
     if isinstance(error, FileNotFoundError):
         there = next((folder for folder in path.parents if folder.is_dir()), Path())
         return ArtifactError("there is no such file", where=str(path), expected="an artifact", received="nothing",
-                             hint=f"ls -la '{there}'")  # fmt: skip
+                             hint=f"ls -la {quoted(there)}")  # fmt: skip
     if isinstance(error, IsADirectoryError):
         return ArtifactError("this is a directory, not an artifact", where=str(path), expected="a file",
-                             received="a directory", hint=f"ls -la '{path}'")  # fmt: skip
+                             received="a directory", hint=f"ls -la {quoted(path)}")  # fmt: skip
     return ArtifactError("the file cannot be read", where=str(path), expected="a file that may be read",
-                         received=error.strerror or str(error), hint=f"ls -la '{path}'")  # fmt: skip
+                         received=error.strerror or str(error), hint=f"ls -la {quoted(path)}")  # fmt: skip
 
 
 def _encode(header: Header) -> bytes:

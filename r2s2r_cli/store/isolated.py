@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any, Literal
 
-from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.errors import ArtifactError, quoted
 from r2s2r_cli.store.header import unreadable
 from r2s2r_cli.store.worker import READY
 
@@ -85,7 +85,7 @@ class IsolatedReader:
             where=str(path),
             expected="an intact HDF5 file",
             received="a file that cannot be opened safely",
-            hint=f"r2s2r recover '{path}'",
+            hint=f"r2s2r recover {quoted(path)}",
         )
 
     def _running(self) -> subprocess.Popen[str]:

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.errors import ArtifactError, quoted
 from r2s2r_cli.store.atomic import creating, disk_error
 
 MAGIC = b"r2s2r-journal 1 "
@@ -98,7 +98,7 @@ class Journal:
                 where=str(path),
                 expected="no journal",
                 received="the journal of a recording that was cut off, or is running",
-                hint=f"r2s2r recover '{path}'",
+                hint=f"r2s2r recover {quoted(path)}",
             ) from error
         except BaseException:
             self.close()

@@ -15,7 +15,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from r2s2r_cli.errors import ArtifactError, UsageError
+from r2s2r_cli.errors import ArtifactError, UsageError, quoted
 from r2s2r_cli.store.header import unreadable
 from r2s2r_cli.store.journal import BLOB_LENGTH, MAGIC, MARK, MAX_RECORD, RECORD, Field, JournalHead, Stream, record_crc
 
@@ -33,14 +33,14 @@ def read_head(path: Path) -> tuple[JournalHead, int]:
         return _from_json(json.loads(body)), offset
     except OSError as error:
         raise ArtifactError("the journal cannot be read", where=str(path), received=error.strerror or str(error),
-                            hint=f"ls -la '{path.parent}'") from error  # fmt: skip
+                            hint=f"ls -la {quoted(path.parent)}") from error  # fmt: skip
     except (ValueError, KeyError, TypeError) as error:
         raise ArtifactError(
             "this is not a journal, or its head is damaged",
             where=str(path),
             expected="a file that begins 'r2s2r-journal' and the digest of its head",
             received=f"{path.stat().st_size} bytes that do not begin with an intact head",
-            hint=f"head -c 200 '{path}'",
+            hint=f"head -c 200 {quoted(path)}",
         ) from error
 
 

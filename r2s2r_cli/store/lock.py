@@ -9,9 +9,12 @@ import platform
 from collections.abc import Iterator
 from pathlib import Path
 
-from r2s2r_cli.errors import ArtifactError, UsageError
+from r2s2r_cli.errors import ArtifactError, UsageError, quoted
 from r2s2r_cli.store.atomic import disk_error
 from r2s2r_cli.store.project import STATE_DIR, root_of
+
+GLANCE_S = 0.2
+"""How long a writer waits: who only asks whether somebody writes (`writer`) takes the lock for an instant."""
 
 
 @contextlib.contextmanager
@@ -24,7 +27,7 @@ def writing(root: Path, command: str) -> Iterator[None]:
     try:
         directory.mkdir(exist_ok=True)
         lock = FileLock(directory / "write.lock")
-        lock.acquire(timeout=0)
+        lock.acquire(timeout=GLANCE_S)
     except Timeout as error:
         raise UsageError(
             "another r2s2r is writing in this project",
@@ -39,7 +42,7 @@ def writing(root: Path, command: str) -> Iterator[None]:
             where=str(directory),
             expected="a local file system, or a network one with locks",
             received=str(error),
-            hint=f"df -T '{root}'",
+            hint=f"df -T {quoted(root)}",
         ) from error
     except OSError as error:
         raise disk_error(error, directory) from error

@@ -93,9 +93,7 @@ class Project:
     def iterations(self) -> list[Iteration]:
         """All iterations, in order."""
         folder = self.root / ITERATIONS
-        found = (
-            [p for p in folder.iterdir() if re.fullmatch(r"\d{3,}", p.name) and p.is_dir()] if folder.is_dir() else []
-        )
+        found = [p for p in folder.iterdir() if _is_iteration(p.name) and p.is_dir()] if folder.is_dir() else []
         return [Iteration(int(p.name), p) for p in sorted(found, key=lambda p: int(p.name))]
 
     def iteration(
@@ -174,6 +172,11 @@ class Project:
     def journals(self) -> list[Path]:
         """Recordings that were not sealed."""
         return sorted((self.root / ITERATIONS).glob(f"*/*{JOURNAL_SUFFIX}"))
+
+
+def _is_iteration(name: str) -> bool:
+    """Whether a directory is called as the iteration of its number is: `0009` would be a second ninth one."""
+    return re.fullmatch(r"\d{3,}", name) is not None and name == f"{int(name):03d}"
 
 
 def _into(folder: Path) -> str:

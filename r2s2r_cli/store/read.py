@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Value
-from r2s2r_cli.errors import ArtifactError, DamageWarning
+from r2s2r_cli.errors import ArtifactError, DamageWarning, quoted
 from r2s2r_cli.store.hashing import PROVENANCE, attributes, walk
 from r2s2r_cli.store.hdf5_errors import translate
 from r2s2r_cli.store.header import body_sha256, read_header
@@ -113,7 +113,7 @@ def check_body(path: Path, header: Header, *, reader: IsolatedReader | None = No
             where=str(path),
             expected=f"{header.body_bytes} bytes of data",
             received=f"{length} bytes",
-            hint=f"r2s2r recover '{path}'",
+            hint=f"r2s2r recover {quoted(path)}",
         )
     with contextlib.nullcontext(reader) if reader else IsolatedReader() as child:
         report = child.verify(path)
@@ -126,7 +126,7 @@ def check_body(path: Path, header: Header, *, reader: IsolatedReader | None = No
         where=f"{path}:/{first['where'].lstrip('/')}",
         expected=first["expected"],
         received=first["received"],
-        hint=f"r2s2r recover '{path}'",
+        hint=f"r2s2r recover {quoted(path)}",
     )
 
 
@@ -137,7 +137,7 @@ def _check_kind(path: Path, header: Header, kind: str | None) -> None:
             where=str(path),
             expected=kind or " | ".join(KINDS),
             received=header.kind,
-            hint=f"r2s2r inspect '{path}'",
+            hint=f"r2s2r inspect {quoted(path)}",
         )
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.errors import ArtifactError, quoted
 from r2s2r_cli.store.again import MEASURED, command_again, command_at
 from r2s2r_cli.store.atomic import keep_beside, replacing
 from r2s2r_cli.store.header import NotAnArtifact, block, body_sha256, read_header, sealed_header, unreadable
@@ -106,7 +106,7 @@ def _without_head(path: Path, reader: IsolatedReader) -> Recovered:
     if offset is None:
         raise ArtifactError("there is no artifact in this file", where=str(path), expected="an artifact of r2s2r",
                             received="neither its head nor an HDF5 body",
-                            hint=command_at(path) or f"file '{path}'")  # fmt: skip
+                            hint=command_at(path) or f"file {quoted(path)}")  # fmt: skip
     header = _rebuilt(path, offset, reader)
     if header is None:
         raise _lost(path, None, rescue(path, None, reader))
@@ -175,7 +175,7 @@ def _lost(path: Path, header: Header | None, found: Rescue) -> ArtifactError:
         # A hint moves no robot: of what was measured it looks, and whoever pastes it decides.
         hint = command_again(header.provenance, path, force=True, dry_run=header.provenance.stage in MEASURED)
     elif (hint := command_at(path)) == "":
-        hint = f"unzip -p '{found.path}' README.json" if found.path else f"ls -la '{path}'*"
+        hint = f"unzip -p {quoted(found.path)} README.json" if found.path else f"ls -la {quoted(path)}*"
     return ArtifactError(
         f"the artifact cannot be restored; {saved} of {count} datasets were rescued" if count
         else "the artifact cannot be restored, and nothing in it can be read",

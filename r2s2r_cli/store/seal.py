@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Rows, Scalar, Value
-from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.errors import ArtifactError, quoted
 from r2s2r_cli.store.atomic import keep_beside
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.journal import Field, JournalHead, Stream
@@ -92,7 +92,7 @@ def seal(journal: Path, target: Path, *, recovered: bool = False, late: Late | N
                     where=str(target),
                     expected="no artifact, so that nothing is overwritten",
                     received="one",
-                    hint=f"mv -n '{target}' '{target}.old' && r2s2r recover '{journal}'",
+                    hint=f"mv -n {quoted(target)} {quoted(f'{target}.old')} && r2s2r recover {quoted(journal)}",
                 )
         else:
             header = write_artifact(target, _current(journal, head, rows, recovered, late), provenance)

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from r2s2r_cli.errors import InputError
+from r2s2r_cli.errors import InputError, quoted
 from r2s2r_cli.store.toml_hints import Mend, around, in_file
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -29,19 +29,19 @@ def read_text(path: Path) -> str:
         if path.exists() and not path.is_file():
             raise InputError("this is not a file", where=str(path), expected="a TOML file",
                              received="a directory" if path.is_dir() else "a pipe, socket or device",
-                             hint=f"ls -la '{path}'")  # fmt: skip
+                             hint=f"ls -la {quoted(path)}")  # fmt: skip
         if path.stat().st_size > MAX_BYTES:
             raise InputError("the file is too large for a TOML file", where=str(path), expected="at most 4 MB",
-                             received=f"{path.stat().st_size} bytes", hint=f"ls -la '{path}'")  # fmt: skip
+                             received=f"{path.stat().st_size} bytes", hint=f"ls -la {quoted(path)}")  # fmt: skip
         return path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError("the file is not UTF-8 text", where=f"{path}, byte {error.start}", expected="UTF-8 text",
                          received=repr(error.object[error.start : error.start + 1]),
-                         hint=f"file '{path}'") from error  # fmt: skip
+                         hint=f"file {quoted(path)}") from error  # fmt: skip
     except OSError as error:
         raise InputError("the file cannot be read", where=str(path), expected="a TOML file",
                          received=error.strerror or str(error),
-                         hint=f"ls -la '{path.parent}'") from error  # fmt: skip
+                         hint=f"ls -la {quoted(path.parent)}") from error  # fmt: skip
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:

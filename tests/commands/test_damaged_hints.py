@@ -33,7 +33,7 @@ def test_what_may_be_brought_back_is_recovered(estimated: Path) -> None:
     with (estimated / ESTIMATE).open("r+b") as file:
         file.write(b"xxxx")
     assert document("status")["next"] == f"r2s2r recover {ESTIMATE}"
-    assert invoke("identify").stderr.splitlines()[-1] == f"hint: r2s2r recover '{estimated / ESTIMATE}'"
+    assert invoke("identify").stderr.splitlines()[-1] == f"hint: r2s2r recover {estimated / ESTIMATE}"
     assert invoke("recover", ESTIMATE).exit_code == 0
     recording = "iterations/001/10-record.h5"
     (estimated / recording).write_bytes(b"")

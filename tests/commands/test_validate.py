@@ -81,7 +81,7 @@ def test_a_damaged_dataset_is_named(estimated: Path) -> None:
     assert document.unreadable == (str(RECORDING),)
     damaged = [f for f in document.findings if f.file == str(RECORDING)]
     assert [(f.check, f.location) for f in damaged] == [("content_intact", "runs/sample/caps/t")]
-    assert damaged[0].hint == f"r2s2r recover '{RECORDING}'"
+    assert damaged[0].hint == f"r2s2r recover {RECORDING}"
     assert len(document.files) == 4
     assert "sensors_are_calibrated" in checks(document, "advice")
 
@@ -118,7 +118,7 @@ def test_a_damaged_head_over_intact_data(estimated: Path) -> None:
     code, document = outcome(str(RECORDING))
     assert (code, checks(document)) == (4, ["file_opens"])
     assert document.findings[0].received.endswith("the data behind it are intact")
-    assert document.findings[0].hint == f"r2s2r recover '{RECORDING}'"
+    assert document.findings[0].hint == f"r2s2r recover {RECORDING}"
 
 
 def test_damage_is_found_behind_a_damaged_head(estimated: Path) -> None:
@@ -209,10 +209,10 @@ def test_a_recording_that_was_cut_off_is_a_warning(estimated: Path) -> None:
     code, document = outcome()
     assert code == 0
     assert [(f.location, f.hint) for f in document.findings if f.importance == "warning"] == [
-        (str(journal), f"r2s2r recover '{journal}'")
+        (str(journal), f"r2s2r recover {journal}")
     ]
     code, document = outcome(str(journal))
-    assert (code, document.findings[0].hint) == (4, f"r2s2r recover '{journal}'")
+    assert (code, document.findings[0].hint) == (4, f"r2s2r recover {journal}")
 
 
 def test_a_misspelt_key_is_found_with_its_neighbour(estimated: Path) -> None:

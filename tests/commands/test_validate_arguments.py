@@ -99,7 +99,7 @@ def test_other_files_are_refused_in_words(project: Path) -> None:
     assert document.unreadable == tuple(names)
     assert [f.check for f in document.findings] == ["file_opens"] * len(names)
     assert all(f.what and f.hint for f in document.findings)
-    assert document.findings[-1].hint == "r2s2r import 'sample.csv'"
+    assert document.findings[-1].hint == "r2s2r import sample.csv"
 
 
 def test_errors_leave_one_document(estimated: Path) -> None:

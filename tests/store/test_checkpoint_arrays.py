@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.errors import InputError, UsageError
-from r2s2r_cli.store.checkpoint_arrays import ArrayCheckpoint
+from r2s2r_cli.store.checkpoint_arrays import RECORD, ArrayCheckpoint
 
 RESULTS = [
     [np.array([[0.1, 1 / 3], [np.nan, 5e-324]]), np.array(7)],
@@ -73,6 +73,19 @@ def test_spoilt_bytes_are_not_believed(tmp_path: Path) -> None:
     kept(path)
     raw = bytearray(path.read_bytes())
     raw[size + 60] ^= 1
+    path.write_bytes(bytes(raw))
+    assert known(path, [0, 1, 2]) == [0]
+
+
+def test_a_spoilt_length_asks_for_no_memory(tmp_path: Path) -> None:
+    """A result that says to be larger than the file is not there."""
+    path = tmp_path / "x.partial"
+    kept(path, 1)
+    size = path.stat().st_size
+    kept(path)
+    raw = bytearray(path.read_bytes())
+    key, _, crc = RECORD.unpack_from(raw, size)
+    RECORD.pack_into(raw, size, key, 2**62, crc)
     path.write_bytes(bytes(raw))
     assert known(path, [0, 1, 2]) == [0]
 

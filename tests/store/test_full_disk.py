@@ -84,7 +84,7 @@ def test_the_message_says_how_much_is_free(disk: SmallDisk) -> None:
     with pytest.raises(ArtifactError, match="disk is full") as caught:
         write_artifact(disk.path / "x.h5", recording(), provenance())
     assert caught.value.exit_code == 4 and "MB free" in caught.value.received
-    assert caught.value.hint == f"df -h '{disk.path}'" and disk.names() == set()
+    assert caught.value.hint == f"df -h {disk.path}" and disk.names() == set()
 
 
 def test_recording_goes_on_when_there_is_space_again(disk: SmallDisk) -> None:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 from r2s2r_cli.errors import ExitCode, UsageError
-from r2s2r_cli.store.lock import writing, writing_at
+from r2s2r_cli.store.lock import GLANCE_S, writer, writing, writing_at
+from r2s2r_cli.store.project import STATE_DIR
 
 HOLD = """
 import sys
@@ -46,6 +49,17 @@ def test_a_second_process_is_refused_and_told_who_writes(tmp_path: Path) -> None
         end(child)
     assert caught.value.exit_code == ExitCode.USAGE
     assert "r2s2r import" in caught.value.received and str(child.pid) in caught.value.received
+
+
+def test_who_only_asks_refuses_nobody(tmp_path: Path) -> None:
+    """To ask who writes takes the lock for an instant: a writer that comes just then waits it out."""
+    with writing(tmp_path, "import"):
+        pass
+    asking = FileLock(tmp_path / STATE_DIR / "write.lock", thread_local=False)
+    asking.acquire()
+    threading.Timer(GLANCE_S / 4, asking.release).start()
+    with writing(tmp_path, "estimate"):
+        assert writer(tmp_path) is not None
 
 
 def test_the_lock_dies_with_its_process(tmp_path: Path) -> None:

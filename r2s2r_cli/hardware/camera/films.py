@@ -13,6 +13,7 @@ import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Value
 from r2s2r_cli.devices.camera import CameraError, Intrinsics
+from r2s2r_cli.errors import quoted
 from r2s2r_cli.hardware.camera.replay import Film
 
 CONFIGS = ("config.json", "camera_intrinsic.json", "intrinsic.json")
@@ -148,9 +149,9 @@ def _configuration(path: Path, tree: dict[str, Any]) -> tuple[Intrinsics, float 
         counts = float(tree["depth_scale"]) if "depth_scale" in tree else None
     except (KeyError, TypeError, ValueError) as error:
         raise _wrong(path, "cam_intr, or intrinsic_matrix, width and height", f"{type(error).__name__} {error}",
-                     f"head '{path}'") from None  # fmt: skip
+                     f"head {quoted(path)}") from None  # fmt: skip
     if not (np.isfinite(K).all() and K[0, 0] > 0 and K[1, 1] > 0 and width > 0 and height > 0):
-        raise _wrong(path, "focal lengths above 0", f"{K.tolist()}", f"head '{path}'")
+        raise _wrong(path, "focal lengths above 0", f"{K.tolist()}", f"head {quoted(path)}")
     lens = Intrinsics(width, height, float(K[0, 0]), float(K[1, 1]),
                       float(K[0, 2]) + _HALF_PIXEL, float(K[1, 2]) + _HALF_PIXEL)  # fmt: skip
     return lens, 1.0 / counts if counts is not None and counts > 1 else None
@@ -162,9 +163,9 @@ def _json(path: Path) -> dict[str, Any]:
             raise ValueError("too large")
         tree = json.loads(path.read_bytes())
     except (OSError, ValueError, RecursionError) as error:
-        raise _wrong(path, "a JSON object", str(error)[:80], f"head '{path}'") from None
+        raise _wrong(path, "a JSON object", str(error)[:80], f"head {quoted(path)}") from None
     if not isinstance(tree, dict):
-        raise _wrong(path, "a JSON object", type(tree).__name__, f"head '{path}'")
+        raise _wrong(path, "a JSON object", type(tree).__name__, f"head {quoted(path)}")
     return tree
 
 

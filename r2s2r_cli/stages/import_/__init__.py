@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Literal
 
 from r2s2r_cli.artifact import ArtifactData, Group
-from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.errors import InputError, UsageError, quoted
 from r2s2r_cli.stages.import_.authors_folder import import_authors_folder
 from r2s2r_cli.stages.import_.checks import ROD_TOLERANCE
-from r2s2r_cli.stages.import_.files import MAX_CSV_BYTES, file_size, list_folder, quoted, read_source, shown
+from r2s2r_cli.stages.import_.files import MAX_CSV_BYTES, file_size, list_folder, read_source, shown
 from r2s2r_cli.stages.import_.run import ImportedRun, run_name
 from r2s2r_cli.stages.import_.sidecar import read_sidecar, sidecar_path
 from r2s2r_cli.stages.import_.trajectory import import_trajectory

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from r2s2r_cli.artifact import Group, Value
-from r2s2r_cli.errors import InputError
+from r2s2r_cli.errors import InputError, quoted
 from r2s2r_cli.stages import frames
 from r2s2r_cli.stages.import_.authors_json import parse_frame
 from r2s2r_cli.stages.import_.authors_streams import build_streams
 from r2s2r_cli.stages.import_.camera_config import camera_attributes
-from r2s2r_cli.stages.import_.files import MAX_TEXT_BYTES, list_folder, quoted, read_source
+from r2s2r_cli.stages.import_.files import MAX_TEXT_BYTES, list_folder, read_source
 from r2s2r_cli.stages.import_.images import check_images, frame_blobs
 from r2s2r_cli.stages.import_.run import NO_NATURE, check_clock, dropped_frames, stream_sizes, time_facts
 from r2s2r_cli.stages.import_.sidecar import check_sidecar, run_attributes

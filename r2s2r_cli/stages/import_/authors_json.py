@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.import_.files import clipped, decode, quoted, shown
+from r2s2r_cli.errors import InputError, quoted
+from r2s2r_cli.stages.import_.files import clipped, decode, shown
 
 PF, MM = 1e-12, 1e-3
 G_M_PER_S2 = 9.80665

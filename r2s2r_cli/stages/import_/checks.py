@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from r2s2r_cli.errors import InputError
+from r2s2r_cli.errors import InputError, quoted
 from r2s2r_cli.stages.frames import fit_rod_length
-from r2s2r_cli.stages.import_.files import quoted
 from schemas.results_import import LengthUnit
 from schemas.robot import Robot
 

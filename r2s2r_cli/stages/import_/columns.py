@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from r2s2r_cli.errors import InputError
+from r2s2r_cli.errors import InputError, quoted
 from r2s2r_cli.stages.import_ import clock
 from r2s2r_cli.stages.import_.checks import UNITS
-from r2s2r_cli.stages.import_.files import clipped, in_place, nearest, quoted, shown
+from r2s2r_cli.stages.import_.files import clipped, in_place, nearest, shown
 from r2s2r_cli.stages.import_.table import Table
 from schemas.results_import import LengthUnit
 from schemas.robot import Robot

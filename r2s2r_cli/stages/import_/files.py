@@ -5,13 +5,12 @@ from __future__ import annotations
 import codecs
 import difflib
 import os
-import shlex
 import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from r2s2r_cli.errors import InputError
+from r2s2r_cli.errors import InputError, quoted
 
 MIB = 1024 * 1024
 MAX_CSV_BYTES = 256 * MIB
@@ -196,8 +195,3 @@ def in_place(path: object, filter_command: str) -> str:
     """A command that puts a file through a filter and keeps the original as `.bak`; the sidecar still fits."""
     copy = quoted(f"{path}.bak")
     return f"cp {quoted(path)} {copy} && {filter_command} < {copy} > {quoted(path)}"
-
-
-def quoted(path: object) -> str:
-    """A path as it can be pasted into a shell."""
-    return shlex.quote(str(path))

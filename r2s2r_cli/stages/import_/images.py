@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from r2s2r_cli.artifact import Blobs
-from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.import_.files import FileBytes, quoted, read_ends
+from r2s2r_cli.errors import InputError, quoted
+from r2s2r_cli.stages.import_.files import FileBytes, read_ends
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _PNG_END = b"\0\0\0\0IEND\xaeB`\x82"

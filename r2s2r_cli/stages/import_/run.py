@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from r2s2r_cli.artifact import Blobs, Group, Scalar
-from r2s2r_cli.errors import InputError
+from r2s2r_cli.errors import InputError, quoted
 from r2s2r_cli.stages.frames import BACKWARDS, DUPLICATE, KEPT, NOT_FINITE, holes, noise_sd, stamp_jitter
-from r2s2r_cli.stages.import_.files import quoted, shown
+from r2s2r_cli.stages.import_.files import shown
 from schemas.results_import import CapNoise, DroppedFrames, ImportReport, TimeGap
 
 RUN_NAME = r"[A-Za-z0-9][\w.+-]*"

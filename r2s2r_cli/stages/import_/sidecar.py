@@ -11,8 +11,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from r2s2r_cli.artifact import Scalar
-from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.import_.files import MAX_TEXT_BYTES, clipped, decode, did_you_mean, quoted, read_source, shown
+from r2s2r_cli.errors import InputError, quoted
+from r2s2r_cli.stages.import_.files import MAX_TEXT_BYTES, clipped, decode, did_you_mean, read_source, shown
 from schemas.robot import Robot
 from schemas.sidecar import MINIMAL_SIDECAR, Sidecar, SidecarPid
 

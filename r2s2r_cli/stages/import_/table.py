@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.import_.files import decode, in_place, quoted, shown
+from r2s2r_cli.errors import InputError, quoted
+from r2s2r_cli.stages.import_.files import decode, in_place, shown
 
 MAX_COLUMNS = 2000
 """Far above any robot; a header longer than this is no header."""

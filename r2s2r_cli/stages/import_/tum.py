@@ -13,10 +13,10 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from r2s2r_cli.artifact import Group
-from r2s2r_cli.errors import InputError
+from r2s2r_cli.errors import InputError, quoted
 from r2s2r_cli.stages import frames
 from r2s2r_cli.stages.import_.camera_config import check_depth_scale
-from r2s2r_cli.stages.import_.files import MAX_CSV_BYTES, decode, quoted, read_source, shown
+from r2s2r_cli.stages.import_.files import MAX_CSV_BYTES, decode, read_source, shown
 from r2s2r_cli.stages.import_.images import check_images, frame_blobs
 from r2s2r_cli.stages.import_.run import NO_NATURE, check_clock, dropped_frames, stream_sizes, time_facts
 from r2s2r_cli.stages.import_.sidecar import check_sidecar, run_attributes

@@ -10,6 +10,7 @@ import typer
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.options import DrawOption, JsonOption, QuietOption
+from r2s2r_cli.store.atomic import write_bytes, write_text
 
 _BANKS = typer.Argument(metavar="BANK | FILE...", help="Folder of `blind make`; with --published: published files.")
 Published = Annotated[
@@ -73,9 +74,9 @@ def score(
     if draw:
         pictures = dict(draw_blind(result))
         target = page or beside.parent / f"{beside.name}-score.html"
-        target.write_bytes(blind_page(result, pictures))
+        write_bytes(target, blind_page(result, pictures))
         for name, png in pictures.items():
-            target.with_name(f"{target.stem}-{name}.png").write_bytes(png)
+            write_bytes(target.with_name(f"{target.stem}-{name}.png"), png)
         console.say(f"page: {target}")
 
 
@@ -103,7 +104,6 @@ def publish(
     from r2s2r_cli.blind.labels import read_key
     from r2s2r_cli.blind.score import publish as opened
     from r2s2r_cli.blind.score.published import write_form
-    from r2s2r_cli.store.atomic import write_bytes
     from schemas.blind import BlindPublished
     from schemas.results_blind import BlindPublishResult
 
@@ -162,7 +162,7 @@ def calibrate(
         found = calibration_published(banks, older or ())
     else:
         found = calibration(*_bank(banks, verdicts, key, "calibrate"), older or ())
-    out.write_text(format_json.dumps(found, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    write_text(out, format_json.dumps(found, indent=1, sort_keys=True) + "\n")
     result = BlindCalibrateResult.model_validate({**found, "out": str(out), **found["left_out"]}, extra="ignore")
     console.document(result)
     console.data(f"{result.sets} sets: temperature {result.temperature:.1f} nats, a name from {result.commit:.2f} on; "

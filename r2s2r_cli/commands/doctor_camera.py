@@ -161,11 +161,13 @@ def _draw(looked: Looked, device: Camera, target: Path, command: str) -> None:
 def _save(path: Path, looked: Looked, marks: int) -> None:
     from r2s2r_cli.stages.calibrate.colors import with_colors
     from r2s2r_cli.store.atomic import write_text
+    from r2s2r_cli.store.lock import writing_at
     from r2s2r_cli.store.toml import read_text
 
     ranges = [rod.range for rod in looked.result.rods if rod.measured and rod.range is not None]
     source = f"doctor camera, {looked.result.name}, {marks} marks"
-    write_text(path, with_colors(read_text(path), ranges, source=source))
+    with writing_at(path, "doctor camera"):  # `calibrate` writes the same file
+        write_text(path, with_colors(read_text(path), ranges, source=source))
 
 
 def _show(looked: Looked, console: Console) -> None:

@@ -149,6 +149,22 @@ def test_a_fresh_artifact_says_that_its_inputs_are_stale(estimated: Path) -> Non
     assert "hint: r2s2r status" in done.stderr
 
 
+def test_what_is_computed_from_stale_inputs_says_so(estimated: Path) -> None:
+    """Which, why and through what, when the stage runs as when it would run; not where all is fresh."""
+    assert document("floor")["stale_inputs"] == []
+    (estimated / "sample.csv").write_text((estimated / "sample.csv").read_text() + "\n")
+    done = invoke("floor", "--force")
+    assert done.exit_code == 0
+    why, record = "input sample.csv changed: its bytes are others", "iterations/001/10-record.h5"
+    said = " ".join(done.stderr.split())
+    assert f"warning: floor.h5: its input {record} is stale itself: {why}" in said
+    assert f"warning: floor.h5: its input {ESTIMATE} is stale itself: through {record}: {why}" in said
+    assert "hint: r2s2r status" in done.stderr
+    floor = f"its input floor.h5 is stale itself: through {record}: {why}"
+    assert floor in document("compare", "--dry-run")["stale_inputs"]
+    assert f"warning: {ESTIMATE}: its input {record} is stale itself: {why}" in invoke("estimate", "--force").stderr
+
+
 def test_a_calibration_is_one_line_of_the_table(estimated: Path) -> None:
     """Many numbers of robot.toml changed: the table counts them, the document names each."""
     text = (estimated / "robot.toml").read_text()

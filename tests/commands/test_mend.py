@@ -12,6 +12,7 @@ from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.commands.wanted import wanted
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
+from r2s2r_cli.store.read import read_artifact
 from r2s2r_cli.store.staleness import artifact_ref
 from r2s2r_cli.store.write import write_artifact
 from schemas.header import InputRef
@@ -80,6 +81,21 @@ def test_states_whose_pictures_are_gone_are_not_asked_for(project: Path, stage: 
     assert pasted() == f"r2s2r {stage} gait.toml --repeats 2 --iteration 1 --dry-run"
     (project / "gait.toml").unlink()
     assert document("status")["next"] == ""
+
+
+@pytest.mark.parametrize("stage", NAMES)
+def test_a_recording_without_a_camera_never_had_pictures(project: Path, stage: str) -> None:
+    """It replaced the one that the states are of: both are said, and not that something was not kept."""
+    without_pictures(project, stage)
+    recording, estimate = NAMES[stage]
+    before = read_artifact(project / "iterations/001" / recording, "recording")[1]
+    blind = {name: group for name, group in before.groups.items() if not name.startswith("runs/walk/imu")}
+    put(project, recording, ArtifactData("recording", blind), stage, settings={"flags": {**FLAGS, "camera": None}})
+    why = f"iterations/001/{recording} was recorded without a camera"
+    assert f"cannot be made again: {why}; these states are of another recording than that" in said(estimate)
+    shown = " ".join(invoke("run", "--iteration", "1", "--dry-run").stderr.split())
+    assert f"cannot be made again here, {why}, and these states are of another recording than that" in shown
+    assert "not kept" not in shown
 
 
 @pytest.mark.parametrize("stage", NAMES)

@@ -21,8 +21,10 @@ ON_BOUND = 1e-6
 
 
 def outdone(rows: Mapping[str, Row], closed_loop_m: float | None, own: str = OURS) -> tuple[str, ...]:
-    """Rivals of smaller held-out error, as it is shown, and a free run with the controller that is worse than none. rows: predictors
-    over the test intervals; closed_loop_m: mean error of that free run; own: the row that is our prediction."""
+    """Rivals of smaller held-out error, as it is shown, and a free run with the controller that is worse than none.
+
+    rows: predictors over the test intervals; closed_loop_m: mean error of that free run; own: the row that is our
+    prediction."""
     ours, found = rows.get(own), list[str]()
     if ours is None or ours.key.rmse_m is None:
         return ()

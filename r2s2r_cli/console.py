@@ -8,7 +8,6 @@ import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from io import StringIO
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.errors import InputError, R2S2RError
@@ -64,31 +63,15 @@ class Console:
             out(text)
 
     def table(self, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-        """A table of data for people; silent with --json. Numbers (cells that begin like one) stand right."""
+        """A table of data for people; silent with --json."""
         if self.json:
             return
-        from rich import box
-        from rich.console import Console as RichConsole
-        from rich.table import Table
-        from rich.text import Text
+        from r2s2r_cli.tables import table_text
 
         body = [[str(cell) for cell in row] for row in rows]
         terminal = sys.stdout.isatty()
         width = shutil.get_terminal_size().columns if terminal else PIPED_WIDTH
-        table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-        # Between two columns stand three characters, and one at either edge.
-        widths = table_widths(columns, body, width - 3 * len(columns) + 1)
-        for i, name in enumerate(columns):
-            numeric = bool(body) and all(_is_number(row[i]) for row in body)
-            table.add_column(Text(name), justify="right" if numeric else "left", overflow="fold", width=widths[i])
-        for row in body:
-            table.add_row(*(Text(cell) for cell in row))
-        # Rendered first and printed by us: rich ends the process by itself where a pipe closes.
-        page = RichConsole(file=StringIO(), width=width, highlight=False, force_terminal=terminal)
-        page.print(table)
-        text = page.file.getvalue() if isinstance(page.file, StringIO) else ""
-        lines = text.rstrip().splitlines() if terminal else [line.rstrip() for line in text.rstrip().splitlines()]
-        out("\n".join([f"\n{title}" if title else "", *lines[1:], ""]))
+        out("\n".join([f"\n{title}" if title else "", table_text(columns, body, width, terminal=terminal), ""]))
 
     def say(self, text: str) -> None:
         """A remark on stderr; silent with --quiet."""
@@ -210,36 +193,3 @@ def print_error(error: R2S2RError, *, as_json: bool) -> None:
         )  # fmt: skip
         out(document.model_dump_json(by_alias=True, indent=2))
     print("\n".join([f"error: {error.what}", *error.lines()[1:]]), file=sys.stderr)
-
-
-def _is_number(cell: str) -> bool:
-    return not cell or cell[0] in "-+0123456789"
-
-
-def table_widths(columns: Sequence[str], rows: Sequence[Sequence[str]], room: int) -> list[int]:
-    """The width of every column, in characters of the terminal; together at most `room`, but at least one each.
-
-    The widest gives way first, each as far as its longest word allows; the first one, which holds the names, after the
-    others where it takes no more than a third. Words are cut where nothing else helps, those of the first column last.
-    """
-    from rich.cells import cell_len
-
-    cells = [[name, *(row[i] for row in rows)] for i, name in enumerate(columns)]
-    lines = [[line for cell in column for line in cell.splitlines() or [""]] for column in cells]
-    whole = [max(1, *map(cell_len, column)) for column in lines]
-    words = [max(1, *(cell_len(word) for line in column for word in line.split() or [""])) for column in lines]
-    widths, names = whole, max(words[0], min(whole[0], room // 3))
-    for least in ([names, *words[1:]], words, [words[0], *(1 for _ in words[1:])], [1] * len(words)):
-        widths = _narrowed(widths, least, room)
-    return widths
-
-
-def _narrowed(widths: Sequence[int], least: Sequence[int], room: int) -> list[int]:
-    """One character less at a time of the widest column that is wider than its least width, until all have room."""
-    narrow = list(widths)
-    while sum(narrow) > room:
-        wider = [i for i, width in enumerate(narrow) if width > least[i]]
-        if not wider:
-            break
-        narrow[max(wider, key=lambda i: narrow[i])] -= 1
-    return narrow

@@ -79,7 +79,7 @@ def execute(
     from r2s2r_cli.commands.cameras import stored_camera
     from r2s2r_cli.commands.execute_outcome import expect
     from r2s2r_cli.commands.outcome import require_model
-    from r2s2r_cli.commands.record_run import Wish, carry_out, look
+    from r2s2r_cli.commands.record_run import Wish, carry_out, look, tell_of_no_camera
     from r2s2r_cli.stages.record import plans
     from r2s2r_cli.store.header import whole_header
     from r2s2r_cli.store.staleness import artifact_ref
@@ -107,6 +107,7 @@ def execute(
         },
         seed=None, draw=draw, force=force, stage="execute", inputs=inputs,
     )  # fmt: skip
+    tell_of_no_camera(wish, console)
     if not dry_run:  # before the simulation, which takes its time
         _require_somebody(link, yes=yes)
         wish.recording().require_room(force=force)

@@ -66,7 +66,7 @@ class Console:
         """A table of data for people; silent with --json."""
         if self.json:
             return
-        from r2s2r_cli.tables import table_text
+        from r2s2r_cli.views.tables import table_text
 
         body = [[str(cell) for cell in row] for row in rows]
         terminal = sys.stdout.isatty()

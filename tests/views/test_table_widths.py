@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from r2s2r_cli.console import PIPED_WIDTH, Console
-from r2s2r_cli.tables import table_text, table_widths
+from r2s2r_cli.views.tables import table_text, table_widths
 
 NAMES = ["001-turn-counterclockwise-2", "motor_speed_mismatch"]
 LONG = "a remark of many words " * 4

@@ -213,7 +213,7 @@ def _require_fresh(project: Project, place: Iteration, plan: Path, console: Cons
             hint=f"r2s2r plan --iteration {place.number}",
         )  # fmt: skip
     for text in stale_inputs(project, header.provenance.inputs):
-        console.warn(f"{project.relative(plan)}: {text}; `r2s2r status` says why")
+        console.warn(f"{project.relative(plan)}: {text}; `r2s2r status` says more")
 
 
 def _ask(console: Console) -> None:

@@ -7,8 +7,12 @@ import shutil
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
+<<<<<<< HEAD
 from contextlib import contextmanager, suppress
 from io import StringIO
+=======
+from contextlib import contextmanager
+>>>>>>> 8ba89b29b0734fe87911b642d51fb51ddd805739
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.errors import InputError, R2S2RError
@@ -64,31 +68,15 @@ class Console:
             out(text)
 
     def table(self, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-        """A table of data for people; silent with --json. Numbers (cells that begin like one) stand right."""
+        """A table of data for people; silent with --json."""
         if self.json:
             return
-        from rich import box
-        from rich.console import Console as RichConsole
-        from rich.table import Table
-        from rich.text import Text
+        from r2s2r_cli.views.tables import table_text
 
         body = [[str(cell) for cell in row] for row in rows]
         terminal = sys.stdout.isatty()
         width = shutil.get_terminal_size().columns if terminal else PIPED_WIDTH
-        table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-        # Between two columns stand three characters, and one at either edge.
-        widths = table_widths(columns, body, width - 3 * len(columns) + 1)
-        for i, name in enumerate(columns):
-            numeric = bool(body) and all(_is_number(row[i]) for row in body)
-            table.add_column(Text(name), justify="right" if numeric else "left", overflow="fold", width=widths[i])
-        for row in body:
-            table.add_row(*(Text(cell) for cell in row))
-        # Rendered first and printed by us: rich ends the process by itself where a pipe closes.
-        page = RichConsole(file=StringIO(), width=width, highlight=False, force_terminal=terminal)
-        page.print(table)
-        text = page.file.getvalue() if isinstance(page.file, StringIO) else ""
-        lines = text.rstrip().splitlines() if terminal else [line.rstrip() for line in text.rstrip().splitlines()]
-        out("\n".join([f"\n{title}" if title else "", *lines[1:], ""]))
+        out("\n".join([f"\n{title}" if title else "", table_text(columns, body, width, terminal=terminal), ""]))
 
     def say(self, text: str) -> None:
         """A remark on stderr; silent with --quiet."""
@@ -209,6 +197,7 @@ def print_error(error: R2S2RError, *, as_json: bool) -> None:
             exit_code=int(error.exit_code), what=error.what, where=error.where, expected=error.expected,
             received=error.received, hint=error.hint,
         )  # fmt: skip
+<<<<<<< HEAD
         with suppress(PipeClosed, InputError):
             out(document.model_dump_json(by_alias=True, indent=2))
     with suppress(OSError):
@@ -246,3 +235,7 @@ def _narrowed(widths: Sequence[int], least: Sequence[int], room: int) -> list[in
             break
         narrow[max(wider, key=lambda i: narrow[i])] -= 1
     return narrow
+=======
+        out(document.model_dump_json(by_alias=True, indent=2))
+    print("\n".join([f"error: {error.what}", *error.lines()[1:]]), file=sys.stderr)
+>>>>>>> 8ba89b29b0734fe87911b642d51fb51ddd805739

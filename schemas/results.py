@@ -34,6 +34,8 @@ class StageResult(Frozen):
     reasons: tuple[str, ...]
     """Why the stage ran (or would run); where it is fresh, which of its inputs are stale themselves."""
     inputs: tuple[str, ...]
+    stale_inputs: tuple[str, ...] = ()
+    """Where the stage ran (or would run): which of its inputs are stale themselves, and why."""
     drawings: tuple[str, ...] = ()
     """Pictures and reports written beside the artifact, relative to the project."""
     report: dict[str, Any] | None = None

@@ -62,9 +62,9 @@ def estimate(
     from r2s2r_cli.commands.estimate_hints import hints_of
     from r2s2r_cli.commands.outcome import print_config, require_input, show_outcome
     from r2s2r_cli.commands.stage import StageRun
-    from r2s2r_cli.commands.wanted import wanted, wanted_again
+    from r2s2r_cli.commands.wanted import wanted
     from r2s2r_cli.store.header import whole_header
-    from r2s2r_cli.store.staleness import artifact_ref, reasons
+    from r2s2r_cli.store.staleness import artifact_ref
     from schemas.results_estimate import EstimateReport
 
     console = Console(json=json, quiet=quiet)
@@ -81,8 +81,6 @@ def estimate(
         first = "r2s2r estimate --of execute"
     require_input(source, f"{first} --iteration {place.number}")
     header = whole_header(source)
-    for reason in reasons(here, header, wanted_again(here, place, header.provenance)):
-        console.warn(f"{here.relative(source)} is stale itself: {reason}")
     run = StageRun(
         stage="estimate", kind="estimate", project=here, iteration=place,
         find_inputs=lambda: [artifact_ref(here, source, whole_header(source))],

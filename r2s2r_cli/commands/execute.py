@@ -79,7 +79,7 @@ def execute(
     from r2s2r_cli.commands.cameras import stored_camera
     from r2s2r_cli.commands.execute_outcome import expect
     from r2s2r_cli.commands.outcome import require_model
-    from r2s2r_cli.commands.record_run import Wish, carry_out, look
+    from r2s2r_cli.commands.record_run import Wish, carry_out, look, tell_of_no_camera
     from r2s2r_cli.stages.record import plans
     from r2s2r_cli.store.header import whole_header
     from r2s2r_cli.store.staleness import artifact_ref
@@ -107,6 +107,7 @@ def execute(
         },
         seed=None, draw=draw, force=force, stage="execute", inputs=inputs,
     )  # fmt: skip
+    tell_of_no_camera(wish, console)
     if not dry_run:  # before the simulation, which takes its time
         _require_somebody(link, yes=yes)
         wish.recording().require_room(force=force)
@@ -213,7 +214,7 @@ def _require_fresh(project: Project, place: Iteration, plan: Path, console: Cons
             hint=f"r2s2r plan --iteration {place.number}",
         )  # fmt: skip
     for text in stale_inputs(project, header.provenance.inputs):
-        console.warn(f"{project.relative(plan)}: {text}; `r2s2r status` says why")
+        console.warn(f"{project.relative(plan)}: {text}; `r2s2r status` says more")
 
 
 def _ask(console: Console) -> None:

@@ -40,13 +40,17 @@ def expect(
             console.warn(f"{run.run}: {text}")
     lasts = {run.run: run.duration_s for run in report.runs}
     total = sum(lasts[run.policy.name] + 2 * run.rest for run in runs)
-    console.say(f"{counted(len(runs), 'run')}, about {total / 60:.1f} minutes of the robot")
+    console.say(f"{counted(len(runs), 'run')}, about {_lasting(total)} on the robot")
     if camera:
         console.say(
             f"its pictures: about {PICTURE_MB * PICTURES_HZ * total:.0f} MB, of 640 x 480 pixels {PICTURES_HZ:g} times "
             "a second; fewer or smaller ones take as much less"
         )
     _tell_of_view(project, place, data, console, camera=camera)
+
+
+def _lasting(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.1f} minutes"
 
 
 def _tell_of_view(project: Project, place: Iteration, data: ArtifactData, console: Console, *, camera: bool) -> None:

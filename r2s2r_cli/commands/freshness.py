@@ -8,6 +8,7 @@ from pathlib import Path
 
 from r2s2r_cli.commands.wanted import wanted_again
 from r2s2r_cli.errors import R2S2RError
+from r2s2r_cli.store.brief import brief
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Iteration, Project
 from r2s2r_cli.store.staleness import joined, reasons
@@ -36,17 +37,23 @@ def own_reasons(project: Project, iteration: Iteration | None, header: Header) -
 
 
 def stale_inputs(project: Project, inputs: Sequence[InputRef]) -> list[str]:
-    """Which inputs are stale, by themselves or through inputs of their own: what was made of them is, then, of old."""
+    """Which inputs are stale, by themselves or through inputs of their own, and why: what was made of them is, then, of
+    old."""
     places = {place.path: place for place in project.iterations()}
 
     @functools.cache
-    def stale(name: str) -> bool:
+    def why(name: str) -> str:
         path = project.root / name
         try:
             header = read_header(path)
             own = own_reasons(project, places.get(path.parent), header)
-        except R2S2RError:
-            return True  # damaged, or gone: nothing fresh
-        return bool(own) or any(stale(ref.path) for ref in header.provenance.inputs if ref.kind in KINDS)
+        except R2S2RError as error:
+            return error.what  # damaged, or gone: nothing fresh
+        if own:
+            first, *more = brief(own)
+            return f"{first}, and {len(more)} more" if more else first
+        through = ((ref.path, why(ref.path)) for ref in header.provenance.inputs if ref.kind in KINDS)
+        return next((f"through {name}: {text}" for name, text in through if text), "")
 
-    return [f"its input {ref.path} is stale itself" for ref in inputs if ref.kind in KINDS and stale(ref.path)]
+    pairs = [(ref.path, why(ref.path)) for ref in inputs if ref.kind in KINDS]
+    return [f"its input {name} is stale itself: {text}" for name, text in pairs if text]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from r2s2r_cli.errors import R2S2RError
@@ -41,6 +41,8 @@ def mending(project: Project, header: Header, path: Path, reasons: Sequence[str]
     if made.stage == "estimate":
         older = len(reasons) == 1 and made.stage_version != STAGE_VERSIONS["estimate"]
         found = _estimated(project, project.root / made.inputs[0].path, older=older)
+        if found is not None and not found.command and found.why_not and of_another(project, path):
+            return replace(found, why_not=f"{found.why_not}; these states are of another recording than that")
         if found is not None:
             return found
     return Mending(command_again(made, path))
@@ -53,9 +55,24 @@ def sighted(datasets: Iterable[str]) -> bool:
 
 def blind(project: Project, recording: Path) -> str:
     """Why no states can be estimated from a recording; empty: they can. Raises ArtifactError where it is damaged."""
-    if sighted(read_header(recording).datasets):
+    header, name = read_header(recording), project.relative(recording)
+    if sighted(header.datasets):
         return ""
-    return f"the pictures or end caps of {project.relative(recording)} are not kept"
+    made = header.provenance
+    # Where pictures were taken out, the times of them stay.
+    if made.settings.get("flags", {}).get("camera") or any("/camera/" in one for one in header.datasets):
+        return f"the pictures or end caps of {name} are not kept"
+    return (
+        f"{name} was recorded without a camera" if made.stage in MEASURED else f"{name} holds no end caps, no pictures"
+    )
+
+
+def of_another(project: Project, estimate: Path) -> bool:
+    """Whether states are of another recording than the one that is there under its name. Raises ArtifactError where
+    they are damaged."""
+    return any(
+        input_reasons(project, ref) for ref in read_header(estimate).provenance.inputs if ref.kind == "recording"
+    )
 
 
 def _estimated(project: Project, recording: Path, *, older: bool = False) -> Mending | None:

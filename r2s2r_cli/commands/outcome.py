@@ -25,7 +25,9 @@ def show_outcome(result: StageResult, console: Console) -> None:
     console.say(words[result.state])
     for reason in brief(result.reasons):
         console.say(f"  {'but' if result.state == 'fresh' else 'because'} {reason}")
-    if result.state == "fresh" and result.reasons:
+    for text in result.stale_inputs:
+        console.warn(f"{result.artifact}: {text}")
+    if (result.state == "fresh" and result.reasons) or result.stale_inputs:
         console.hint("r2s2r status")
     for path in result.drawings:
         console.say(f"  drew {path}")

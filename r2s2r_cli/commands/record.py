@@ -83,11 +83,11 @@ def record(
     Each run begins and ends in the rest shape. While the robot moves the space bar is the emergency stop. Whatever ends
     a recording, what there is of it is sealed. --dry-run moves nothing: it looks at the sensors and says the plan.
 
-    Example: r2s2r record --random 15 --repeats 3 --port /dev/ttyUSB0
+    Example: r2s2r record --random 15 --repeats 3 --port /dev/ttyUSB0 --camera realsense
     """
     from r2s2r_cli.commands.cameras import stored_camera
     from r2s2r_cli.commands.outcome import print_config
-    from r2s2r_cli.commands.record_run import Wish, carry_out, look
+    from r2s2r_cli.commands.record_run import Wish, carry_out, look, tell_of_no_camera
     from r2s2r_cli.commands.simulate_inputs import stored_names
     from r2s2r_cli.commands.wanted import wanted
     from r2s2r_cli.stages.record import plans
@@ -114,6 +114,7 @@ def record(
         protocol=link.protocol, camera=camera, simulated=simulated, overrides=overrides, flags=flags,
         seed=None if random is None else seed, draw=draw, force=force,
     )  # fmt: skip
+    tell_of_no_camera(wish, console)
     if dry_run:
         look(wish, console)
         return

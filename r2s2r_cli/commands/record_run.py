@@ -56,6 +56,15 @@ class Wish:
         return Recording(self.project, self.iteration, self.overrides, self.flags, self.seed, self.stage, self.inputs)
 
 
+def tell_of_no_camera(wish: Wish, console: Console) -> None:
+    """To be said before anything moves: afterwards it is too late for a camera."""
+    if wish.camera is None:
+        console.warn(
+            "no camera is named: no states can be estimated from these runs, so `identify` cannot learn from them and "
+            "`compare` has nothing to compare; with one, add --camera realsense"
+        )
+
+
 def carry_out(wish: Wish, console: Console) -> None:
     """Record, seal, draw, report. Raises HardwareError or Interrupted after what there is was sealed."""
     from r2s2r_cli.hardware.signals import interrupting_signals

@@ -159,7 +159,7 @@ def _steps(
 
 def _kept(project: Project, place: Iteration, step: Step, steps: Sequence[Step]) -> str:
     """Why states that are there are not estimated again: their pictures are gone, and no step brings them back."""
-    from r2s2r_cli.commands.mend import blind
+    from r2s2r_cli.commands.mend import blind, of_another
 
     executed = step.name == "estimate-executed"
     recording = place.artifact("recording", executed=executed)
@@ -168,10 +168,11 @@ def _kept(project: Project, place: Iteration, step: Step, steps: Sequence[Step])
     if any(one.target == recording and not one.robot for one in steps):  # imported again, where it is stale
         return ""
     try:
-        why = blind(project, recording)
+        why, other = blind(project, recording), of_another(project, step.target)
     except R2S2RError:  # damaged: the stage says so
         return ""
-    return why and f"it cannot be made again here, {why}"
+    also = ", and these states are of another recording than that" if other else ""
+    return why and f"it cannot be made again here, {why}{also}"
 
 
 def _warn_of_old(project: Project, step: Step, console: Console) -> None:

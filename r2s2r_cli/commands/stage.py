@@ -192,4 +192,5 @@ class StageRun(Generic[Report]):
             stage=self.stage, state=state, artifact=self.project.relative(self.target), reasons=tuple(why),
             content_sha256=header.content_sha256 if header else None, inputs=tuple(ref.path for ref in self.inputs),
             drawings=tuple(drawings), report=report.model_dump(mode="json") if report else None,
+            stale_inputs=() if state == "fresh" else tuple(stale_inputs(self.project, self.inputs)),
         )  # fmt: skip

@@ -17,6 +17,8 @@ from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import Header, InputRef, Provenance
 from schemas.versions import KINDS
 
+_LISTED = 3
+"""Values of a list that are told one by one."""
 OPTIONAL = {"plan": ("identification",), "compare": ("floor",), "diagnose": ("floor", "plan")}
 """Of every stage the kinds that it reads where they are there, of the project or of its iteration."""
 
@@ -83,7 +85,7 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any], prefix: str = ""
         if isinstance(before, Mapping) and isinstance(after, Mapping):
             found += differences(before, after, f"{name}.")
         elif before != after:
-            found.append(f"{name} was {_text(before)}, is {_text(after)}")
+            found.append(f"{name} was {_text(old.get(key))}, is {_text(new.get(key))}")
     return found
 
 
@@ -117,8 +119,11 @@ def _plain(value: Any) -> Any:
 
 
 def _text(value: Any) -> str:
-    if value is None:
+    if value is None or value in ([], ()):
         return "absent"
     if isinstance(value, Mapping):
         return f"a table of {len(value)}"
+    if isinstance(value, list | tuple):
+        plain = len(value) <= _LISTED and not any(isinstance(one, Mapping | list | tuple) for one in value)
+        return ", ".join(map(repr, value)) if plain else f"a list of {len(value)}"
     return repr(value)

@@ -135,7 +135,8 @@ def _number(row: BlindRow, value: float | None) -> str:
 
 
 def _interval(row: BlindRow) -> str:
-    return "" if not row.n else f"{_number(row, row.low)} to {_number(row, row.high)}"
+    low, high = _number(row, row.low), _number(row, row.high)
+    return "" if not row.n else low if low == high == "not finite" else f"{low} to {high}"
 
 
 def _target(row: BlindRow) -> str:

@@ -72,8 +72,9 @@ def _policy(one: PolicyFigures) -> list[str]:
     if one.goal is not None:
         gx, gy, turn = one.goal
         name += f" ({gx:g}, {gy:g}, {math.degrees(turn):.0f} deg)"
+    shortcuts = f"{one.shortcuts} (-{counted(one.saved, 'target')})" if one.shortcuts else "0"
     return [
-        name, str(one.targets), f"{one.shortcuts} (-{one.saved} targets)", f"{ex:+.2f}, {ey:+.2f}",
+        name, str(one.targets), shortcuts, f"{ex:+.2f}, {ey:+.2f}",
         f"{math.degrees(one.expected_turn_rad):+.0f}", f"{x:+.2f} +- {sx:.2f}, {y:+.2f} +- {sy:.2f}",
         f"{math.degrees(one.turn_rad):+.0f} +- {math.degrees(one.turn_sd_rad):.0f}", f"{one.worked:.0%}",
         f"{one.duration_s:.0f}", " ".join(one.gaits),

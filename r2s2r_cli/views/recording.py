@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.views.figure import new_figure, png_bytes
 from r2s2r_cli.views.page import Page, PageTable, Picture, counted, render
-from r2s2r_cli.views.recording_camera import camera_height, draw_camera
-from r2s2r_cli.views.recording_motion import MOTION_HEIGHT, draw_motion
+from r2s2r_cli.views.recording_camera import camera_height, draw_camera, has_frames
+from r2s2r_cli.views.recording_motion import COMMANDS_HEIGHT, MOTION_HEIGHT, draw_commands, draw_motion
 from r2s2r_cli.views.recording_streams import draw_streams, panels, streams_height
 from schemas.results_import import ImportReport, ImportReports
 
@@ -28,14 +28,18 @@ def draw_recording(data: ArtifactData, cap_radius_m: float) -> Iterator[tuple[st
 
 
 def _picture(data: ArtifactData, run: str, cap_radius_m: float) -> bytes | None:
-    moving = data.group(run, "caps") is not None or data.group(run, "commands") is not None
+    caps, commands = data.group(run, "caps"), data.group(run, "commands")
     streams = panels(data, run)
     camera = data.group(run, "camera")
+    if camera is not None and not has_frames(camera):  # taken out, to keep the rest small
+        camera = None
     parts: list[float] = []
-    if moving:
-        parts.append(MOTION_HEIGHT if data.group(run, "caps") is not None else MOTION_HEIGHT / 2)
-    if streams:
-        parts.append(streams_height(streams))
+    if caps is not None:
+        parts.append(MOTION_HEIGHT)
+    # Without end caps the commands share the axis of time of what the robot sent.
+    above = caps is None and commands is not None
+    if streams or above:
+        parts.append(streams_height(streams) + COMMANDS_HEIGHT * above)
     if camera is not None:
         parts.append(camera_height(camera, _WIDTH))
     if not parts:
@@ -44,10 +48,13 @@ def _picture(data: ArtifactData, run: str, cap_radius_m: float) -> bytes | None:
     nature = str(data.groups[f"runs/{run}"].attributes.get("nature", "not stated"))
     figure.suptitle(f"run {run}: as recorded ({stated(nature)})")
     places = iter(figure.subfigures(len(parts), 1, height_ratios=parts, squeeze=False)[:, 0])
-    if moving:
+    if caps is not None:
         draw_motion(next(places), data, run, cap_radius_m)
-    if streams:
-        draw_streams(next(places), streams, data.group(run, "intervals"))
+    if streams or above:
+        draw_streams(
+            next(places), streams, data.group(run, "intervals"), above_height=COMMANDS_HEIGHT,
+            above=(lambda axes: draw_commands(axes, data, run)) if above else None,
+        )  # fmt: skip
     if camera is not None:
         draw_camera(next(places), camera)
     return png_bytes(figure)

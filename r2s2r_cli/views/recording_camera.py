@@ -19,6 +19,11 @@ _RANGE_PERCENT = (1, 99)
 _UNKNOWN, _BROKEN = "#c8c8c8", "#d4380d"
 
 
+def has_frames(camera: Group) -> bool:
+    """Whether any pictures are there to draw."""
+    return any(isinstance(camera.datasets.get(name), Blobs) for name in ("color", "depth"))
+
+
 def camera_height(camera: Group, width: float) -> float:
     """Height [inches] of the strip in a picture of `width`: a row for colour, one for depth."""
     aspect = float(camera.attributes["height"]) / float(camera.attributes["width"])

@@ -14,31 +14,34 @@ if TYPE_CHECKING:
     from matplotlib.figure import SubFigure
 
 MOTION_HEIGHT = 7.5
-"""With end caps [inches]; half of it without."""
+"""[inches]"""
+COMMANDS_HEIGHT = 3.4
+"""Of targets and controls alone [inches]."""
 _DROPPED = "#888888"
 _SPAN = 0.8
 """Share of a cable's row that positions 0 to 1 take."""
 
 
 def draw_motion(figure: SubFigure, data: ArtifactData, run: str, radius: float) -> None:
-    """Draws into `figure`. radius: height of a resting cap centre [m]."""
-    caps, commands, intervals = (data.group(run, name) for name in ("caps", "commands", "intervals"))
-    tolerance = data.groups[f"runs/{run}"].attributes.get("pid_tolerance")
-    if caps is None:
-        targets = figure.subplots()
-        draw_bands(targets, intervals)
-        targets.set_xlabel("time [s]")
-    else:
-        grid = figure.add_gridspec(3, 2, width_ratios=(2, 1.2))
-        heights, targets, gaps = (figure.add_subplot(grid[i, 0]) for i in range(3))
-        for axes in (heights, targets, gaps):
-            draw_bands(axes, intervals)
-        _heights(heights, caps, radius)
-        _gaps(gaps, caps)
-        gaps.set_xlabel("time [s]")
-        _top_view(figure.add_subplot(grid[:, 1]), caps)
+    """Draws a run with end caps into `figure`. radius: height of a resting cap centre [m]."""
+    caps, intervals = data.groups[f"runs/{run}/caps"], data.group(run, "intervals")
+    grid = figure.add_gridspec(3, 2, width_ratios=(2, 1.2))
+    heights, targets, gaps = (figure.add_subplot(grid[i, 0]) for i in range(3))
+    for axes in (heights, gaps):
+        draw_bands(axes, intervals)
+    _heights(heights, caps, radius)
+    draw_commands(targets, data, run)
+    _gaps(gaps, caps)
+    gaps.set_xlabel("time [s]")
+    _top_view(figure.add_subplot(grid[:, 1]), caps)
+
+
+def draw_commands(axes: Axes, data: ArtifactData, run: str) -> None:
+    """Targets and controls of a run over time, where it has any."""
+    commands, tolerance = data.group(run, "commands"), data.groups[f"runs/{run}"].attributes.get("pid_tolerance")
+    draw_bands(axes, data.group(run, "intervals"))
     if commands is not None:
-        _targets(targets, commands, None if tolerance is None else float(tolerance))
+        _targets(axes, commands, None if tolerance is None else float(tolerance))
 
 
 def _heights(axes: Axes, caps: Group, radius: float) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,12 +12,18 @@ from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.figure import BLUE, GREEN, ORANGE, PURPLE, RED, draw_bands, legend_beside
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
 
 _PANEL_HEIGHT = 1.8
 """[inches]"""
-_COLORS = (BLUE, RED, GREEN, PURPLE, "#000000", ORANGE)
-"""Okabe and Ito's, which colour-blind people can tell apart; from the seventh line on dashed."""
+_COLORS = (BLUE, RED, GREEN, PURPLE, "#000000", ORANGE, "#56b4e9", "#7f7f7f", "#7a4b12")
+"""The first seven are Okabe and Ito's, which colour-blind people can tell apart."""
+_SOLID = 6
+"""From the seventh line on dashed."""
+_GAP_S = 0.5
+_FEW = 60
+"""Lines of more points have no dots: they would fill the gaps of the dashes."""
 
 
 @dataclass(frozen=True)
@@ -41,16 +47,37 @@ def streams_height(drawn: Sequence[Panel]) -> float:
     return _PANEL_HEIGHT * len(drawn) + 0.3
 
 
-def draw_streams(figure: SubFigure, drawn: Sequence[Panel], intervals: Group | None) -> None:
-    """Draws the panels into `figure`, one above the other."""
-    for axes, panel in zip(figure.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0], drawn, strict=True):
+def draw_streams(
+    figure: SubFigure, drawn: Sequence[Panel], intervals: Group | None, *,
+    above: Callable[[Axes], None] | None = None, above_height: float = _PANEL_HEIGHT,
+) -> None:  # fmt: skip
+    """Draws the panels into `figure`, one above the other, with one axis of time. above: draws another diagram over
+    time, of that height [inches], over them."""
+    heights = [*([above_height] if above is not None else []), *[_PANEL_HEIGHT] * len(drawn)]
+    every = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+    if above is not None:
+        above(every[0])
+    for axes, panel in zip(every[len(heights) - len(drawn) :], drawn, strict=True):
         draw_bands(axes, intervals)
-        for i, (t, line, name) in enumerate(zip(panel.t, panel.lines, panel.names, strict=True)):
-            style = ("-", "--", ":")[i // len(_COLORS) % 3]
-            axes.plot(t, line, style, marker=".", ms=3, lw=1, color=_COLORS[i % len(_COLORS)], label=name)
+        for i, (t, line, name) in enumerate(zip(*received(panel), panel.names, strict=True)):
+            style, marker = ("-", "--", ":")[i // _SOLID % 3], "." if len(t) <= _FEW else ""
+            axes.plot(t, line, style, marker=marker, ms=3, lw=1, color=_COLORS[i % len(_COLORS)], label=name)
         axes.set_ylabel(panel.title, fontsize=9)
         legend_beside(axes, ncol=1 + (len(panel.lines) > 9))
     axes.set_xlabel("time [s]")
+
+
+def received(panel: Panel) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Times and values of each line without the rows in which others alone were received; cut in two where nothing was
+    for longer than _GAP_S, and than three samples usually take."""
+    times, lines = list[np.ndarray](), list[np.ndarray]()
+    for t, line in zip(panel.t, panel.lines, strict=True):
+        there = np.isfinite(line)
+        step = np.diff(t[there])
+        cuts = np.flatnonzero(step > max(_GAP_S, 3.0 * float(np.median(step)) if len(step) else 0.0)) + 1
+        times.append(np.insert(t[there].astype(float), cuts, np.nan))
+        lines.append(np.insert(line[there].astype(float), cuts, np.nan))
+    return times, lines
 
 
 def _panels(data: ArtifactData, run: str) -> Iterator[Panel]:

@@ -3,7 +3,8 @@
 import numpy as np
 
 from r2s2r_cli.blind.score import score_of
-from r2s2r_cli.views.blind import blind_page, blind_tables, draw_blind
+from r2s2r_cli.views.blind import _interval, blind_page, blind_tables, draw_blind
+from schemas.results_blind import BlindRow
 from tests.support import blind_bank
 
 
@@ -26,6 +27,14 @@ def test_tables_and_page_hold_every_figure() -> None:
     assert all(png.startswith(b"\x89PNG") for png in pictures.values())
     page = blind_page(result, pictures).decode()
     assert page.count("data:image/png") == 2 and "f00" in page and all(row.what in page for row in result.rows[:5])
+
+
+def test_an_interval_that_is_not_finite_says_so_once() -> None:
+    """Not `not finite to not finite`; where one end is, both are told."""
+    row = BlindRow(name="loss", what="loss", target=None, above=False, unit="number", value=None, n=3, low=None,
+                   high=None, passed=None, shown=None)  # fmt: skip
+    assert _interval(row) == "not finite"
+    assert _interval(row.model_copy(update={"low": 1.0})) == "1.0 to not finite"
 
 
 def test_confusion_counts_every_decided_set_once() -> None:

@@ -106,7 +106,8 @@ def test_a_plan_of_a_stale_identification_is_executed_with_a_warning(
     monkeypatch.setattr(console, "warn", said.append)
     _require_fresh(Project.find(estimated), Project.find(estimated).iteration(1), place / "40-plan.h5", console)
     assert len(said) == 1
-    assert said[0].startswith("iterations/001/40-plan.h5: its input iterations/001/30-identify.h5 is stale itself;")
+    stale = "iterations/001/40-plan.h5: its input iterations/001/30-identify.h5 is stale itself: stage identify changed"
+    assert said[0].startswith(stale)
 
 
 @pytest.mark.parametrize("command", ["execute", "compare", "simulate"])

@@ -12,6 +12,7 @@ from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.commands.wanted import wanted
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
+from r2s2r_cli.store.read import read_artifact
 from r2s2r_cli.store.staleness import artifact_ref
 from r2s2r_cli.store.write import write_artifact
 from schemas.header import InputRef
@@ -83,6 +84,21 @@ def test_states_whose_pictures_are_gone_are_not_asked_for(project: Path, stage: 
 
 
 @pytest.mark.parametrize("stage", NAMES)
+def test_a_recording_without_a_camera_never_had_pictures(project: Path, stage: str) -> None:
+    """It replaced the one that the states are of: both are said, and not that something was not kept."""
+    without_pictures(project, stage)
+    recording, estimate = NAMES[stage]
+    before = read_artifact(project / "iterations/001" / recording, "recording")[1]
+    blind = {name: group for name, group in before.groups.items() if not name.startswith("runs/walk/imu")}
+    put(project, recording, ArtifactData("recording", blind), stage, settings={"flags": {**FLAGS, "camera": None}})
+    why = f"iterations/001/{recording} was recorded without a camera"
+    assert f"cannot be made again: {why}; these states are of another recording than that" in said(estimate)
+    shown = " ".join(invoke("run", "--iteration", "1", "--dry-run").stderr.split())
+    assert f"cannot be made again here, {why}, and these states are of another recording than that" in shown
+    assert "not kept" not in shown
+
+
+@pytest.mark.parametrize("stage", NAMES)
 def test_no_robot_is_asked_to_move_for_a_newer_version_of_a_stage(project: Path, stage: str) -> None:
     """States that an older version made of pictures that are gone remain usable: it is said, and nothing is hinted."""
     without_pictures(project, stage)
@@ -147,6 +163,22 @@ def test_a_fresh_artifact_says_that_its_inputs_are_stale(estimated: Path) -> Non
     assert "but its input iterations/001/10-record.h5 is stale itself" in done.stderr
     assert "but its input iterations/001/20-estimate.h5 is stale itself" in done.stderr
     assert "hint: r2s2r status" in done.stderr
+
+
+def test_what_is_computed_from_stale_inputs_says_so(estimated: Path) -> None:
+    """Which, why and through what, when the stage runs as when it would run; not where all is fresh."""
+    assert document("floor")["stale_inputs"] == []
+    (estimated / "sample.csv").write_text((estimated / "sample.csv").read_text() + "\n")
+    done = invoke("floor", "--force")
+    assert done.exit_code == 0
+    why, record = "input sample.csv changed: its bytes are others", "iterations/001/10-record.h5"
+    said = " ".join(done.stderr.split())
+    assert f"warning: floor.h5: its input {record} is stale itself: {why}" in said
+    assert f"warning: floor.h5: its input {ESTIMATE} is stale itself: through {record}: {why}" in said
+    assert "hint: r2s2r status" in done.stderr
+    floor = f"its input floor.h5 is stale itself: through {record}: {why}"
+    assert floor in document("compare", "--dry-run")["stale_inputs"]
+    assert f"warning: {ESTIMATE}: its input {record} is stale itself: {why}" in invoke("estimate", "--force").stderr
 
 
 def test_a_calibration_is_one_line_of_the_table(estimated: Path) -> None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from r2s2r_cli.commands.plan_inputs import Asked
+from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.plan import rewards
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.read import read_artifact
@@ -49,6 +51,66 @@ def test_a_reward_of_an_entry_point(project: Path, monkeypatch: pytest.MonkeyPat
     assert invoke("plan", "--behaviour", "sideways", "--dry-run").exit_code == 0
     refused = invoke("plan", "--behaviour", "upwards", "--dry-run")
     assert refused.exit_code == 2 and "sideways" in refused.stderr
+
+
+BROKEN = """
+import math
+
+import numpy as np
+
+
+def boom(came):
+    return math.sqrt(-1.0)
+
+
+def nothing(came):
+    return None
+
+
+def word(came):
+    return "far"
+
+
+def hole(came):
+    return np.where(np.arange(len(came)) < 2, np.nan, came.turn)
+
+
+def short(came):
+    return came.turn[1:]
+"""
+
+
+@pytest.mark.parametrize(
+    ("function", "what", "where", "received"),
+    [
+        ("boom", "the reward fails", "wish_c.py, line 8", "ValueError"),
+        ("nothing", "the reward gives no number for every gait", "--behaviour", "shape ()"),
+        ("word", "the reward gives no numbers", "--behaviour", "str"),
+        ("hole", "the reward gives no number for every gait", "--behaviour", "2 that are not finite"),
+        ("short", "the reward gives no number for every gait", "--behaviour", "shape (4,)"),
+    ],
+)
+def test_a_reward_that_is_wrong_is_told_by_its_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, function: str, what: str, where: str, received: str
+) -> None:
+    """It is the user's to mend, and no bug of ours."""
+    (tmp_path / "wish_c.py").write_text(BROKEN)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    came = rewards.Outcomes(np.zeros((5, 3)), *(np.zeros(5) for _ in range(5)))
+    with pytest.raises(UsageError) as caught:
+        rewards.reward_named(f"wish_c:{function}")(came)
+    error = caught.value
+    assert error.what == what and where in error.where and received in error.received
+    assert error.expected == "5 finite numbers" and error.hint == "r2s2r plan --behaviour forward"
+
+
+@pytest.mark.parametrize(("text", "line"), [("x = 1\ny = (\n", 2), ("x = 1\n\ny = 1 / 0\n", 3)])
+def test_a_file_of_a_reward_that_cannot_be_imported(project: Path, text: str, line: int) -> None:
+    """Its line is said, with exit code 2."""
+    (project / f"wish_d{line}.py").write_text(text)
+    result = invoke("plan", "--behaviour", f"wish_d{line}:away", "--dry-run")
+    assert result.exit_code == 2, result.stderr
+    assert f"wish_d{line}.py, line {line}" in result.stderr and "Traceback" not in result.stderr
 
 
 @pytest.mark.slow

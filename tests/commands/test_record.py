@@ -15,6 +15,7 @@ import pytest
 
 from r2s2r_cli.commands import record_run
 from r2s2r_cli.commands.status import survey
+from r2s2r_cli.console import Console
 from r2s2r_cli.devices.link import LinkError, Sample
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
@@ -196,6 +197,20 @@ def test_a_stuck_sensor_stops_the_robot(robot_project: Path, link: Maker) -> Non
     assert result.exit_code == 5 and "stopped" in result.stderr
     assert made.count <= 50 + 0.25 / made.period and not made.driven.any()
     assert (robot_project / RECORDING).exists()
+
+
+@pytest.mark.parametrize("more", [(), ("--dry-run",)])
+def test_runs_without_a_camera_are_warned_of_before_they_move(
+    robot_project: Path, link: Maker, monkeypatch: pytest.MonkeyPatch, more: tuple[str, ...]
+) -> None:
+    """Nobody can estimate states of them: it is said while there is time to add one."""
+    said: list[str] = []
+    made = link()
+    monkeypatch.setattr(Console, "warn", lambda self, text: said.append(f"{text} ({len(made.commands)} commands)"))
+    assert invoke(*ASK, *more).exit_code == 0
+    assert bool(made.commands) == (not more)
+    told = [text for text in said if "no states can be estimated" in text]
+    assert len(told) == 1 and told[0].endswith("(0 commands)") and "--camera realsense" in told[0]
 
 
 def test_dry_run_moves_nothing(robot_project: Path, link: Maker, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -229,7 +229,9 @@ def _without_none(value: Any) -> Any:
 def test_a_list_that_is_newer_than_the_artifact_and_empty_does_not_make_it_stale() -> None:
     """With an entry it does; a table or a number that is new does."""
     assert differences({"free": ["friction"]}, {"free": ["friction"], "fix": []}) == []
-    assert differences({}, {"fix": ["friction=1"]}) == ["fix was absent, is a table of 1"]
+    assert differences({}, {"fix": ["friction=1"]}) == ["fix was absent, is 'friction=1'"]
+    assert differences({}, {"fix": ["a", "b", "c", "d"]}) == ["fix was absent, is a list of 4"]
+    assert differences({"parts": [{"kg": 1.0}]}, {"parts": []}) == ["parts was a list of 1, is absent"]
     assert differences({}, {"fix": {}}) and differences({}, {"fix": 0})
 
 

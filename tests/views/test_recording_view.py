@@ -9,9 +9,9 @@ import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Value
 from r2s2r_cli.stages.import_ import import_source, merge_runs
-from r2s2r_cli.views.figure import spread_out
+from r2s2r_cli.views.figure import new_figure, png_bytes, spread_out
 from r2s2r_cli.views.recording import draw_recording, ground_offset, import_rows, import_title
-from r2s2r_cli.views.recording_streams import panels
+from r2s2r_cli.views.recording_streams import Panel, draw_streams, panels, received
 from tests.support.import_samples import (
     SIDECAR,
     frame_json,
@@ -90,6 +90,44 @@ def test_what_the_robot_sent_is_drawn(tmp_path: Path) -> None:
     for words in ("position", "encoder length [mm]", "sensor length [mm]", "capacitance [pF]", "specific force", "mm]"):
         assert any(words in title for title in titles), words
     assert panels(_recording(_source("trajectory_csv", tmp_path / "other")), "walk") == []
+
+
+def test_what_was_sent_shares_its_time_with_the_commands() -> None:
+    """Of a run without end caps: the diagrams begin and end at the same places of the picture and at the same times.
+    Nine sensors have nine colours, and the dashes of the last three no dots between them."""
+    t = np.linspace(0.0, 5.0, 200)
+    nine = Panel("length", [t] * 9, [t + k for k in range(9)], [f"sensor {k}" for k in range(9)])
+    figure = new_figure(10.0, 6.0)
+    (part,) = figure.subfigures(1, 1, squeeze=False)[:, 0]
+    draw_streams(part, [nine, nine], None, above=lambda axes: axes.plot([0.0, 9.0], [0.0, 1.0])[0].set_label("target"))
+    png_bytes(figure)
+    axes = part.axes
+    assert (
+        len({(round(one.get_position().x0, 6), round(one.get_position().x1, 6), one.get_xlim()) for one in axes}) == 1
+    )
+    lines = axes[1].get_lines()
+    assert len({line.get_color() for line in lines}) == 9
+    assert {(line.get_linestyle(), line.get_marker()) for line in lines[6:]} == {("--", "")}
+
+
+def test_a_row_in_which_others_were_received_is_no_gap() -> None:
+    """Sensors that take turns are lines all the same; a silence of a second is a gap, in whatever is not that slow."""
+    t = 0.05 * np.arange(80)
+    turns = np.where(np.arange(80) % 2, np.nan, t)
+    silent = np.where((t > 1.0) & (t < 2.0), np.nan, t)
+    slow = 20.0 * t
+    (fast, cut, rare), lines = received(Panel("", [t, t, slow], [turns, silent, slow], ["a", "b", "c"]))
+    assert np.isfinite(fast).all() and len(fast) == 40 and np.isfinite(rare).all()
+    assert np.isnan(cut).sum() == np.isnan(lines[1]).sum() == 1
+
+
+def test_a_recording_whose_pictures_were_taken_out_is_drawn(tmp_path: Path) -> None:
+    """The times of its frames stay, and are no picture."""
+    data = _recording(_source("authors_folder", tmp_path))
+    camera = data.groups["runs/walk/camera"]
+    kept = {name: values for name, values in camera.datasets.items() if not isinstance(values, Blobs)}
+    groups = {**data.groups, "runs/walk/camera": Group(kept, camera.attributes)}
+    assert dict(draw_recording(ArtifactData("recording", groups), 0.0175))["walk"].startswith(b"\x89PNG")
 
 
 def test_numbers_that_would_overlap_are_left_out() -> None:

@@ -64,12 +64,14 @@ def _others(free: Free, frees: Sequence[Free], values: np.ndarray, held: Sequenc
     lies from there, as a normal sd with the same 95 % as the t of so few, no wider than the prior. None where it has no
     family or where too few of that are shown."""
     family = free.name.rpartition(".")[0]
+    if family not in FAMILIES:  # a payload, say, begins at none: nothing is a share of that
+        return None
     ratios = [
         math.log(value / other.start)
         for other, value in zip(frees, values.tolist(), strict=True)
         if other.name.rpartition(".")[0] == family and other.name not in held
     ]
-    if family not in FAMILIES or len(ratios) < LEAST:
+    if len(ratios) < LEAST:
         return None
     from scipy.stats import t
 

@@ -21,16 +21,18 @@ ON_BOUND = 1e-6
 
 
 def outdone(rows: Mapping[str, Row], closed_loop_m: float | None, own: str = OURS) -> tuple[str, ...]:
-    """Rivals of no larger held-out error, and a free run with the controller that is worse than none. rows: predictors
-    over the test intervals; closed_loop_m: mean error of that free run; own: the row that is our prediction."""
+    """Rivals of smaller held-out error, as it is shown, and a free run with the controller that is worse than none.
+
+    rows: predictors over the test intervals; closed_loop_m: mean error of that free run; own: the row that is our
+    prediction."""
     ours, found = rows.get(own), list[str]()
     if ours is None or ours.key.rmse_m is None:
         return ()
     for name, row in rows.items():
-        if name == own or row.key.rmse_m is None or row.key.rmse_m >= ours.key.rmse_m:
+        if name == own or row.key.rmse_m is None or _shown(row.key.rmse_m) >= _shown(ours.key.rmse_m):
             continue
         difference = ours.against(row)
-        surely = difference is not None and difference.interval.lower > 0.0
+        surely = difference is not None and _shown(difference.interval.lower) > 0.0
         how = "better than" if surely else "at least as well as"
         found.append(f"'{name}' predicts the held-out key frames {how} {WORDS.get(own, own)}")
     idle = rows[NOTHING_MOVES].free_m if NOTHING_MOVES in rows else None
@@ -40,6 +42,11 @@ def outdone(rows: Mapping[str, Row], closed_loop_m: float | None, own: str = OUR
             "the robot"
         )
     return tuple(found)
+
+
+def _shown(error_m: float) -> float:
+    """As the tables show it [mm]: what they show as equal is no more than rounding."""
+    return round(1e3 * error_m, 1)
 
 
 def contradicted(parameters: Sequence[ParameterFound], profiles: Sequence[ProfileFound]) -> tuple[str, ...]:

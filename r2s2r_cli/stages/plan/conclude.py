@@ -19,6 +19,7 @@ from r2s2r_cli.stages.plan.groups import (
     symmetry_groups,
 )
 from r2s2r_cli.stages.plan.robust import Primitive
+from r2s2r_cli.stages.plan.route import SIGNS
 from r2s2r_cli.stages.plan.runs import played, policy_file, run_groups
 from r2s2r_cli.stages.plan.ways import Way
 from r2s2r_cli.stages.plan.world import Request, World
@@ -93,7 +94,12 @@ def _warnings(
             said.append(f"{name}: {len(gaits)} gaits found, {settings.kept} were wanted")
         if gaits and gaits[0].mean <= 0:
             said.append(f"{name}: the best gait earns {gaits[0].mean:.3g}: the robot does not move that way")
+    named = {one.name for one in policies}
+    said += [f"{name}: no sequence of the gaits turns that way: there is no such policy"
+             for name in SIGNS if name not in named]  # fmt: skip
     for one in policies:
+        if one.name in SIGNS and one.reached.mean(axis=0)[2] * SIGNS[one.name] <= 0:
+            said.append(f"{one.name}: simulated whole, it turns the other way")
         if one.goal is None and one.far > request.reach:
             said.append(f"{one.name}: comes {one.far:.2f} m from its start, and {request.reach:.2f} m are allowed: "
                         "the camera may lose the robot")  # fmt: skip

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import sysconfig
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from importlib.metadata import entry_points
@@ -11,8 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+import r2s2r_cli
 from r2s2r_cli.errors import UsageError
 
+_OURS = (str(Path(r2s2r_cli.__file__).parent), "<")
+_LIBRARIES = tuple(sysconfig.get_path(key) for key in ("stdlib", "purelib", "platlib"))
 ENTRY_POINTS = "r2s2r.rewards"
 """Group of entry points in which other packages offer rewards."""
 
@@ -91,9 +96,15 @@ def _brought_along(name: str) -> Reward:
                 expected=" | ".join([*BEHAVIOURS, *found, "package.module:function"]), received=name,
                 hint="r2s2r plan --behaviour forward",
             )  # fmt: skip
+    except UsageError:
+        raise
     except (ImportError, AttributeError) as error:
         raise UsageError("the reward cannot be loaded", where=f"--behaviour {name}", received=str(error),
                          expected="package.module:function that Python can import",
+                         hint="r2s2r plan --behaviour forward") from error  # fmt: skip
+    except Exception as error:  # whatever code of the user's raises
+        raise UsageError("the file of the reward fails when it is imported", where=_raised_at(error, name),
+                         expected="a module that Python can import", received=_described(error),
                          hint="r2s2r plan --behaviour forward") from error  # fmt: skip
     if not callable(made):
         raise UsageError("the reward is no function", where=f"--behaviour {name}", expected="a function of Outcomes",
@@ -103,12 +114,38 @@ def _brought_along(name: str) -> Reward:
 
 
 def _checked(name: str, function: Reward) -> Reward:
+    where, hint = f"--behaviour {name}", "r2s2r plan --behaviour forward"
+
     def reward(outcome: Outcomes) -> np.ndarray:
-        value = np.asarray(function(outcome), dtype=float)
-        if value.shape != (len(outcome),) or not np.isfinite(value).all():
-            raise UsageError("the reward gives no number for every gait", where=f"--behaviour {name}",
-                             expected=f"{len(outcome)} finite numbers", received=f"shape {value.shape}",
-                             hint="see docs/guides/plan.md for an example")  # fmt: skip
+        wanted = f"{len(outcome)} finite numbers"
+        try:
+            given = function(outcome)
+        except Exception as error:  # whatever code of the user's raises
+            raise UsageError("the reward fails", where=_raised_at(error, name), expected=wanted,
+                             received=_described(error), hint=hint) from error  # fmt: skip
+        try:
+            value = np.asarray(given, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise UsageError("the reward gives no numbers", where=where, expected=wanted,
+                             received=type(given).__name__, hint=hint) from error  # fmt: skip
+        bad = int((~np.isfinite(value)).sum())
+        if value.shape != (len(outcome),) or bad:
+            received = f"shape {value.shape}" if value.shape != (len(outcome),) else f"{bad} that are not finite"
+            raise UsageError("the reward gives no number for every gait", where=where, expected=wanted,
+                             received=received, hint=hint)  # fmt: skip
         return value
 
     return reward
+
+
+def _raised_at(error: Exception, name: str) -> str:
+    """File and line in which an error arose: the innermost that is not ours, and not a library's where any is not."""
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"{error.filename}, line {error.lineno}"
+    frames = [one for one in traceback.extract_tb(error.__traceback__) if not one.filename.startswith(_OURS)]
+    own = [one for one in frames if not one.filename.startswith(_LIBRARIES)] or frames
+    return f"{own[-1].filename}, line {own[-1].lineno}" if own else f"--behaviour {name}"
+
+
+def _described(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}".splitlines()[0]

@@ -98,10 +98,12 @@ RISK = 2.0
 
 
 def best_sequences(
-    moves: Moves, length: int, value: Callable[[Paths], np.ndarray], *, beam: int = 400, reach: float = math.inf
-) -> Paths:
+    moves: Moves, length: int, value: Callable[[Paths], np.ndarray], *, beam: int = 400, reach: float = math.inf,
+    sign: float = 0.0,
+) -> Paths:  # fmt: skip
     """The sequence of `length` moves with the highest value, less RISK times what may go wrong on the way, by beam
-    search on their beginnings. reach: how far it may come from its start [m]; then a shorter one may be the best."""
+    search on their beginnings. reach: how far it may come from its start [m]; then a shorter one may be the best.
+    sign: of the turn that it must make, 0 for any; the empty sequence where none does."""
     paths = start_paths()
     found, highest = paths, -math.inf
     for k in range(length):
@@ -112,9 +114,11 @@ def best_sequences(
         worth = value(paths) - RISK * moves.risk[paths.picks].sum(axis=1)
         order = np.argsort(-worth, kind="stable")[:beam]
         paths = paths.take(order)
+        # On its beginnings a sequence may turn as it likes.
+        fit = np.flatnonzero(sign * paths.heading[:, -1] > 0) if sign else np.arange(1)
         # Without a limit all have the length that was asked for.
-        if worth[order[0]] > highest if math.isfinite(reach) else k == length - 1:
-            found, highest = paths.take(np.arange(1)), float(worth[order[0]])
+        if len(fit) and (worth[order[fit[0]]] > highest if math.isfinite(reach) else k == length - 1):
+            found, highest = paths.take(fit[:1]), float(worth[order[fit[0]]])
     return found
 
 
@@ -190,6 +194,9 @@ LONG: dict[str, Callable[[Paths], np.ndarray]] = {
     "turn-counterclockwise": in_place(1.0),
 }
 """The four long gaits of the paper and what each is to be good at."""
+SIGNS = {"turn-clockwise": -1.0, "turn-counterclockwise": 1.0}
+"""Which way those turn that are named for it. Their value alone does not tell: a robot that hardly leaves its place is
+worth more than one that turns and leaves it, also where it turns the other way."""
 
 
 def without_rare(primitives: Sequence[Primitive], least: float = 0.95) -> list[Primitive]:

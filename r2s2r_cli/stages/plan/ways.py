@@ -14,6 +14,7 @@ from r2s2r_cli.stages.plan.long import Walk, walks
 from r2s2r_cli.stages.plan.robust import Primitive, usual_ends
 from r2s2r_cli.stages.plan.route import (
     LONG,
+    SIGNS,
     Moves,
     Paths,
     best_sequences,
@@ -52,14 +53,17 @@ def ways(
 ) -> list[Way]:
     """The paper's long gaits and the ways to the goals, made of gaits that can be relied on.
 
-    Of several sequences for each the one is taken that does best in the simulator, over drawn numbers.
+    Of several sequences for each the one is taken that does best in the simulator, over drawn numbers; none where all
+    turn the other way than the name says.
     """
     fit = without_rare(primitives)
     moves = moves_of(world.reference, fit)
     values: dict[str, Callable[[Paths], np.ndarray]] = dict(LONG)
     tried: list[tuple[str, Paths]] = []
     for name, value in LONG.items():
-        best = partial(best_sequences, length=settings.cycles, value=value, reach=MARGIN * request.reach)
+        best = partial(
+            best_sequences, length=settings.cycles, value=value, reach=MARGIN * request.reach, sign=SIGNS.get(name, 0.0)
+        )
         tried += [(name, path) for path in different_sequences(moves, best, SEQUENCES)]
     for name, goal in request.goals.items():
         values[name] = partial(_near, goal)
@@ -70,6 +74,8 @@ def ways(
     longest = max((path.picks.shape[1] for _, path in tried), default=0)
 
     def walked_along(paths: list[tuple[str, Paths]], start: Standing, *, smooth: bool, part: str) -> list[Walk]:
+        if not paths:
+            return []
         sequences = [[fit[k] for k in path.picks[0]] for _, path in paths]
         return walks(world.executor, world.reference, start, sequences, smooth=smooth,
                      progress=lambda done: progress(part, done, longest))  # fmt: skip
@@ -81,6 +87,8 @@ def ways(
     score: dict[str, tuple[float, Paths]] = {}
     whole: dict[str, Walk] = {}
     for (name, path), walk in zip(tried, walked_along(tried, world.pairs, smooth=False, part="sequences"), strict=True):
+        if not turns_as_named(name, walk):
+            continue
         came = walked(walk.way)
         away = (farthest(came) > request.reach) & (name not in request.goals)
         worth = np.where(walk.lost | away, LOST, values[name](came))
@@ -91,10 +99,16 @@ def ways(
     made = walked_along(chosen_paths, world.few, smooth=settings.smooth, part="long policies")
     # Every shortcut led where the whole gait led, and yet what follows it may not: then the returns to rest stay.
     kept = [
-        walk if astray(walk) <= astray(whole[name]) else whole[name]
+        walk if astray(walk) <= astray(whole[name]) and turns_as_named(name, walk) else whole[name]
         for (name, _), walk in zip(chosen_paths, made, strict=True)
     ]
     return [Way(name, path, walk) for (name, path), walk in zip(chosen_paths, kept, strict=True)]
+
+
+def turns_as_named(name: str, walk: Walk) -> bool:
+    """Whether a long policy turns the way its name says, in the mean of the robots that give no target up."""
+    going = ~walk.lost if not walk.lost.all() else np.ones_like(walk.lost)
+    return name not in SIGNS or float(walked(walk.way).heading[going, -1].mean()) * SIGNS[name] > 0
 
 
 def share_astray(walk: Walk, rested: np.ndarray) -> float:

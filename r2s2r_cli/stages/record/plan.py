@@ -49,8 +49,8 @@ def plans(
     for name in names:
         if names.count(name) > 1:
             raise UsageError(
-                "two runs would have the same name", where="r2s2r record", expected="a name for each", received=name,
-                hint="change name in one of the policies, or record one at a time",
+                "two runs would have the same name", where=f"r2s2r {again.split()[0]}", expected="a name for each",
+                received=name, hint=f"r2s2r {again} --repeats 2   # one policy twice; another one needs another name",
             )  # fmt: skip
     return tuple(found)
 

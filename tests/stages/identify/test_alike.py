@@ -85,3 +85,9 @@ def test_nothing_changes(specs: tuple[str, ...], held: tuple[str, ...]) -> None:
     """Where all are shown or one alone; where somebody said where it starts; of the other way; of what is no winch."""
     before = fitted(specs, held, RATIOS[: len(specs)])
     assert as_the_others(before) is before
+
+
+def test_what_begins_at_none_is_no_share_of_anything() -> None:
+    """Places of payloads, of which one is held: none of them is divided by its start, which is 0."""
+    before = fitted(tuple(f"payload.place_m.{k}" for k in range(3)), ("payload.place_m.2",), np.ones(3))
+    assert as_the_others(before) is before

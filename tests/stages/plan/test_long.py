@@ -13,7 +13,7 @@ from r2s2r_cli.stages.plan.placement import Reference
 from r2s2r_cli.stages.plan.robust import Primitive
 from r2s2r_cli.stages.plan.route import walked
 from r2s2r_cli.stages.plan.runs import played, policy_file, run_groups
-from r2s2r_cli.stages.plan.ways import share_astray
+from r2s2r_cli.stages.plan.ways import share_astray, turns_as_named
 from tests.stages.plan.planted import bench
 from tests.support.robots import subject
 
@@ -112,3 +112,12 @@ def test_robots_that_end_elsewhere_are_astray() -> None:
         walk = cast(Walk, SimpleNamespace(way=way, lost=lost))
         assert share_astray(walk, rested) == 0.5
     assert share_astray(cast(Walk, SimpleNamespace(way=way, lost=~lost)), lost & ~lost) == 1.0
+
+
+def test_a_walk_that_turns_the_other_way_is_not_what_its_name_says() -> None:
+    """Robots that turn counter-clockwise in the mean are no turn-clockwise; one that gave a target up says nothing, and
+    what is named for no turn may turn as it likes."""
+    way = [np.zeros((3, 3)), np.column_stack([np.zeros((3, 2)), [0.2, 0.1, -1.0]])]
+    walk = cast(Walk, SimpleNamespace(way=way, lost=np.array([False, False, True])))
+    assert not turns_as_named("turn-clockwise", walk)
+    assert turns_as_named("turn-counterclockwise", walk) and turns_as_named("straight", walk)

@@ -16,6 +16,7 @@ from r2s2r_cli.stages.plan.robust import Primitive
 from r2s2r_cli.stages.plan.route import (
     ARC,
     LONG,
+    SIGNS,
     Moves,
     Paths,
     arching,
@@ -98,6 +99,19 @@ def test_the_long_gaits_ask_for_what_their_names_say() -> None:
     for name, pick in (("straight", 0), ("arching", 1), ("turn-counterclockwise", 2), ("turn-clockwise", 3)):
         # How the robot lies at the end does not count for an arc: three of four gaits are asked for.
         assert best_sequences(moves, 4, LONG[name]).picks[0, :3].tolist() == [pick] * 3
+
+
+def test_a_turn_is_to_the_side_that_it_is_named_for() -> None:
+    """A gait that turns clockwise and leaves its place is worth less than one that turns the other way on the spot, and
+    is taken all the same; where only the other one is there, there is no sequence, and so none is tried."""
+    value, sign = LONG["turn-clockwise"], SIGNS["turn-clockwise"]
+    moves = simple((0.0, 0.4, -0.4), (0.0, 0.0, 0.2))
+    assert best_sequences(moves, 1, value).picks.tolist() == [[1]]
+    for reach in (np.inf, 1.0):
+        assert best_sequences(moves, 1, value, reach=reach, sign=sign).picks.tolist() == [[0]]
+    wrong = moves.take(np.array([1]))
+    assert not best_sequences(wrong, 2, value, reach=1.0, sign=sign).picks.shape[1]
+    assert not different_sequences(wrong, partial(best_sequences, length=2, value=value, sign=sign), 4)
 
 
 def test_a_gait_that_may_go_wrong_is_not_worth_a_little_more_way() -> None:

@@ -75,8 +75,10 @@ def test_repeats_take_turns() -> None:
         "random-1-1", "random-2-1", "random-1-2", "random-2-2",
     ]  # fmt: skip
     assert [p.name for p in plans((one,), repeats=1, rest=1.0)] == ["random-1"]
-    with pytest.raises(UsageError, match="same name"):
-        plans((one, one), repeats=1, rest=1.0)
+    with pytest.raises(UsageError, match="same name") as caught:
+        plans((one, one), repeats=1, rest=1.0, again="execute straight")
+    assert caught.value.where == "r2s2r execute"
+    assert caught.value.hint.startswith("r2s2r execute straight --repeats 2   #")
     with pytest.raises(UsageError, match="number of repeats"):
         plans((one,), repeats=0, rest=1.0)
 

@@ -174,10 +174,11 @@ class Mapping:
         """Fixed numbers are within their bounds, and no free number undoes one."""
         for entry in given:
             free, value = entry.free, self.fixed[entry.free.name]
+            unit = "" if free.unit == "1" else f" {free.unit}"
             if not free.lower <= value <= free.upper:
                 raise InputError(
                     f"the fixed {free.name} is out of its bounds", where="--fix",
-                    expected=f"{free.lower:g} to {free.upper:g} {free.unit}", received=f"{value:g}",
+                    expected=f"{free.lower:g} to {free.upper:g}{unit}", received=f"{value:g}",
                     hint=f"--fix {free.name}={entry.nominal:g}",
                 )  # fmt: skip
             for other in self._entries:

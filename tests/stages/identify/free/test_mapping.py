@@ -199,8 +199,9 @@ def test_fixed_values_are_checked() -> None:
         mapping(fixed={"frictoin": 0.5})
     assert "--fix friction=" in caught.value.hint
     for bad in (-0.1, math.nan):
-        with pytest.raises(InputError, match="out of its bounds"):
+        with pytest.raises(InputError, match="out of its bounds") as outside:
             mapping(fixed={"friction": bad})
+        assert outside.value.expected == "0.038 to 5"  # of no unit
 
 
 def test_the_catalogue_has_the_whole_before_its_parts() -> None:

@@ -1,0 +1,27 @@
+"""What the tables of a plan, and of what it takes to execute one, say in words."""
+
+from __future__ import annotations
+
+import pytest
+
+from r2s2r_cli.commands.execute_outcome import _lasting
+from r2s2r_cli.views.plan_page import _policy
+from schemas.results_plan import PolicyFigures
+
+
+@pytest.mark.parametrize(
+    ("shortcuts", "saved", "said"), [(0, 0, "0"), (1, 1, "1 (-1 target)"), (2, 5, "2 (-5 targets)")]
+)
+def test_shortcuts_say_what_they_save(shortcuts: int, saved: int, said: str) -> None:
+    """And nothing where there are none."""
+    figures = PolicyFigures(
+        name="straight", gaits=("forward-1",), targets=3, shortcuts=shortcuts, saved=saved, expected_m=(0.0, 0.2),
+        expected_turn_rad=0.0, shift_m=(0.0, 0.2), shift_sd_m=(0.0, 0.0), turn_rad=0.0, turn_sd_rad=0.0, worked=1.0,
+        duration_s=4.0, goal=None,
+    )  # fmt: skip
+    assert _policy(figures)[2] == said
+
+
+def test_short_runs_last_seconds() -> None:
+    """Not a tenth of a minute."""
+    assert [_lasting(seconds) for seconds in (6.2, 119.0, 150.0)] == ["6 s", "119 s", "2.5 minutes"]

@@ -64,12 +64,11 @@ def carry_out(wish: Wish, console: Console) -> None:
 
     recording = wish.recording()
     recording.require_room(force=wish.force)
-    with writing(wish.project.root, wish.stage):
+    with writing(wish.project.root, wish.stage), interrupting_signals() as signals:
         ended: BaseException | None = None
         session: Session | None = None
         try:
             with ExitStack() as stack:
-                stack.enter_context(interrupting_signals())
                 feed, facts = _camera(wish.camera, stack)
                 link = stack.enter_context(_guarded(wish, dry_run=False))
                 live = Live([len(plan.policy.steps) * plan.policy.repeat + 2 for plan in wish.runs])
@@ -90,6 +89,7 @@ def carry_out(wish: Wish, console: Console) -> None:
                 raise
             ended = error
         assert session is not None  # noqa: S101 - an error without a session was raised above
+        signals.standing()
         result = _seal(wish, recording, session, console)
     _finish(wish, session.report(), result, ended, console)
 

@@ -10,7 +10,7 @@ not: the motors are off while a sensor is in doubt (`Sample.doubt`), and go on w
 | frozen sensor | not one change in 0.18 s in which its motor was driven: held; none in 0.8 s: stopped |
 | length out of range | outside the limits of robot.toml by more than 20 mm, three messages in a row |
 | time limit | the run takes longer than it was given |
-| exit, exception, SIGINT, SIGTERM | leaving the context; `signals.py` turns both signals into exceptions |
+| exit, exception, a signal | leaving the context; `signals.py` turns signals into exceptions |
 """
 
 from __future__ import annotations

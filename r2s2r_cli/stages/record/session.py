@@ -104,7 +104,6 @@ class Session:
         ended = "complete"
         try:
             with ExitStack() as stack:
-                stack.callback(self.link.stop)
                 if self.feed is not None:
                     stamp = self._stamp(loop)
                     pictures = Pictures(
@@ -112,6 +111,8 @@ class Session:
                         waits=self.link.facts.lock_step, since=LATE_S,
                     )  # fmt: skip
                     stack.enter_context(pictures)
+                # Left before the pictures, whose end waits for all that is to be encoded: the robot would drive on.
+                stack.callback(self.link.stop)
                 loop.run(pictures)
         except BaseException as error:
             self.link.stop()

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 
+from r2s2r_cli.devices.camera import FeedStatistics, Frame
 from r2s2r_cli.devices.link import LinkError, Sample
 from r2s2r_cli.engine.pid import advance, start_progress, ticks
 from r2s2r_cli.errors import ArtifactError, HardwareError, InputError
@@ -196,6 +197,45 @@ def test_a_dead_link_ends_the_run_with_what_was_recorded(after: int) -> None:
     if after > 1:  # the interval that was cut off is written, and not complete where cables were on their way
         last = rows.of["runs/gait-1/intervals"][-1]
         assert last["last"] == after - 2
+
+
+class Watched:
+    """A feed without frames that notes how often the robot had been stopped when its pictures were left."""
+
+    statistics = FeedStatistics()
+
+    def __init__(self, link: FakeLink) -> None:
+        self.link = link
+        self.stops = -1
+
+    def frames(self) -> list[Frame]:
+        """None."""
+        return []
+
+    def hold(self, on: bool) -> None:
+        """Off once all is encoded: a backlog takes half a second."""
+        self.stops = self.stops if on else self.link.stops
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), LinkError("gone", where="fake", hint="plug it in")])
+def test_the_motors_stop_before_the_pictures_are_encoded(error: BaseException) -> None:
+    """Whatever ends a run in mid-motion: the stop does not wait for the camera's backlog."""
+
+    def end(number: int, sample: Sample) -> Sample:
+        if number == 40:
+            raise error
+        return sample
+
+    robot = calibrated()
+    link = FakeLink(robot, on_read=end)
+    feed = Watched(link)
+    session = Session(plans([policy(robot, 0.2)], repeats=1, rest=0.0), robot, link, RecordSettings(), feed=feed)
+    with pytest.raises(type(error)):
+        session.record(Rows())
+    assert feed.stops == 1
 
 
 def test_a_full_disk_stops_the_robot() -> None:

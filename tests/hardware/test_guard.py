@@ -46,6 +46,10 @@ class Clockwork:
         if timeout <= 0:
             return None
         self.k += 1
+        return self.next()
+
+    def next(self) -> Sample | None:
+        """The message of this tick."""
         noisy = SLOPE * (self.length + self.draw.normal(0, 5e-4, 9)) + OFFSET
         value = self.wrong(self.k, np.round(noisy, 14))
         if value is None:

@@ -90,7 +90,7 @@ class Session:
         facts = self.link.facts
         begun = {run.run for run in self.runs}
         return RecordReport(
-            port=facts.port, protocol=facts.protocol, stops_by_itself=facts.watchdog is not None,
+            port=facts.port, protocol=facts.protocol, stops_by_itself=facts.stops_by_itself,
             clock="board" if facts.lock_step else "host", runs=tuple(self.runs),
             not_begun=tuple(plan.name for plan in self.plans if plan.name not in begun),
         )  # fmt: skip
@@ -143,7 +143,7 @@ def _report(loop: RunLoop, pictures: Pictures | None, ended: str) -> RecordRun:
         silent_share=tuple((tally.silent / max(1, tally.ticks)).tolist()), voltage_first_v=tally.voltage_first,
         voltage_last_v=tally.voltage_last, camera=camera,
     )  # fmt: skip
-    warnings = _warnings(done, loop, stops_by_itself=loop.link.facts.watchdog is not None)
+    warnings = _warnings(done, loop, stops_by_itself=loop.link.facts.stops_by_itself)
     return done.model_copy(update={"warnings": tuple(warnings)})
 
 

@@ -13,7 +13,7 @@ from r2s2r_cli.devices.camera import FeedStatistics, Frame
 from r2s2r_cli.devices.link import LinkError, Sample
 from r2s2r_cli.engine.pid import advance, start_progress, ticks
 from r2s2r_cli.errors import ArtifactError, HardwareError, InputError
-from r2s2r_cli.stages.record import Session, plans
+from r2s2r_cli.stages.record import Session, plans, run_layout
 from r2s2r_cli.stages.segments import segments, target_intervals
 from schemas.config import RecordSettings
 from schemas.policy import PolicyFile
@@ -171,6 +171,28 @@ def test_repeats_take_turns_and_have_names_of_their_own() -> None:
     assert [run.run for run in session.runs] == ["a-1", "b-1", "a-2", "b-2", "a-3", "b-3"]
     assert all(rows.column(f"runs/{run.run}/commands", "t")[0] < 0.1 for run in session.runs)
     assert session.report().not_begun == ()
+
+
+@pytest.mark.parametrize(("watchdog", "guaranteed"), [(0.25, True), (5.0, False), (0.0, False), (None, False)])
+def test_a_recording_says_whether_the_robot_stops_by_itself(watchdog: float | None, guaranteed: bool) -> None:
+    """As the robot says of its watchdog: in the report, in the layout of the file, and where a run was cut off."""
+
+    def die(number: int, sample: Sample) -> Sample:
+        if number == 40:
+            raise LinkError("the port is gone", where="fake", hint="plug it in")
+        return sample
+
+    robot = calibrated()
+    link = FakeLink(robot, on_read=die)
+    link.facts = dataclasses.replace(link.facts, watchdog=watchdog)
+    session = Session(plans([policy(robot, 0.2)], repeats=1, rest=0.0), robot, link, RecordSettings())
+    with pytest.raises(LinkError):
+        session.record(Rows())
+    assert session.report().stops_by_itself == guaranteed
+    assert ("cannot guarantee" in session.runs[0].warnings[0]) != guaranteed
+    streams = run_layout(session.plans[0], robot, link.facts, None)
+    (told,) = [one.attributes["stops_by_itself"] for one in streams if one.path.endswith("/link")]
+    assert told == guaranteed
 
 
 @pytest.mark.parametrize("after", [1, 40, 90])

@@ -67,6 +67,7 @@ class RunLoop:
         """By target that was given up: which cables were not there, and what they lacked."""
         self._lengths, self._pid, self._robot = Lengths.of(robot), WirePid.of(robot), robot
         self.winched = list(robot.actuated)
+        self._driving = np.isin(self._lengths.cable, self.winched)
         self._interval = OpenInterval()
         self._encoder = np.full(len(self.winched), np.nan)
         self._voltage = float("nan")
@@ -125,7 +126,8 @@ class RunLoop:
             self._next_look = t + LOOK_S
 
     def _control(self, t: float, sample: Sample, pictures: Pictures | None) -> None:
-        if not sample.complete:  # a sensor has never been heard: nothing to act on yet
+        # Nothing to act on yet where one of them was never heard; a dead sensor of a passive cable holds up nothing.
+        if not np.isfinite(sample.t_sensor[self._driving]).all():
             self.link.command(np.zeros(len(self.winched)))
             return
         target = self._sequence.target[self.steps.index]

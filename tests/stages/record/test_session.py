@@ -346,6 +346,28 @@ def test_nothing_is_commanded_before_every_sensor_was_heard() -> None:
     assert rows.column("runs/gait/commands", "t")[0] > 0.04
 
 
+def test_a_dead_sensor_of_a_passive_cable_holds_up_nothing() -> None:
+    """Never heard: the run is the one with all sensors, and it is said which one was missing. One of a winched cable
+    lets no motor move."""
+    robot = calibrated()
+    passive = next(i for i, sensor in enumerate(robot.sensors) if sensor.cable not in robot.actuated)
+
+    def dead(number: int, sample: Sample) -> Sample:
+        lost = np.arange(len(robot.sensors)) == passive
+        return dataclasses.replace(
+            sample, fresh=sample.fresh & ~lost, t_sensor=np.where(lost, np.nan, sample.t_sensor),
+            capacitance=np.where(lost, np.nan, sample.capacitance),
+        )  # fmt: skip
+
+    link, whole = FakeLink(robot, on_read=dead), FakeLink(robot)
+    session, _ = recorded(link, policy(robot, 0.2))
+    recorded(whole, policy(robot, 0.2))
+    assert np.array_equal(link.commands, whole.commands)
+    run = session.runs[0]
+    assert run.complete and run.targets_done == 3
+    assert run.warnings == (f"sensors without a reading: {passive} (100%) of the control ticks",)
+
+
 def test_an_uncalibrated_robot_is_refused() -> None:
     """Without the line of a winched cable's sensor there is no length to control."""
     robot = subject().robot

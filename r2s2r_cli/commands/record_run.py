@@ -160,9 +160,12 @@ def _streams(wish: Wish, link: LinkFacts, camera: CameraFacts | None) -> list[An
 
 
 def _groups(wish: Wish, link: LinkFacts) -> dict[str, Mapping[str, Any]]:
+    from r2s2r_cli.rig.wire.checked import FIRMWARE
     from r2s2r_cli.stages.record import place_of, run_attributes
 
-    rig = wish.simulated or link.lock_step or _RIG in link.device.lower() or (wish.camera or "").startswith("rig:")
+    # By the whole name: any firmware may have "rig" in it, as `original-2.1` does.
+    ours = link.device.startswith(FIRMWARE)
+    rig = wish.simulated or link.lock_step or ours or (wish.camera or "").startswith("rig:")
     source = f"{wish.robot.name} at {place_of(link)}, protocol {link.protocol}"
     return {
         f"runs/{plan.name}": run_attributes(

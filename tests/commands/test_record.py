@@ -96,6 +96,16 @@ def test_a_sensor_is_judged_by_the_messages_of_its_board(robot_project: Path, li
     assert [(one["check"], one["what"]) for one in found if one["check"] != "sensors_move"] == expected
 
 
+@pytest.mark.parametrize(("firmware", "origin"), [("original-2.1", "robot"), ("", "robot"), ("r2s2r-rig", "rig")])
+def test_a_rig_is_known_by_its_firmware(robot_project: Path, link: Maker, firmware: str, origin: str) -> None:
+    """By its whole name: a real robot whose firmware has "rig" in it is none."""
+    made = link()
+    made.facts = dataclasses.replace(made.facts, device=firmware)
+    document(*ASK, "--no-draw")
+    _, data = read_artifact(robot_project / RECORDING, "recording")
+    assert data.groups["runs/random-0"].attributes["origin"] == origin
+
+
 def test_a_recording_does_not_go_stale(robot_project: Path, link: Maker) -> None:
     """Other settings and another robot.toml later: what the robot did stays what it did."""
     link()

@@ -20,8 +20,8 @@ def policy_of(data: ArtifactData, run: str, repeats: int = 0) -> str:
 
 
 def asked_repeats(settings: Mapping[str, Any]) -> int:
-    """How often each policy was to be run, by the settings in a recording's provenance; 0: they do not say."""
-    told = settings.get("repeats")
+    """How often each policy was to be run, by the flags in a recording's provenance; 0: they do not say."""
+    told = settings.get("flags", {}).get("repeats")
     return told if isinstance(told, int) else 0
 
 

@@ -16,6 +16,7 @@ import pytest
 from r2s2r_cli.commands import record_run
 from r2s2r_cli.commands.status import survey
 from r2s2r_cli.devices.link import LinkError, Sample
+from r2s2r_cli.stages.repeated import asked_repeats, policy_of
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.read import read_artifact
@@ -180,6 +181,21 @@ def test_ctrl_c_seals_what_there_is(robot_project: Path, link: Maker) -> None:
     (line,) = survey(Project.find(robot_project)).artifacts
     assert line.state == "fresh" and line.notes[0].endswith(": interrupted")
     assert "ended at target" in invoke("status").stdout
+
+
+def test_the_first_of_several_repeats_is_a_run_of_its_policy(robot_project: Path, link: Maker) -> None:
+    """Interrupted in it: the file knows how many there were to be."""
+
+    def interrupt(number: int, sample: Sample) -> Sample:
+        if number == 40:
+            raise KeyboardInterrupt
+        return sample
+
+    link(on_read=interrupt)
+    assert invoke(*ASK, "--no-draw", "--repeats", "3").exit_code == 130
+    header, data = read_artifact(robot_project / RECORDING, "recording")
+    repeats = asked_repeats(header.provenance.settings)
+    assert [policy_of(data, run, repeats) for run in data.runs()] == ["random-0"] and repeats == 3
 
 
 def test_a_stuck_sensor_stops_the_robot(robot_project: Path, link: Maker) -> None:

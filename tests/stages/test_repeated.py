@@ -37,5 +37,5 @@ def test_interrupted_repeats_keep_their_policy() -> None:
     data = recorded(a_1=1, b_1=1, a_2=2)
     assert [policy_of(data, run) for run in data.runs()] == ["a", "b", "a"]
     data = recorded(a_1=1, b_1=1)
-    assert [policy_of(data, run, asked_repeats({"repeats": 2})) for run in data.runs()] == ["a", "b"]
-    assert asked_repeats({"repeats": None}) == asked_repeats({}) == 0
+    assert [policy_of(data, run, asked_repeats({"flags": {"repeats": 2}})) for run in data.runs()] == ["a", "b"]
+    assert asked_repeats({"flags": {"repeats": None}}) == asked_repeats({}) == 0

@@ -59,7 +59,7 @@ class Wish:
 def carry_out(wish: Wish, console: Console) -> None:
     """Record, seal, draw, report. Raises HardwareError or Interrupted after what there is was sealed."""
     from r2s2r_cli.hardware.signals import interrupting_signals
-    from r2s2r_cli.stages.record import Session
+    from r2s2r_cli.stages.record import Session, as_run
     from r2s2r_cli.store.lock import writing
 
     recording = wish.recording()
@@ -71,7 +71,7 @@ def carry_out(wish: Wish, console: Console) -> None:
             with ExitStack() as stack:
                 feed, facts = _camera(wish.camera, stack)
                 link = stack.enter_context(_guarded(wish, dry_run=False))
-                live = Live([len(plan.policy.steps) * plan.policy.repeat + 2 for plan in wish.runs])
+                live = Live([len(as_run(plan, wish.robot).target) for plan in wish.runs])
                 session = Session(
                     wish.runs, wish.robot, link, wish.settings, feed=feed, wall_clock=time.time, watch=live.watch,
                     begin=lambda: link.restart(time_limit=wish.settings.time_limit_s),

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
@@ -90,7 +91,11 @@ class GuardedLink:
     def __enter__(self) -> Self:
         """Connect; the time limit begins."""
         self.inner.__enter__()
-        self.restart()
+        try:
+            self.restart()
+        except BaseException:  # nobody leaves a context that was not entered
+            self.inner.__exit__(*sys.exc_info())
+            raise
         return self
 
     def __exit__(

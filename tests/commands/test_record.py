@@ -6,7 +6,7 @@ import dataclasses
 import json
 import re
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.commands import record_run
+from r2s2r_cli.commands.record_live import Live
 from r2s2r_cli.commands.status import survey
 from r2s2r_cli.devices.link import LinkError, Sample
 from r2s2r_cli.stages.repeated import asked_repeats, policy_of
@@ -254,6 +255,27 @@ def test_a_policy_file_is_run_as_it_stands(robot_project: Path, link: Maker) -> 
     (robot_project / "other.toml").write_text(text.format([0.4]).replace("threebar", "sixbar"))
     refused = invoke("record", "other.toml", "--port", "fake")
     assert refused.exit_code == 4 and "another robot" in refused.stderr
+
+
+@pytest.mark.parametrize(("ends", "rest", "targets"), [(1.0, 0.2, 3), (0.5, 0.2, 5), (1.0, 0.0, 3)])
+def test_the_time_left_counts_the_targets_that_are_run(
+    robot_project: Path, link: Maker, monkeypatch: pytest.MonkeyPatch, ends: float, rest: float, targets: int
+) -> None:
+    """The rest shapes that are run, whether the policy has them, the recording adds them, or nobody."""
+    link()
+    counts: list[list[int]] = []
+
+    class Noted(Live):
+        def __init__(self, targets: Sequence[int]) -> None:
+            counts.append(list(targets))
+            super().__init__(targets)
+
+    monkeypatch.setattr(record_run, "Live", Noted)
+    text = 'schema_version = 1\nrobot = "threebar"\nname = "bend"\n'
+    text += "".join(f"[[steps]]\ntarget = {[one] * 6}\n" for one in (ends, 0.4, ends))
+    (robot_project / "bend.toml").write_text(text)
+    made = document("record", "bend.toml", "--port", "fake", "--no-draw", "--set", f"record.rest_s={rest}")
+    assert counts == [[targets]] and made["report"]["runs"][0]["targets"] == targets
 
 
 def test_an_uncalibrated_robot_is_refused_before_it_moves(

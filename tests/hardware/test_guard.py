@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.devices.lengths import NOT_INITIALISED
-from r2s2r_cli.devices.link import LinkFacts, LinkState, LinkStatistics, RobotLink, SafetyStop, Sample
+from r2s2r_cli.devices.link import LinkError, LinkFacts, LinkState, LinkStatistics, RobotLink, SafetyStop, Sample
 from r2s2r_cli.errors import ExitCode
 from r2s2r_cli.hardware.guard import GuardedLink
 from r2s2r_cli.hardware.signals import ENDING, interrupting_signals
@@ -239,6 +239,19 @@ def test_a_stop_that_comes_twice_interrupts_once(first: signal.Signals) -> None:
             os.kill(os.getpid(), number)
         signals.standing()
         os.kill(os.getpid(), signal.SIGTERM)
+
+
+def test_a_link_that_dies_while_it_is_entered_is_closed() -> None:
+    """The port is open then, and the robot there: it is told to stop."""
+
+    class Dying(Clockwork):
+        def read(self, timeout: float) -> Sample | None:
+            raise LinkError("gone", where="fake", hint="plug it in")
+
+    inner = Dying()
+    with pytest.raises(LinkError), GuardedLink(inner, calibrated()):
+        pytest.fail("it was entered")
+    assert inner.said == [(0.0, "stop")]
 
 
 def test_files_are_written_to_their_end() -> None:

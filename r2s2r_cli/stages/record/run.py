@@ -13,10 +13,9 @@ from r2s2r_cli.devices.link import LinkStatistics, RobotLink, Sample
 from r2s2r_cli.devices.pid import WirePid, WireSteps, ticks
 from r2s2r_cli.stages.record.camera import Pictures
 from r2s2r_cli.stages.record.intervals import OpenInterval
-from r2s2r_cli.stages.record.plan import RunPlan, with_rest
+from r2s2r_cli.stages.record.plan import RunPlan, as_run
 from r2s2r_cli.stages.record.tally import Tally
 from r2s2r_cli.stages.record.writer import Writer
-from r2s2r_cli.stages.simulate.policies import sequence
 from schemas.robot import Robot
 
 READ_S = 0.05
@@ -58,8 +57,8 @@ class RunLoop:
     def __init__(self, plan: RunPlan, robot: Robot, link: RobotLink, writer: Writer, watch: Watch) -> None:
         """Raises InputError where the policy is for another robot, or an actuated cable has no calibrated sensor."""
         self.plan, self.link, self._writer, self._watch = plan, link, writer, watch
-        timeout, period = robot.pid.step_timeout_s, 1.0 / robot.pid.rate_hz
-        self._sequence = with_rest(sequence(plan.policy, robot), rest=plan.rest, timeout=timeout)
+        period = 1.0 / robot.pid.rate_hz
+        self._sequence = as_run(plan, robot)
         self.targets = len(self._sequence.target)
         self.steps = WireSteps(ticks(self._sequence.hold, period), ticks(self._sequence.timeout, period))
         self.timed_out: list[int] = []

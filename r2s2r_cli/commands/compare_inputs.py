@@ -104,17 +104,18 @@ class Asked:
         """The real runs, those of this iteration first, and why others are left out. Raises ArtifactError, and
         InputError where this iteration has none."""
         from r2s2r_cli.stages.compare import real_runs
+        from r2s2r_cli.stages.repeated import asked_repeats
         from r2s2r_cli.store.read import read_artifact
 
         found: list[RealRun] = []
         said: list[str] = []
         for place in self.places:
             path = self.recording(place)
-            recording = read_artifact(path, "recording")[1] if path.exists() else None
+            header, recording = read_artifact(path, "recording") if path.exists() else (None, None)
             try:
                 runs, left_out = real_runs(
                     self._states[place.number], recording, self.project.robot(), iteration=place.number,
-                    prefix=self.prefix(place),
+                    prefix=self.prefix(place), repeats=asked_repeats(header.provenance.settings) if header else 0,
                 )  # fmt: skip
             except InputError as error:
                 if place == self.iteration:

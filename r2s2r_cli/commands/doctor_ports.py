@@ -106,7 +106,7 @@ def _robot(robot: Robot, health: LinkHealth) -> Iterator[Probe]:
     version = f" {facts.version}" if facts.version else ""
     device = f", {facts.robot}, firmware {facts.device}" if facts.device else ""
     yield Probe(name="protocol", state="ok", found=f"{facts.protocol}{version}{device}")
-    yield Probe(name="watchdog", state="ok" if facts.watchdog else "warning",
+    yield Probe(name="watchdog", state="ok" if facts.stops_by_itself else "warning",
                 found=f"{facts.watchdog * 1e3:.0f} ms" if facts.watchdog else "none")  # fmt: skip
     for remark in facts.remarks:
         yield Probe(name="remark", state="warning", found=remark)

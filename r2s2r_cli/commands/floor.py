@@ -119,7 +119,7 @@ def _runs(project: Project, places: Sequence[Iteration]) -> tuple[list[SeenRun],
     """Runs with caps, runs with sensors, and the policy of each by name. Recorded runs are called NUMBER:RUN, executed
     ones too unless that is taken; the same name of a policy means another one in the plan of another iteration."""
     from r2s2r_cli.stages.floor import seen_run, sensed_run
-    from r2s2r_cli.stages.repeated import policy_of
+    from r2s2r_cli.stages.repeated import asked_repeats, policy_of
     from r2s2r_cli.store.read import read_artifact
 
     robot = project.robot()
@@ -127,7 +127,7 @@ def _runs(project: Project, places: Sequence[Iteration]) -> tuple[list[SeenRun],
     sensed: list[SensedRun] = []
     policies: dict[str, str] = {}
     for place, source, states, executed in ((one, *pair) for one in places for pair in _sources(one)):
-        recording = read_artifact(source, "recording")[1] if source.exists() else None
+        header, recording = read_artifact(source, "recording") if source.exists() else (None, None)
         estimate = read_artifact(states, "estimate")[1] if states.exists() else None
         taken = {*policies, *(one.name for one in seen)}
 
@@ -137,10 +137,11 @@ def _runs(project: Project, places: Sequence[Iteration]) -> tuple[list[SeenRun],
         for run in estimate.runs() if estimate is not None else ():
             one = seen_run(called(run), estimate, recording, run) if estimate is not None else None
             seen += [one] if one is not None else []
-        if recording is None:
+        if header is None or recording is None:
             continue
+        repeats = asked_repeats(header.provenance.settings)
         for run in recording.runs():
-            policy = policy_of(recording, run)
+            policy = policy_of(recording, run, repeats)
             policies[called(run)] = f"{place.number}:{policy}" if executed else policy
             other = sensed_run(called(run), recording, run, robot)
             sensed += [other] if other is not None else []

@@ -68,20 +68,19 @@ def tell_of_no_camera(wish: Wish, console: Console) -> None:
 def carry_out(wish: Wish, console: Console) -> None:
     """Record, seal, draw, report. Raises HardwareError or Interrupted after what there is was sealed."""
     from r2s2r_cli.hardware.signals import interrupting_signals
-    from r2s2r_cli.stages.record import Session
+    from r2s2r_cli.stages.record import Session, as_run
     from r2s2r_cli.store.lock import writing
 
     recording = wish.recording()
     recording.require_room(force=wish.force)
-    with writing(wish.project.root, wish.stage):
+    with writing(wish.project.root, wish.stage), interrupting_signals() as signals:
         ended: BaseException | None = None
         session: Session | None = None
         try:
             with ExitStack() as stack:
-                stack.enter_context(interrupting_signals())
                 feed, facts = _camera(wish.camera, stack)
                 link = stack.enter_context(_guarded(wish, dry_run=False))
-                live = Live([len(plan.policy.steps) * plan.policy.repeat + 2 for plan in wish.runs])
+                live = Live([len(as_run(plan, wish.robot).target) for plan in wish.runs])
                 session = Session(
                     wish.runs, wish.robot, link, wish.settings, feed=feed, wall_clock=time.time, watch=live.watch,
                     begin=lambda: link.restart(time_limit=wish.settings.time_limit_s),
@@ -99,6 +98,7 @@ def carry_out(wish: Wish, console: Console) -> None:
                 raise
             ended = error
         assert session is not None  # noqa: S101 - an error without a session was raised above
+        signals.standing()
         result = _seal(wish, recording, session, console)
     _finish(wish, session.report(), result, ended, console)
 
@@ -169,9 +169,12 @@ def _streams(wish: Wish, link: LinkFacts, camera: CameraFacts | None) -> list[An
 
 
 def _groups(wish: Wish, link: LinkFacts) -> dict[str, Mapping[str, Any]]:
+    from r2s2r_cli.rig.wire.checked import FIRMWARE
     from r2s2r_cli.stages.record import place_of, run_attributes
 
-    rig = wish.simulated or link.lock_step or _RIG in link.device.lower() or (wish.camera or "").startswith("rig:")
+    # By the whole name: any firmware may have "rig" in it, as `original-2.1` does.
+    ours = link.device.startswith(FIRMWARE)
+    rig = wish.simulated or link.lock_step or ours or (wish.camera or "").startswith("rig:")
     source = f"{wish.robot.name} at {place_of(link)}, protocol {link.protocol}"
     return {
         f"runs/{plan.name}": run_attributes(

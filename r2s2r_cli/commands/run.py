@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shlex
 import signal
-import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from typing import Annotated
 import typer
 
 from r2s2r_cli.commands.robot_link import PortOption, ProtocolOption, link_of
+from r2s2r_cli.commands.run_child import STOPPED, ended
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ExitCode, Interrupted, R2S2RError, UsageError
 from r2s2r_cli.options import DrawOption, DryRunOption, IterationOption, ProjectOption, QuietOption
@@ -22,10 +22,6 @@ from r2s2r_cli.store.project import Iteration, Project
 
 STAGES = ("record", "estimate", "identify", "plan", "execute", "estimate-executed", "compare")
 """In their order; `import` takes the place of `record` where logs are given."""
-
-
-_STOPPED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Signals by which somebody stops a command; a child that another one ended has failed."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +110,7 @@ def run(
         console.say(f"[{number}/{len(steps)}] {shlex.join(words)}")
         if dry_run:
             continue
-        _carry_out((*step.words, *common, *_resumed(step)), shlex.join(words))
+        _carry_out((*step.words, *common, *_resumed(step)), shlex.join(words), robot=step.robot)
         _gate(place, step)
     if dry_run:
         console.say("nothing was done")
@@ -213,21 +209,17 @@ def _resumed(step: Step) -> tuple[str, ...]:
     return ("--resume",) if step.name in ("identify", "plan") and checkpoint_of(step.target).exists() else ()
 
 
-def _carry_out(words: Sequence[str], shown: str) -> None:
-    """One command in a process of its own, so that its memory is given back; its words are ours. Leaves with its code
-    where it fails."""
-    with subprocess.Popen([sys.executable, "-m", "r2s2r_cli", *words]) as child:
-        try:
-            code = child.wait()
-        except KeyboardInterrupt:
-            code = child.wait()  # it had the same signal, and stops what it does in its own way
-    if code < 0 and -code not in _STOPPED:
+def _carry_out(words: Sequence[str], shown: str, *, robot: bool = False) -> None:
+    """One command in a process of its own; its words are ours. Leaves with its code where it fails."""
+    code, stopped = ended(words, robot=robot)
+    if code < 0 and -code not in STOPPED:
         raise R2S2RError(
             f"the system ended the process of: {shown}", where="r2s2r run", expected="a stage that ends by itself",
             received=f"signal {-code}" + "; most often there was too little memory" * (code == -signal.SIGKILL),
             hint=shlex.join(["r2s2r", *sys.argv[1:]]),
         )  # fmt: skip
-    if code == ExitCode.INTERRUPTED or code < 0:
+    # Stopped in its last moment it is done all the same; the next one is not begun.
+    if code == ExitCode.INTERRUPTED or code < 0 or (stopped and code == ExitCode.DONE):
         raise Interrupted(f"stopped in: {shown}", hint=shlex.join(["r2s2r", *sys.argv[1:]]))
     if code != ExitCode.DONE:
         raise typer.Exit(code)

@@ -39,6 +39,10 @@ ROBOT_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
 """Which part of robot.toml each stage uses; a change elsewhere does not make its results stale."""
 
 
+SHARED = {"compare": ("step_s", "frame_rate_hz", "rod_contact")}
+"""Of every stage the settings of `simulate` that it uses."""
+
+
 def robot_part(stage: str, robot: Robot) -> dict[str, Any]:
     """The part of the robot description that `stage` uses, as JSON values."""
     everything = robot.model_dump(mode="json")
@@ -55,10 +59,19 @@ def wanted(
     """What `stage` would use if it ran now. Raises InputError or UsageError for wrong settings."""
     config = project.config(iteration, overrides).model_dump(mode="json", by_alias=True)
     settings = {**config.get(stage, {}), "flags": dict(flags)}
+    settings |= _shared(stage, config["simulate"])
     own = installed_words() if stage == "diagnose" else ""
     if own:  # it looks for them beside the catalogue's
         settings["installed_effects"] = own
     return Wanted(STAGE_VERSIONS.get(stage, 1), settings, robot_part(stage, project.robot()))
+
+
+def _shared(stage: str, simulate: Mapping[str, Any]) -> dict[str, Any]:
+    """Those that are not the default: what was made with the defaults, or before they were noted, stays fresh."""
+    from schemas.config import SimulateSettings
+
+    usual = SimulateSettings().model_dump(mode="json", by_alias=True)
+    return {f"simulate.{name}": simulate[name] for name in SHARED.get(stage, ()) if simulate[name] != usual[name]}
 
 
 def wanted_again(project: Project, iteration: Iteration | None, made: Provenance) -> Wanted:

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from types import TracebackType
 
 
+WATCHDOG_S = 0.25
+"""Longest watchdog of a device of which it is said that it stops by itself [s]: what our protocol promises."""
+
+
 class LinkState(Enum):
     """Where a link is in its life: closed -> connecting -> handshake -> running -> lost -> connecting ... -> closed."""
 
@@ -116,9 +120,9 @@ class LinkFacts:
     """What the handshake told, and what the protocol promises.
 
     port: as the user gave it. protocol: checked | boards | legacy. version, device, robot: as the device says, "" where
-    it does not. watchdog: seconds after which the device stops by itself, None: it never does, so a stop cannot be
-    guaranteed once the link is gone. lock_step: the device waits for us, time is the device's. sensors, motors: how
-    many the protocol carries.
+    it does not. watchdog: seconds after which the device stops by itself, as it says or its protocol promises; None or
+    0: it never does, so a stop cannot be guaranteed once the link is gone. lock_step: the device waits for us, time is
+    the device's. sensors, motors: how many the protocol carries.
     """
 
     port: str
@@ -131,6 +135,11 @@ class LinkFacts:
     sensors: int = 0
     motors: int = 0
     remarks: tuple[str, ...] = field(default=())
+
+    @property
+    def stops_by_itself(self) -> bool:
+        """Whether the device does, in time: a watchdog of five seconds lets the motors tear the cables."""
+        return self.watchdog is not None and 0 < self.watchdog <= WATCHDOG_S
 
 
 @runtime_checkable

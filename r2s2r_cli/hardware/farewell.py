@@ -38,13 +38,14 @@ def rescue(link: Link) -> str:
     """Say stop on the old connection or on a new one; what can be said of the motors then."""
     link.stop()
     end = time.monotonic() + RESCUE
-    if link.codec.watchdog is not None:
-        return f"the robot stops by itself after {link.codec.watchdog * 1e3:g} ms"
+    facts = link.facts
+    if facts.watchdog is not None and facts.stops_by_itself:
+        return f"the robot stops by itself after {facts.watchdog * 1e3:g} ms"
     while True:
         try:
             link.transport.open()
             link.send(link.codec.stop())
-            return "a stop was sent on a new connection, which this protocol does not confirm"
+            return "a stop was sent on a new connection, and nothing confirms it"
         except LinkError:
             if time.monotonic() >= end:
                 return "A STOP COULD NOT BE SENT: SWITCH THE ROBOT OFF"

@@ -9,14 +9,16 @@ not: the motors are off while a sensor is in doubt (`Sample.doubt`), and go on w
 | impossible sensors | a winched cable's sensor sends 0.20 pF (its chip is not set up) for 200 ms |
 | frozen sensor | not one change in 0.18 s in which its motor was driven: held; none in 0.8 s: stopped |
 | length out of range | outside the limits of robot.toml by more than 20 mm, three messages in a row |
+| slow host | readings wait for longer than 200 ms, or never end to wait for 1 s, after a single pause (`pace.py`) |
 | time limit | the run takes longer than it was given |
-| exit, exception, SIGINT, SIGTERM | leaving the context; `signals.py` turns both signals into exceptions |
+| exit, exception, a signal | leaving the context; `signals.py` turns signals into exceptions |
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
@@ -25,6 +27,7 @@ import numpy as np
 
 from r2s2r_cli.devices.lengths import Lengths
 from r2s2r_cli.devices.link import LinkFacts, LinkState, LinkStatistics, RobotLink, SafetyStop, Sample
+from r2s2r_cli.hardware.pace import Pace
 from r2s2r_cli.hardware.watch import STALE, Watch
 
 if TYPE_CHECKING:
@@ -57,6 +60,7 @@ class GuardedLink:
         self.dry_run = dry_run
         self.time_limit = time_limit
         self._watch = Watch(robot, Lengths.of(robot) if calibrated else None)
+        self._pace = Pace(1 / robot.pid.rate_hz)
         self._reason = ""
         self._start = self._heard = self._wall = -math.inf
         self._moving = np.zeros(len(robot.actuated))
@@ -87,7 +91,11 @@ class GuardedLink:
     def __enter__(self) -> Self:
         """Connect; the time limit begins."""
         self.inner.__enter__()
-        self.restart()
+        try:
+            self.restart()
+        except BaseException:  # nobody leaves a context that was not entered
+            self.inner.__exit__(*sys.exc_info())
+            raise
         return self
 
     def __exit__(
@@ -109,6 +117,7 @@ class GuardedLink:
         self._start = self._heard = self.now()
         self._wall = time.monotonic()
         self._watch.restart(self._start)
+        self._pace.restart(self._start)
         self._next, self._judged, self._held = None, self._start, ""
         self._looked = self._start
 
@@ -117,6 +126,7 @@ class GuardedLink:
         self.inner.reconnect(timeout)
         self._heard, self._wall = self.now(), time.monotonic()
         self._watch.restart(self._heard)
+        self._pace.restart(self._heard)
         self._next, self._judged, self._held = None, self._heard, ""
         self._looked = self._heard
 
@@ -132,6 +142,7 @@ class GuardedLink:
             sample, self._next = self._next or self.inner.read(max(0.0, min(left, LOOK))), None
             if sample is not None:
                 self._heard, self._wall = self.now(), time.monotonic()
+                self._pace.sample(sample)
                 self._object(self._watch.sample(sample, self._moving))
                 sample = self._hold(sample)
             self._object(self._clock())
@@ -178,8 +189,9 @@ class GuardedLink:
         if now - self._start > self.time_limit:
             return f"time limit: the run has taken {self.time_limit:g} s"
         self._next = self._next or self.inner.read(0.0)
+        late = self._pace.look(now, waits=self._next is not None)
         if self._next is not None and now - self._judged < HELD_UP:
-            return ""
+            return late
         self._judged = now
         silent = now - self._heard
         if silent > STALE:
@@ -188,7 +200,7 @@ class GuardedLink:
             return f"stale sensors: nothing came for {SILENT:g} s"
         reason = self._watch.stale(now)
         if not reason.startswith("stale"):
-            return reason
+            return reason or late
         return f"{reason}, the last message of any board {silent * 1e3:.0f} ms ago{self._excuse(now)}"
 
     def _excuse(self, now: float) -> str:

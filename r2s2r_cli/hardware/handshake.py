@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from r2s2r_cli.devices.link import LinkError, LinkFacts, SafetyStop
+from r2s2r_cli.devices.link import WATCHDOG_S, LinkError, LinkFacts, SafetyStop
 from r2s2r_cli.hardware.codec import PROTOCOLS
 from r2s2r_cli.hardware.codec.base import Ack, Beat, Corrupt, DeviceState, Event, Greeting, LockStep, Reading, Status
 from r2s2r_cli.hardware.codec.checked import VERSION
@@ -160,12 +161,19 @@ def facts(link: Link) -> LinkFacts:
     name = re.sub(r"[^A-Za-z0-9_.-]", "_", link.robot.name)
     if greeting is not None and greeting.robot != name:
         remarks.append(f"the robot calls itself {greeting.robot}, robot.toml is of {link.robot.name}")
-    return LinkFacts(
+    told = greeting.watchdog if greeting is not None else link.codec.watchdog
+    found = LinkFacts(
         port=link.transport.name, protocol=link.codec.name, version=str(greeting.version) if greeting else "",
         device=greeting.firmware if greeting else "", robot=greeting.robot if greeting else "",
-        watchdog=greeting.watchdog if greeting else link.codec.watchdog, lock_step=link.lock_step is not None,
-        sensors=len(link.robot.sensors), motors=len(link.robot.motors), remarks=tuple(remarks),
+        watchdog=told, lock_step=link.lock_step is not None,
+        sensors=len(link.robot.sensors), motors=len(link.robot.motors),
     )  # fmt: skip
+    if told is not None and not found.stops_by_itself:
+        remarks.append(
+            f"the robot's watchdog is {f'{told * 1e3:g} ms, more than {WATCHDOG_S * 1e3:g} ms' if told else 'off'}: "
+            "this host cannot guarantee a stop"
+        )
+    return replace(found, remarks=tuple(remarks))
 
 
 def unlatch(link: Link) -> None:

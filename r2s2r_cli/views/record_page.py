@@ -43,7 +43,7 @@ def plan_table(runs: Sequence[Planned], robot: Robot) -> PageTable:
 
 def look_tables(facts: Any, statistics: Any, sample: Any, robot: Robot) -> list[PageTable]:
     """A link and its sensors, from a look at the robot (`devices.link`: LinkFacts, LinkStatistics, Sample or None)."""
-    stop = "the device, by itself" if facts.watchdog is not None else "the host alone: it cannot be guaranteed"
+    stop = "the device, by itself" if facts.stops_by_itself else "the host alone: it cannot be guaranteed"
     rows = [
         ("port", facts.port), ("protocol", facts.protocol), ("robot", facts.robot or "does not say"),
         ("stopped by", stop), ("samples", f"{statistics.received} received, {statistics.corrupt} corrupt"),

@@ -6,7 +6,7 @@ import dataclasses
 import json
 import re
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.commands import record_run
+from r2s2r_cli.commands.record_live import Live
 from r2s2r_cli.commands.status import survey
 from r2s2r_cli.console import Console
 from r2s2r_cli.devices.link import LinkError, Sample
+from r2s2r_cli.stages.repeated import asked_repeats, policy_of
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.read import read_artifact
@@ -108,6 +110,16 @@ def test_a_sensor_is_judged_by_the_messages_of_its_board(robot_project: Path, li
     assert [(one["check"], one["what"]) for one in found if one["check"] != "sensors_move"] == expected
 
 
+@pytest.mark.parametrize(("firmware", "origin"), [("original-2.1", "robot"), ("", "robot"), ("r2s2r-rig", "rig")])
+def test_a_rig_is_known_by_its_firmware(robot_project: Path, link: Maker, firmware: str, origin: str) -> None:
+    """By its whole name: a real robot whose firmware has "rig" in it is none."""
+    made = link()
+    made.facts = dataclasses.replace(made.facts, device=firmware)
+    document(*ASK, "--no-draw")
+    _, data = read_artifact(robot_project / RECORDING, "recording")
+    assert data.groups["runs/random-0"].attributes["origin"] == origin
+
+
 def test_a_recording_does_not_go_stale(robot_project: Path, link: Maker) -> None:
     """Other settings and another robot.toml later: what the robot did stays what it did."""
     link()
@@ -184,6 +196,21 @@ def test_ctrl_c_seals_what_there_is(robot_project: Path, link: Maker) -> None:
     assert "ended at target" in invoke("status").stdout
 
 
+def test_the_first_of_several_repeats_is_a_run_of_its_policy(robot_project: Path, link: Maker) -> None:
+    """Interrupted in it: the file knows how many there were to be."""
+
+    def interrupt(number: int, sample: Sample) -> Sample:
+        if number == 40:
+            raise KeyboardInterrupt
+        return sample
+
+    link(on_read=interrupt)
+    assert invoke(*ASK, "--no-draw", "--repeats", "3").exit_code == 130
+    header, data = read_artifact(robot_project / RECORDING, "recording")
+    repeats = asked_repeats(header.provenance.settings)
+    assert [policy_of(data, run, repeats) for run in data.runs()] == ["random-0"] and repeats == 3
+
+
 def test_a_stuck_sensor_stops_the_robot(robot_project: Path, link: Maker) -> None:
     """0.20 pF from the middle on: the duty of the host ends the run with exit code 5, within 250 ms of the run."""
 
@@ -254,6 +281,27 @@ def test_a_policy_file_is_run_as_it_stands(robot_project: Path, link: Maker) -> 
     (robot_project / "other.toml").write_text(text.format([0.4]).replace("threebar", "sixbar"))
     refused = invoke("record", "other.toml", "--port", "fake")
     assert refused.exit_code == 4 and "another robot" in refused.stderr
+
+
+@pytest.mark.parametrize(("ends", "rest", "targets"), [(1.0, 0.2, 3), (0.5, 0.2, 5), (1.0, 0.0, 3)])
+def test_the_time_left_counts_the_targets_that_are_run(
+    robot_project: Path, link: Maker, monkeypatch: pytest.MonkeyPatch, ends: float, rest: float, targets: int
+) -> None:
+    """The rest shapes that are run, whether the policy has them, the recording adds them, or nobody."""
+    link()
+    counts: list[list[int]] = []
+
+    class Noted(Live):
+        def __init__(self, targets: Sequence[int]) -> None:
+            counts.append(list(targets))
+            super().__init__(targets)
+
+    monkeypatch.setattr(record_run, "Live", Noted)
+    text = 'schema_version = 1\nrobot = "threebar"\nname = "bend"\n'
+    text += "".join(f"[[steps]]\ntarget = {[one] * 6}\n" for one in (ends, 0.4, ends))
+    (robot_project / "bend.toml").write_text(text)
+    made = document("record", "bend.toml", "--port", "fake", "--no-draw", "--set", f"record.rest_s={rest}")
+    assert counts == [[targets]] and made["report"]["runs"][0]["targets"] == targets
 
 
 def test_an_uncalibrated_robot_is_refused_before_it_moves(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 from pathlib import Path
 from typing import Any, ClassVar
@@ -20,6 +22,9 @@ class Child:
 
     calls: ClassVar[Calls] = []
     codes: ClassVar[dict[str, int]] = {}
+    signal: ClassVar[int] = 0
+    """That `run` gets while a child is at work."""
+    told: ClassVar[list[int]] = []
 
     def __init__(self, words: list[str]) -> None:
         Child.calls.append(words[3:])
@@ -31,13 +36,19 @@ class Child:
 
     def wait(self) -> int:
         """The code of this stage."""
+        if Child.signal:
+            os.kill(os.getpid(), Child.signal)
         return Child.codes.get(Child.calls[-1][0], 0)
+
+    def send_signal(self, number: int) -> None:
+        """Note it."""
+        Child.told.append(number)
 
 
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
     """The stages that were called, in order; none of them does anything."""
-    Child.calls, Child.codes = [], {}
+    Child.calls, Child.codes, Child.signal, Child.told = [], {}, 0, []
     monkeypatch.setattr(subprocess, "Popen", Child)
     return Child.calls
 
@@ -74,6 +85,35 @@ def test_a_robot_that_has_moved_is_not_moved_again(estimated: Path, calls: Calls
     assert result.exit_code == 0, result.stderr
     assert "not moved again" in result.stderr
     assert stages(Child.calls) == ["estimate", "identify", "plan"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP, signal.SIGINT])
+def test_whoever_stops_it_stops_the_robot(project: Path, calls: Calls, number: int) -> None:
+    """The process that drives the robot is told to end, whichever signal came, and is awaited; no stage follows."""
+    Child.signal = number
+    for code in (130, 0):
+        Child.codes = {"record": code}
+        before = signal.getsignal(number)
+        result = invoke("run", "--port", "socket://nowhere:1")
+        assert result.exit_code == 130 and "stopped in: r2s2r record" in result.stderr
+        assert stages(Child.calls) == ["record"] and signal.getsignal(number) == before
+        assert Child.told == [signal.SIGTERM, signal.SIGCONT]
+        Child.calls.clear(), Child.told.clear()
+
+
+def test_whoever_kills_it_kills_a_stage_that_computes(project: Path, calls: Calls) -> None:
+    """SIGTERM is passed on; what is ignored stays so: `nohup r2s2r run` outlives its terminal."""
+    Child.signal, Child.codes = signal.SIGTERM, {"import": -signal.SIGTERM}
+    assert invoke("run", "sample.csv", "--until", "estimate").exit_code == 130
+    assert stages(Child.calls) == ["import"] and Child.told[0] == signal.SIGTERM
+    Child.calls.clear(), Child.told.clear()
+    Child.signal, Child.codes = signal.SIGHUP, {}
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        assert invoke("run", "sample.csv", "--until", "estimate").exit_code == 0
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    assert Child.told == []
 
 
 CUT_OFF = {"runs": [{"run": "gait", "ended": "interrupted"}], "not_begun": ["gait-2"]}

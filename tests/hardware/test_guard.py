@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.devices.lengths import NOT_INITIALISED
-from r2s2r_cli.devices.link import LinkFacts, LinkState, LinkStatistics, RobotLink, SafetyStop, Sample
+from r2s2r_cli.devices.link import LinkError, LinkFacts, LinkState, LinkStatistics, RobotLink, SafetyStop, Sample
 from r2s2r_cli.errors import ExitCode
 from r2s2r_cli.hardware.guard import GuardedLink
-from r2s2r_cli.hardware.signals import interrupting_signals
+from r2s2r_cli.hardware.signals import ENDING, interrupting_signals
 from tests.support.wire_robot import OFFSET, SLOPE, calibrated
 
 TICK = 0.02
@@ -46,6 +46,10 @@ class Clockwork:
         if timeout <= 0:
             return None
         self.k += 1
+        return self.next()
+
+    def next(self) -> Sample | None:
+        """The message of this tick."""
         noisy = SLOPE * (self.length + self.draw.normal(0, 5e-4, 9)) + OFFSET
         value = self.wrong(self.k, np.round(noisy, 14))
         if value is None:
@@ -213,15 +217,51 @@ def test_a_dry_run_moves_nothing() -> None:
     assert len(speeds) > 100 and (speeds[:-1] == 0).all() and np.isnan(speeds[-1]).all()
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+@pytest.mark.parametrize("number", [*ENDING, signal.SIGINT], ids=lambda number: number.name)
 def test_polite_kills_leave_the_context(number: signal.Signals) -> None:
-    """SIGTERM, SIGHUP and SIGINT become an exception in the run; the motors are told to stop; handlers come back."""
+    """Each of them, Ctrl-Z and Ctrl-backslash too, becomes an exception in the run; the motors are told to stop;
+    handlers come back."""
     inner, before = Clockwork(), signal.getsignal(number)
     with pytest.raises(KeyboardInterrupt), interrupting_signals(), GuardedLink(inner, calibrated()) as link:
         link.command(np.ones(6))
         os.kill(os.getpid(), number)
         drive(link, 5.0)
     assert inner.said[-1][1] == "stop" and signal.getsignal(number) == before
+
+
+@pytest.mark.parametrize("first", [signal.SIGTERM, signal.SIGINT])
+def test_a_stop_that_comes_twice_interrupts_once(first: signal.Signals) -> None:
+    """A terminal, `timeout` and `r2s2r run` all pass a signal on: what ends the run is not interrupted by the rest."""
+    with interrupting_signals() as signals:
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), first)
+        for number in ENDING:
+            os.kill(os.getpid(), number)
+        signals.standing()
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+def test_a_link_that_dies_while_it_is_entered_is_closed() -> None:
+    """The port is open then, and the robot there: it is told to stop."""
+
+    class Dying(Clockwork):
+        def read(self, timeout: float) -> Sample | None:
+            raise LinkError("gone", where="fake", hint="plug it in")
+
+    inner = Dying()
+    with pytest.raises(LinkError), GuardedLink(inner, calibrated()):
+        pytest.fail("it was entered")
+    assert inner.said == [(0.0, "stop")]
+
+
+def test_files_are_written_to_their_end() -> None:
+    """A signal once the robot stands waits for the end of the context: no exception falls into the sealing."""
+    sealed = False
+    with pytest.raises(KeyboardInterrupt), interrupting_signals() as signals:
+        signals.standing()
+        os.kill(os.getpid(), signal.SIGTERM)
+        sealed = True
+    assert sealed
 
 
 def test_a_host_that_was_held_up_is_not_a_robot_that_fell_silent() -> None:

@@ -132,6 +132,24 @@ def test_a_dead_port_is_an_error_that_tells_of_the_motors_and_can_be_mended() ->
             link.command(np.zeros(6))
 
 
+@pytest.mark.parametrize(("ms", "said"), [(0, "watchdog is off"), (5000, "watchdog is 5000 ms")])
+def test_a_watchdog_is_what_the_robot_says_of_it(ms: int, said: str) -> None:
+    """None, or one that takes seconds: it does not stop by itself. It is remarked, and no dead link claims it."""
+    robot = FakeRobot()
+    robot.watchdog_ms = ms
+    with link_to(robot) as link:
+        assert not link.facts.stops_by_itself and said in link.facts.remarks[0]
+        link.command(np.ones(6))
+        robot.dead = True
+        with pytest.raises(LinkError) as caught:
+            link.read(1.0)
+        assert "SWITCH THE ROBOT OFF" in caught.value.received
+    robot = FakeRobot()
+    robot.watchdog_ms = 240
+    with link_to(robot) as link:
+        assert link.facts.stops_by_itself and link.facts.remarks == ()
+
+
 def test_without_a_watchdog_a_stop_is_said_on_a_new_connection() -> None:
     """The authors' robots keep their last command: the port is opened again for the stop, else: switch it off."""
 

@@ -39,7 +39,7 @@ class FakeRobot:
         self.robot = robot or calibrated()
         self.name = "/dev/fake"
         self.overlong = 0
-        self.lock_us = lock_us
+        self.lock_us, self.watchdog_ms = lock_us, 250
         self.lengths = np.full(9, 0.15)
         self.version, self.motors, self.calls = 1, 6, "threebar"
         self.deaf = self.mute = self.dead = self.latched = False
@@ -114,5 +114,5 @@ class FakeRobot:
             return self.say("T", self.k, self.k * self.lock_us)
         self.say("K", seq, code, self.seq * 1000)
         if kind == "H":
-            self.say("H", self.version, self.calls, "v2", 1, self.motors, 9, 250, self.state, self.lock_us)
+            self.say("H", self.version, self.calls, "v2", 1, self.motors, 9, self.watchdog_ms, self.state, self.lock_us)
         return None

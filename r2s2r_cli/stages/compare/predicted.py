@@ -49,6 +49,8 @@ def predicted(
     done: Callable[[], None] = lambda: None,
 ) -> tuple[PredictedRun, ...]:  # fmt: skip
     """Every run by one simulator. done: called after each. Raises InputError for a robot that cannot be simulated."""
+    # What comes after the last target is in no real run; it would lengthen the last simulated interval.
+    settings = settings.model_copy(update={"tail_s": 0.0})
     driver = Driver(model.numbers.robot, settings, cache_dir, model.numbers)
     found = []
     for run in runs:

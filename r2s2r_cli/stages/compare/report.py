@@ -146,8 +146,10 @@ def _model(
     fresh, fresh_others = ([row for row in side if row.run not in seen] for side in (own, others))
     mine = [one for one in compared if one.model is model and one.real.name not in flat]
     simulated = {one.real.name: one.predicted.walk for one in mine if one.predicted.walk is not None}
+    # Of a run that is compared in part the same part: the rest of it would be the simulator's fault.
+    real = {one.real.name: one.predicted.real for one in mine if one.predicted.real is not None}
     known = [one.real for one in mine if one.real.name in simulated]
-    ranks = ranking({run.name: run.walk for run in known}, simulated, policies_of(known))
+    ranks = ranking(real, simulated, policies_of(known))
     return CompareModel(
         model=model.name, words=model.numbers.words, runs=measures(own, others, floor),
         heldout=measures(fresh, fresh if model is first else fresh_others, floor),

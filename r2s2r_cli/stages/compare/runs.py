@@ -42,17 +42,25 @@ class RealRun:
 
 
 def real_runs(
-    estimate: ArtifactData, recording: ArtifactData | None, robot: Robot, *, iteration: int, prefix: str = ""
+    estimate: ArtifactData,
+    recording: ArtifactData | None,
+    robot: Robot,
+    *,
+    iteration: int,
+    prefix: str = "",
+    repeats: int = 0,
 ) -> tuple[tuple[RealRun, ...], tuple[str, ...]]:
     """The runs of an estimate that allow a comparison, and why others do not, in words.
 
-    prefix: before the names of runs and policies, where those of several iterations are compared.
+    prefix: before the names of runs and policies, where those of several iterations are compared. repeats: how often
+    each policy was to be run, 0: not known.
     Raises InputError where none does.
     """
     found, refused = [], []
     for run in estimate.runs():
         try:
-            found.append(_run(estimate, recording, run, robot, iteration, prefix))
+            called = prefix + run, prefix + policy_of(estimate, run, repeats)
+            found.append(_run(estimate, recording, run, robot, iteration, called))
         except InputError as error:
             refused.append(error)
     if not found and refused:
@@ -77,8 +85,11 @@ def cap_shares(robot: Robot) -> np.ndarray:
 
 
 def _run(
-    estimate: ArtifactData, recording: ArtifactData | None, run: str, robot: Robot, iteration: int, prefix: str
-) -> RealRun:
+    estimate: ArtifactData, recording: ArtifactData | None, run: str, robot: Robot, iteration: int,
+    called: tuple[str, str],
+) -> RealRun:  # fmt: skip
+    """called: the run and its policy."""
+    name, policy = called
     groups = dict(estimate.streams(run))
     told = str(groups[""].attributes.get("robot", robot.name))
     if told != robot.name:
@@ -102,10 +113,10 @@ def _run(
                          expected=f"every end cap at the {frame}", received=f"none of cap {int(np.argmin(known))}",
                          hint="r2s2r validate")  # fmt: skip
     return RealRun(
-        name=prefix + run, policy=prefix + policy_of(estimate, run), iteration=iteration,
+        name=name, policy=policy, iteration=iteration,
         intervals=len(groups["intervals"]["first"]) - opening.intervals, walk=walk,
         targets=policy_part(_targets(estimate, recording, run, intervals, robot), opening),
-        data=_data(estimate, recording, run, prefix + run), opening=opening,
+        data=_data(estimate, recording, run, name), opening=opening,
         fallen=not_at_rest(whole.p_WE, intervals, robot),
     )  # fmt: skip
 

@@ -94,7 +94,10 @@ def _used(*phases: Phases) -> tuple[str, ...]:
 
 
 def _complete(run: SeenRun) -> tuple[Step, ...]:
-    return steps_of(run, [i + 1 for i in range(len(run.intervals)) if run.intervals.complete[i]])
+    """Without the step after a target that was given up as well: it starts from another shape than its phase says."""
+    table = run.intervals
+    begun = np.append(True, table.complete[:-1] | (table.first[1:] != table.last[:-1] + 1))
+    return steps_of(run, (np.flatnonzero(table.complete & begun) + 1).tolist())
 
 
 def _caps(

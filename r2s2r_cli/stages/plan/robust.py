@@ -102,12 +102,24 @@ def usual_ends(moves: np.ndarray) -> np.ndarray:
     middle = np.median(moves[:, :2], axis=0)
     far = np.linalg.norm(moves[:, :2] - middle, axis=1)
     # The median of angles is that of their differences from a direction among them.
-    among = float(np.angle(np.exp(1j * moves[:, 2]).sum()))
+    among = _direction(moves[:, 2])
     turn = wrapped(moves[:, 2] - among)
     usual = float(np.median(turn))
     most_m = STRAY_M + STRAY_SHARE * np.linalg.norm(middle)
     most_rad = STRAY_RAD + STRAY_SHARE * abs(float(wrapped(np.array(among + usual))))
     return np.asarray((far <= most_m) & (np.abs(turn - usual) <= most_rad))
+
+
+def _direction(turn: np.ndarray) -> float:
+    """The one that angles (B,) [rad] lie about."""
+    return float(np.angle(np.exp(1j * turn).sum()))
+
+
+def _together(moves: np.ndarray) -> np.ndarray:
+    """Moves (B, 3) with turns less than half a turn from the one that they lie about: of 179 and -179 degrees the mean
+    is 180, not 0. Whole turns alone are added, so that others keep their numbers to the bit."""
+    whole = 2 * np.pi * np.round((_direction(moves[:, 2]) - moves[:, 2]) / (2 * np.pi))
+    return np.column_stack([moves[:, :2], moves[:, 2] + whole])
 
 
 def earned(reward: Reward, came: Outcomes, good: np.ndarray) -> np.ndarray:
@@ -130,9 +142,11 @@ def primitive(
     every = np.column_stack([came.com[:, :2], came.turn])
     of[of] = usual_ends(every[of])
     rows = np.flatnonzero(of) if of.any() else np.arange(1)
-    shown, moves = came.take(rows), every[rows]
+    shown, moves = came.take(rows), _together(every[rows])
+    move = moves.mean(axis=0)
+    move[2] = move[2] if abs(move[2]) <= np.pi else wrapped(move[2])
     same = float(of.sum() / good.sum()) if good.any() else 0.0
     return Primitive(
-        name, behaviour, gait, float(value[0]), mean, sd, mean - spread * sd, float(good.mean()), moves.mean(axis=0),
+        name, behaviour, gait, float(value[0]), mean, sd, mean - spread * sd, float(good.mean()), move,
         moves.std(axis=0), usual, same, float(shown.duration.mean()),
     )  # fmt: skip

@@ -7,12 +7,12 @@ the camera come from outside (`devices`), open; rows go to a sink from one threa
 from __future__ import annotations
 
 from r2s2r_cli.stages.record.layout import CameraFacts, StreamLayout, place_of, run_layout
-from r2s2r_cli.stages.record.plan import RunPlan, plans, run_attributes
+from r2s2r_cli.stages.record.plan import RunPlan, as_run, plans, run_attributes
 from r2s2r_cli.stages.record.policies import EXCITATIONS, excitation, random_targets
 from r2s2r_cli.stages.record.run import Now
 from r2s2r_cli.stages.record.session import Session
 
 __all__ = [
-    "EXCITATIONS", "CameraFacts", "Now", "RunPlan", "Session", "StreamLayout", "excitation", "place_of", "plans",
-    "random_targets", "run_attributes", "run_layout",
+    "EXCITATIONS", "CameraFacts", "Now", "RunPlan", "Session", "StreamLayout", "as_run", "excitation", "place_of",
+    "plans", "random_targets", "run_attributes", "run_layout",
 ]  # fmt: skip

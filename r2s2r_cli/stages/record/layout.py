@@ -58,7 +58,7 @@ def run_layout(plan: RunPlan, robot: Robot, link: LinkFacts, camera: CameraFacts
     }
     words = f"{plan.policy.description}; as it is run, with the rest shape and all its repeats".lstrip("; ")
     attributes: dict[str, Mapping[str, Scalar]] = {
-        "link": {"protocol": link.protocol, "port": place_of(link), "stops_by_itself": link.watchdog is not None},
+        "link": {"protocol": link.protocol, "port": place_of(link), "stops_by_itself": link.stops_by_itself},
         "policy": {"robot": robot.name, "description": words, "repeat": 1},
     }
     found = [

@@ -10,7 +10,7 @@ import numpy as np
 
 from r2s2r_cli.artifact import Scalar
 from r2s2r_cli.errors import UsageError
-from r2s2r_cli.stages.simulate.policies import Sequence
+from r2s2r_cli.stages.simulate.policies import Sequence, sequence
 from schemas.policy import PolicyFile
 from schemas.robot import Robot
 
@@ -71,6 +71,11 @@ def with_rest(sequence: Sequence, *, rest: float, timeout: float) -> Sequence:
         target = np.insert(target, place, 1.0, axis=0)
         hold, limit = np.insert(hold, place, rest), np.insert(limit, place, timeout)
     return Sequence(target, hold, limit)
+
+
+def as_run(plan: RunPlan, robot: Robot) -> Sequence:
+    """The targets of a run, those in the rest shape included. Raises InputError for a policy of another robot."""
+    return with_rest(sequence(plan.policy, robot), rest=plan.rest, timeout=robot.pid.step_timeout_s)
 
 
 def run_attributes(plan: RunPlan, robot: Robot, *, origin: str, source: str, lock_step: bool) -> dict[str, Scalar]:

@@ -13,10 +13,9 @@ from r2s2r_cli.devices.link import LinkStatistics, RobotLink, Sample
 from r2s2r_cli.devices.pid import WirePid, WireSteps, ticks
 from r2s2r_cli.stages.record.camera import Pictures
 from r2s2r_cli.stages.record.intervals import OpenInterval
-from r2s2r_cli.stages.record.plan import RunPlan, with_rest
+from r2s2r_cli.stages.record.plan import RunPlan, as_run
 from r2s2r_cli.stages.record.tally import Tally
 from r2s2r_cli.stages.record.writer import Writer
-from r2s2r_cli.stages.simulate.policies import sequence
 from schemas.robot import Robot
 
 READ_S = 0.05
@@ -58,8 +57,8 @@ class RunLoop:
     def __init__(self, plan: RunPlan, robot: Robot, link: RobotLink, writer: Writer, watch: Watch) -> None:
         """Raises InputError where the policy is for another robot, or an actuated cable has no calibrated sensor."""
         self.plan, self.link, self._writer, self._watch = plan, link, writer, watch
-        timeout, period = robot.pid.step_timeout_s, 1.0 / robot.pid.rate_hz
-        self._sequence = with_rest(sequence(plan.policy, robot), rest=plan.rest, timeout=timeout)
+        period = 1.0 / robot.pid.rate_hz
+        self._sequence = as_run(plan, robot)
         self.targets = len(self._sequence.target)
         self.steps = WireSteps(ticks(self._sequence.hold, period), ticks(self._sequence.timeout, period))
         self.timed_out: list[int] = []
@@ -67,6 +66,7 @@ class RunLoop:
         """By target that was given up: which cables were not there, and what they lacked."""
         self._lengths, self._pid, self._robot = Lengths.of(robot), WirePid.of(robot), robot
         self.winched = list(robot.actuated)
+        self._driving = np.isin(self._lengths.cable, self.winched)
         self._interval = OpenInterval()
         self._encoder = np.full(len(self.winched), np.nan)
         self._voltage = float("nan")
@@ -125,7 +125,8 @@ class RunLoop:
             self._next_look = t + LOOK_S
 
     def _control(self, t: float, sample: Sample, pictures: Pictures | None) -> None:
-        if not sample.complete:  # a sensor has never been heard: nothing to act on yet
+        # Nothing to act on yet where one of them was never heard; a dead sensor of a passive cable holds up nothing.
+        if not np.isfinite(sample.t_sensor[self._driving]).all():
             self.link.command(np.zeros(len(self.winched)))
             return
         target = self._sequence.target[self.steps.index]

@@ -90,7 +90,7 @@ class Session:
         facts = self.link.facts
         begun = {run.run for run in self.runs}
         return RecordReport(
-            port=facts.port, protocol=facts.protocol, stops_by_itself=facts.watchdog is not None,
+            port=facts.port, protocol=facts.protocol, stops_by_itself=facts.stops_by_itself,
             clock="board" if facts.lock_step else "host", runs=tuple(self.runs),
             not_begun=tuple(plan.name for plan in self.plans if plan.name not in begun),
         )  # fmt: skip
@@ -104,7 +104,6 @@ class Session:
         ended = "complete"
         try:
             with ExitStack() as stack:
-                stack.callback(self.link.stop)
                 if self.feed is not None:
                     stamp = self._stamp(loop)
                     pictures = Pictures(
@@ -112,6 +111,8 @@ class Session:
                         waits=self.link.facts.lock_step, since=LATE_S,
                     )  # fmt: skip
                     stack.enter_context(pictures)
+                # Left before the pictures, whose end waits for all that is to be encoded: the robot would drive on.
+                stack.callback(self.link.stop)
                 loop.run(pictures)
         except BaseException as error:
             self.link.stop()
@@ -142,7 +143,7 @@ def _report(loop: RunLoop, pictures: Pictures | None, ended: str) -> RecordRun:
         silent_share=tuple((tally.silent / max(1, tally.ticks)).tolist()), voltage_first_v=tally.voltage_first,
         voltage_last_v=tally.voltage_last, camera=camera,
     )  # fmt: skip
-    warnings = _warnings(done, loop, stops_by_itself=loop.link.facts.watchdog is not None)
+    warnings = _warnings(done, loop, stops_by_itself=loop.link.facts.stops_by_itself)
     return done.model_copy(update={"warnings": tuple(warnings)})
 
 

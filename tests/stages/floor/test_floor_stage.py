@@ -161,3 +161,19 @@ def test_where_a_target_was_given_up_the_robot_is_not_judged() -> None:
     assert report.lengths is not None and report.lengths.floor_m < 1e-9 and report.given_up == 1
     assert fooled.lengths.contrasts - report.lengths.contrasts == 2
     assert "intervals left out since their target was given up: 1" in report.warnings
+
+
+def test_the_step_after_a_target_that_was_given_up_is_no_repeat_of_caps() -> None:
+    """The fifth of thirteen was given up, so the sixth starts from another shape: neither is compared, and though
+    that shape is 50 mm off, its floor stays at nothing."""
+    observed = path(13)
+    observed[5 * FRAMES : 6 * FRAMES - 1, 3:] += [0.05, 0.0, 0.0]
+    whole = replace_name(run(13, observed=observed, noise=0.0), "1:gait")
+    complete = whole.intervals.complete.copy()
+    complete[4] = False
+    seen = replace(whole, intervals=replace(whole.intervals, complete=complete))
+    data, report = floor([seen], [], policies={})
+    assert not {5, 6} & set(data.groups["caps"]["interval"].tolist())
+    assert report.caps is not None and report.caps.floor_m < 1e-9
+    _, fooled = floor([whole], [], policies={})
+    assert fooled.caps is not None and fooled.caps.floor_m > 1e-3

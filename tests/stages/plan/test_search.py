@@ -132,6 +132,20 @@ def test_a_gait_on_the_brink_of_tipping_is_not_steady() -> None:
     assert usual_ends(turns).tolist() == [True, True, True, False]
 
 
+@pytest.mark.parametrize("degrees", [[178, 179, -179, -178, 180], [-178, -179, 178, 177], [90, 92, 88], [-3, 4, -1]])
+def test_a_gait_of_half_a_turn_turns_by_half_a_turn(degrees: list[float]) -> None:
+    """Mean and scatter are those of the directions, on whichever side of half a turn they lie; others as they were."""
+    turn = np.radians(np.array(degrees, dtype=float))
+    came = outcome(forward=[0.1] * len(turn), turn=turn.tolist())
+    made = primitive("a", "forward", BEHAVIOURS["forward"], Gait(np.ones((1, 6))), came, turn < 9.0, spread=1.0)
+    seen = turn % (2 * np.pi) if np.abs(turn).max() > 3 else turn
+    assert made.same_element == 1.0
+    assert np.isclose(np.cos(made.move[2] - seen.mean()), 1.0) and abs(made.move[2]) <= np.pi
+    assert np.isclose(made.move_sd[2], seen.std())
+    if np.abs(turn).max() < 3:
+        assert made.move[2] == turn.mean()
+
+
 def sideways(came: Outcomes) -> np.ndarray:
     """A user's reward: along the principal axis."""
     return came.com[:, 0]

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 import torch
 
+from r2s2r_cli.devices.camera import FeedStatistics, Frame
 from r2s2r_cli.devices.link import LinkError, Sample
 from r2s2r_cli.engine.pid import advance, start_progress, ticks
 from r2s2r_cli.errors import ArtifactError, HardwareError, InputError
-from r2s2r_cli.stages.record import Session, plans
+from r2s2r_cli.stages.record import Session, plans, run_layout
 from r2s2r_cli.stages.segments import segments, target_intervals
 from schemas.config import RecordSettings
 from schemas.policy import PolicyFile
@@ -172,6 +173,28 @@ def test_repeats_take_turns_and_have_names_of_their_own() -> None:
     assert session.report().not_begun == ()
 
 
+@pytest.mark.parametrize(("watchdog", "guaranteed"), [(0.25, True), (5.0, False), (0.0, False), (None, False)])
+def test_a_recording_says_whether_the_robot_stops_by_itself(watchdog: float | None, guaranteed: bool) -> None:
+    """As the robot says of its watchdog: in the report, in the layout of the file, and where a run was cut off."""
+
+    def die(number: int, sample: Sample) -> Sample:
+        if number == 40:
+            raise LinkError("the port is gone", where="fake", hint="plug it in")
+        return sample
+
+    robot = calibrated()
+    link = FakeLink(robot, on_read=die)
+    link.facts = dataclasses.replace(link.facts, watchdog=watchdog)
+    session = Session(plans([policy(robot, 0.2)], repeats=1, rest=0.0), robot, link, RecordSettings())
+    with pytest.raises(LinkError):
+        session.record(Rows())
+    assert session.report().stops_by_itself == guaranteed
+    assert ("cannot guarantee" in session.runs[0].warnings[0]) != guaranteed
+    streams = run_layout(session.plans[0], robot, link.facts, None)
+    (told,) = [one.attributes["stops_by_itself"] for one in streams if one.path.endswith("/link")]
+    assert told == guaranteed
+
+
 @pytest.mark.parametrize("after", [1, 40, 90])
 def test_a_dead_link_ends_the_run_with_what_was_recorded(after: int) -> None:
     """The link dies at any sample: motors are told to stop, all rows before are with the sink, the report says so."""
@@ -196,6 +219,45 @@ def test_a_dead_link_ends_the_run_with_what_was_recorded(after: int) -> None:
     if after > 1:  # the interval that was cut off is written, and not complete where cables were on their way
         last = rows.of["runs/gait-1/intervals"][-1]
         assert last["last"] == after - 2
+
+
+class Watched:
+    """A feed without frames that notes how often the robot had been stopped when its pictures were left."""
+
+    statistics = FeedStatistics()
+
+    def __init__(self, link: FakeLink) -> None:
+        self.link = link
+        self.stops = -1
+
+    def frames(self) -> list[Frame]:
+        """None."""
+        return []
+
+    def hold(self, on: bool) -> None:
+        """Off once all is encoded: a backlog takes half a second."""
+        self.stops = self.stops if on else self.link.stops
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), LinkError("gone", where="fake", hint="plug it in")])
+def test_the_motors_stop_before_the_pictures_are_encoded(error: BaseException) -> None:
+    """Whatever ends a run in mid-motion: the stop does not wait for the camera's backlog."""
+
+    def end(number: int, sample: Sample) -> Sample:
+        if number == 40:
+            raise error
+        return sample
+
+    robot = calibrated()
+    link = FakeLink(robot, on_read=end)
+    feed = Watched(link)
+    session = Session(plans([policy(robot, 0.2)], repeats=1, rest=0.0), robot, link, RecordSettings(), feed=feed)
+    with pytest.raises(type(error)):
+        session.record(Rows())
+    assert feed.stops == 1
 
 
 def test_a_full_disk_stops_the_robot() -> None:
@@ -282,6 +344,28 @@ def test_nothing_is_commanded_before_every_sensor_was_heard() -> None:
     _, rows = recorded(link, policy(link.robot, 0.2))
     assert not np.array(link.commands[:2]).any()
     assert rows.column("runs/gait/commands", "t")[0] > 0.04
+
+
+def test_a_dead_sensor_of_a_passive_cable_holds_up_nothing() -> None:
+    """Never heard: the run is the one with all sensors, and it is said which one was missing. One of a winched cable
+    lets no motor move."""
+    robot = calibrated()
+    passive = next(i for i, sensor in enumerate(robot.sensors) if sensor.cable not in robot.actuated)
+
+    def dead(number: int, sample: Sample) -> Sample:
+        lost = np.arange(len(robot.sensors)) == passive
+        return dataclasses.replace(
+            sample, fresh=sample.fresh & ~lost, t_sensor=np.where(lost, np.nan, sample.t_sensor),
+            capacitance=np.where(lost, np.nan, sample.capacitance),
+        )  # fmt: skip
+
+    link, whole = FakeLink(robot, on_read=dead), FakeLink(robot)
+    session, _ = recorded(link, policy(robot, 0.2))
+    recorded(whole, policy(robot, 0.2))
+    assert np.array_equal(link.commands, whole.commands)
+    run = session.runs[0]
+    assert run.complete and run.targets_done == 3
+    assert run.warnings == (f"sensors without a reading: {passive} (100%) of the control ticks",)
 
 
 def test_an_uncalibrated_robot_is_refused() -> None:

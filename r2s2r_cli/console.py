@@ -7,12 +7,7 @@ import shutil
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
-<<<<<<< HEAD
 from contextlib import contextmanager, suppress
-from io import StringIO
-=======
-from contextlib import contextmanager
->>>>>>> 8ba89b29b0734fe87911b642d51fb51ddd805739
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.errors import InputError, R2S2RError
@@ -197,45 +192,7 @@ def print_error(error: R2S2RError, *, as_json: bool) -> None:
             exit_code=int(error.exit_code), what=error.what, where=error.where, expected=error.expected,
             received=error.received, hint=error.hint,
         )  # fmt: skip
-<<<<<<< HEAD
         with suppress(PipeClosed, InputError):
             out(document.model_dump_json(by_alias=True, indent=2))
     with suppress(OSError):
         print("\n".join([f"error: {error.what}", *error.lines()[1:]]), file=sys.stderr)
-
-
-def _is_number(cell: str) -> bool:
-    return not cell or cell[0] in "-+0123456789"
-
-
-def table_widths(columns: Sequence[str], rows: Sequence[Sequence[str]], room: int) -> list[int]:
-    """The width of every column, in characters of the terminal; together at most `room`, but at least one each.
-
-    The widest gives way first, each as far as its longest word allows; the first one, which holds the names, after the
-    others where it takes no more than a third. Words are cut where nothing else helps, those of the first column last.
-    """
-    from rich.cells import cell_len
-
-    cells = [[name, *(row[i] for row in rows)] for i, name in enumerate(columns)]
-    lines = [[line for cell in column for line in cell.splitlines() or [""]] for column in cells]
-    whole = [max(1, *map(cell_len, column)) for column in lines]
-    words = [max(1, *(cell_len(word) for line in column for word in line.split() or [""])) for column in lines]
-    widths, names = whole, max(words[0], min(whole[0], room // 3))
-    for least in ([names, *words[1:]], words, [words[0], *(1 for _ in words[1:])], [1] * len(words)):
-        widths = _narrowed(widths, least, room)
-    return widths
-
-
-def _narrowed(widths: Sequence[int], least: Sequence[int], room: int) -> list[int]:
-    """One character less at a time of the widest column that is wider than its least width, until all have room."""
-    narrow = list(widths)
-    while sum(narrow) > room:
-        wider = [i for i, width in enumerate(narrow) if width > least[i]]
-        if not wider:
-            break
-        narrow[max(wider, key=lambda i: narrow[i])] -= 1
-    return narrow
-=======
-        out(document.model_dump_json(by_alias=True, indent=2))
-    print("\n".join([f"error: {error.what}", *error.lines()[1:]]), file=sys.stderr)
->>>>>>> 8ba89b29b0734fe87911b642d51fb51ddd805739

@@ -15,6 +15,7 @@ from typing import Annotated
 import typer
 
 from r2s2r_cli.commands.robot_link import PortOption, ProtocolOption, link_of
+from r2s2r_cli.commands.run_again import Typed, robot_again
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ExitCode, Interrupted, R2S2RError, UsageError
 from r2s2r_cli.options import DrawOption, DryRunOption, IterationOption, ProjectOption, QuietOption
@@ -91,6 +92,7 @@ def run(
     names = tuple(policy or ())
     steps = list(_steps(here, place, tuple(source or ()), robot, (random, seed), names, repeats, yes=yes))
     steps = [step for step in steps if STAGES.index(step.name) <= STAGES.index(until)]
+    typed = Typed(asked, link.protocol, camera, names, repeats, (random, seed))
     common = ("--project", str(here.root), "--iteration", str(place.number), *(("--quiet",) if quiet else ()),
               *(() if draw else ("--no-draw",)))  # fmt: skip
     for number, step in enumerate(steps, start=1):
@@ -102,9 +104,10 @@ def run(
             used = place.artifact("estimate", executed=step.name == "execute").exists()
             if not why or used or not robot:
                 console.say(f"[{number}/{len(steps)}] {name} is there: the robot is not moved again")
-                _warn_of_old(here, step, console)
+                _warn_of_old(here, step, typed, console)
                 if why:
-                    console.warn(f"{name} was cut off ({why}); to do it again: {shlex.join(['r2s2r', *again])}")
+                    shown = robot_again(here, step.target, typed)
+                    console.warn(f"{name} was cut off ({why}); to do it again: {shown}")
                 continue
             console.say(f"[{number}/{len(steps)}] {name} was cut off ({why}): it is done again, and kept as .replaced")
             words, step = ("r2s2r", *again, *words[-2:]), replace(step, words=again)
@@ -174,16 +177,18 @@ def _kept(project: Project, place: Iteration, step: Step, steps: Sequence[Step])
     return why and f"it cannot be made again here, {why}"
 
 
-def _warn_of_old(project: Project, step: Step, console: Console) -> None:
+def _warn_of_old(project: Project, step: Step, typed: Typed, console: Console) -> None:
     """Runs whose plan or policies have become others since: they are compared as what they are, and it is said."""
     from r2s2r_cli.store.header import read_header
     from r2s2r_cli.store.staleness import input_reasons
 
-    changed = [text for ref in read_header(step.target).provenance.inputs for text in input_reasons(project, ref)]
+    made = read_header(step.target).provenance
+    changed = [text for ref in made.inputs for text in input_reasons(project, ref)]
     if changed:
+        way = "To import it again" if made.stage == "import" else "To run the present policies"
         console.warn(
-            f"{project.relative(step.target)} holds runs of what has changed since: {'; '.join(changed)}. To run the "
-            f"present policies: {shlex.join(['r2s2r', *step.words, '--force'])}"
+            f"{project.relative(step.target)} holds runs of what has changed since: {'; '.join(changed)}. "
+            f"{way}: {robot_again(project, step.target, typed)}"
         )
 
 

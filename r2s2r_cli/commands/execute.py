@@ -76,6 +76,7 @@ def execute(
 
     Example: r2s2r execute straight --repeats 3 --port /dev/ttyUSB0 --camera realsense
     """  # fmt: skip
+    from r2s2r_cli.commands.asking import answered, require_answer
     from r2s2r_cli.commands.cameras import stored_camera
     from r2s2r_cli.commands.execute_outcome import expect
     from r2s2r_cli.commands.outcome import require_model
@@ -108,8 +109,10 @@ def execute(
         seed=None, draw=draw, force=force, stage="execute", inputs=inputs,
     )  # fmt: skip
     if not dry_run:  # before the simulation, which takes its time
-        _require_somebody(link, yes=yes)
-        wish.recording().require_room(force=force)
+        _require_named(link)
+        # Both at once: who adds --force by the hint would be told of --yes next.
+        wish.recording().require_room(force=force, more=() if answered(yes=yes) else ("--yes",))
+        require_answer("execute", yes=yes)
     expect(here, place, runs, numbers, console, camera=camera is not None)
     if dry_run:
         look(wish, console)
@@ -119,20 +122,12 @@ def execute(
     carry_out(wish, console)
 
 
-def _require_somebody(link: RobotLink, *, yes: bool) -> None:
-    """Raises UsageError where no robot is named, or nobody is there to be asked whether it may move."""
-    import sys
-
-    from r2s2r_cli.commands.typed import typed_again
-
+def _require_named(link: RobotLink) -> None:
+    """Raises UsageError where no robot is named."""
     if link.port is None:
         raise UsageError("no robot is named", where="--port", expected="a device, socket://HOST:PORT or udp://HOST:PORT",
                          received="nothing",
                          hint="r2s2r doctor ports   # what to name, or set as link.port in project.toml")  # fmt: skip
-    if not yes and not sys.stdin.isatty():
-        raise UsageError("nobody is there to be asked whether the robot may move", where="r2s2r execute",
-                         expected="a terminal, or --yes", received="neither",
-                         hint=typed_again("execute", "--yes"))  # fmt: skip
 
 
 def _chosen(

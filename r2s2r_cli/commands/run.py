@@ -14,6 +14,7 @@ from typing import Annotated
 
 import typer
 
+from r2s2r_cli.commands.asking import require_answer
 from r2s2r_cli.commands.robot_link import PortOption, ProtocolOption, link_of
 from r2s2r_cli.commands.run_again import Typed, robot_again
 from r2s2r_cli.console import Console
@@ -92,6 +93,8 @@ def run(
     names = tuple(policy or ())
     steps = list(_steps(here, place, tuple(source or ()), robot, (random, seed), names, repeats, yes=yes))
     steps = [step for step in steps if STAGES.index(step.name) <= STAGES.index(until)]
+    if not dry_run and any(step.name == "execute" and _moves(place, step, robot) for step in steps):
+        require_answer("run", yes=yes)  # now, not after the stages before it
     typed = Typed(asked, link.protocol, camera, names, repeats, (random, seed))
     common = ("--project", str(here.root), "--iteration", str(place.number), *(("--quiet",) if quiet else ()),
               *(() if draw else ("--no-draw",)))  # fmt: skip
@@ -100,9 +103,7 @@ def run(
         if step.robot and step.target.exists():
             name, again = here.relative(step.target), (*step.words, "--force")
             why = _cut_off(step.target)
-            # What somebody went on from is theirs to judge.
-            used = place.artifact("estimate", executed=step.name == "execute").exists()
-            if not why or used or not robot:
+            if not _moves(place, step, robot):
                 console.say(f"[{number}/{len(steps)}] {name} is there: the robot is not moved again")
                 _warn_of_old(here, step, typed, console)
                 if why:
@@ -121,6 +122,15 @@ def run(
         _gate(place, step)
     if dry_run:
         console.say("nothing was done")
+
+
+def _moves(place: Iteration, step: Step, robot: Sequence[str]) -> bool:
+    """Whether the robot does this step: it has not yet, or was cut off at it and nothing was made of that. What
+    somebody went on from is theirs to judge."""
+    if not step.target.exists():
+        return step.robot
+    used = place.artifact("estimate", executed=step.name == "execute").exists()
+    return step.robot and bool(robot) and not used and bool(_cut_off(step.target))
 
 
 def _gate(place: Iteration, step: Step) -> None:

@@ -152,6 +152,19 @@ def test_nobody_to_ask_is_told_the_command_as_typed(project: Path, monkeypatch: 
     assert typed_again("record", "--yes") == "r2s2r record --yes"
 
 
+def test_runs_in_the_way_and_nobody_to_ask_are_one_hint(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither option alone would do."""
+    place = project / "iterations" / "001"
+    place.mkdir(parents=True)
+    (place / "50-execute.h5").write_bytes(b"runs")
+    (project / "gait.toml").write_text(GAIT.format(robot="threebar", target=[0.5] * 6))
+    words = ["execute", "gait.toml", "--port", "socket://h:1"]
+    monkeypatch.setattr("sys.argv", ["r2s2r", *words])
+    refused = invoke(*words)
+    assert refused.exit_code == 2
+    assert f"hint: r2s2r {' '.join(words)} --yes --force   #" in refused.stderr
+
+
 @pytest.mark.parametrize("answer", [True, False])
 def test_a_robot_moves_only_after_a_yes(answer: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Asked on stderr; no is exit code 2, with what shows the outcome again."""

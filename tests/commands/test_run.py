@@ -107,7 +107,7 @@ def test_a_recording_that_was_cut_off_and_used_stays(project: Path, calls: Calls
 
 def test_the_next_iteration_records_nothing(estimated: Path, calls: Calls) -> None:
     """It learns from the runs of the one before."""
-    result = invoke("run", "--iteration", "2", "--port", "socket://nowhere:1", "--until", "execute")
+    result = invoke("run", "--iteration", "2", "--port", "socket://nowhere:1", "--until", "execute", "--yes")
     assert result.exit_code == 0, result.stderr
     assert stages(Child.calls) == ["identify", "plan", "execute"]
 

@@ -87,3 +87,23 @@ def test_a_recording_that_was_cut_off_keeps_its_policies(project: Path, calls: C
     assert " ".join(shown(result.stderr)) == (
         "record gait.toml --port socket://nowhere:1 --camera realsense --repeats 3 --iteration 1 --force"
     )
+
+
+@pytest.mark.parametrize("until", ["plan", "execute"])
+def test_nobody_to_ask_is_said_before_anything_is_computed(
+    estimated: Path, calls: Calls, monkeypatch: pytest.MonkeyPatch, until: str
+) -> None:
+    """Without a terminal and --yes no stage begins where the robot would execute; where it would not, all do."""
+    words = ["run", "--port", "socket://nowhere:1", "--until", until]
+    monkeypatch.setattr("sys.argv", ["r2s2r", *words])
+    result = invoke(*words)
+    assert (result.exit_code, bool(calls)) == ((0, True) if until == "plan" else (2, False))
+    assert (f"hint: r2s2r {shlex.join(words)} --yes" in result.stderr) == (until == "execute")
+
+
+def test_nobody_is_asked_where_the_robot_has_moved(older: Path, calls: Calls) -> None:
+    """Runs that are there stay, and nothing else needs an answer; nor does a dry run."""
+    assert invoke("run", "--port", "socket://nowhere:1", "--iteration", "1").exit_code == 0
+    (older / "iterations/002/50-execute.h5").unlink()
+    assert invoke("run", "--port", "socket://nowhere:1", "--iteration", "2", "--dry-run").exit_code == 0
+    assert invoke("run", "--port", "socket://nowhere:1", "--iteration", "2").exit_code == 2

@@ -82,7 +82,7 @@ class Recording:
     def _elsewhere(self, more: Sequence[str]) -> str:
         """The command as it was typed, for where there is room: a recording starts a new iteration, what is executed
         belongs to the plan of its own."""
-        words = typed_words(self.stage)
+        words = [word for word in typed_words(self.stage) if word != "--dry-run"]  # which is not refused
         if self.stage == "execute":
             return shlex.join(["r2s2r", *words, *more, "--force"]) + "   # the old runs stay as .replaced"
         at = next((k for k, word in enumerate(words) if word.split("=")[0] == "--iteration"), None)

@@ -25,7 +25,7 @@ from r2s2r_cli.store.project import Iteration, Project
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from schemas.header import InputRef
+    from schemas.header import Header, InputRef
     from schemas.policy import PolicyFile
 
 
@@ -92,7 +92,7 @@ def execute(
     robot, link = here.robot(), link_of(here, port, protocol)
     chosen, inputs = _chosen(here, place, policies or [], console)
     settings = here.config(place, overrides).record
-    runs = plans(chosen, repeats=repeats, rest=settings.rest_s, again="execute straight")
+    runs = plans(chosen, repeats=repeats, rest=settings.rest_s)
     own = place.artifact("identification")
     numbers = model if model is not None else own if own.exists() else None
     if numbers is not None:
@@ -204,10 +204,27 @@ def _require_fresh(project: Project, place: Iteration, plan: Path, console: Cons
         raise InputError(
             "the plan is stale: it was made for another robot or simulator than there is now",
             where=project.relative(plan), expected="a fresh plan", received="; ".join(found),
-            hint=f"r2s2r plan --iteration {place.number}",
+            hint=_planned_anew(project, place, plan, header),
         )  # fmt: skip
     for text in stale_inputs(project, header.provenance.inputs):
         console.warn(f"{project.relative(plan)}: {text}; `r2s2r status` says why")
+
+
+def _planned_anew(project: Project, place: Iteration, plan: Path, header: Header) -> str:
+    """What must be made first: `plan` refuses numbers of another robot.toml, for which `identify` comes before it."""
+    from r2s2r_cli.commands.freshness import own_reasons
+    from r2s2r_cli.commands.mend import mending
+    from r2s2r_cli.store.again import command_again
+    from r2s2r_cli.store.header import whole_header
+
+    numbers = place.artifact("identification")
+    if numbers.exists():
+        made = whole_header(numbers)
+        why = own_reasons(project, place, made)
+        first = mending(project, made, numbers, why).command if why else ""
+        if first:
+            return first
+    return command_again(header.provenance, plan)
 
 
 def _ask(console: Console) -> None:

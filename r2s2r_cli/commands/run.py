@@ -16,7 +16,7 @@ import typer
 
 from r2s2r_cli.commands.asking import require_answer
 from r2s2r_cli.commands.robot_link import PortOption, ProtocolOption, link_of
-from r2s2r_cli.commands.run_again import Typed, robot_again
+from r2s2r_cli.commands.run_again import Typed, cut_off, robot_again, warn_of_old
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ExitCode, Interrupted, R2S2RError, UsageError
 from r2s2r_cli.options import DrawOption, DryRunOption, IterationOption, ProjectOption, QuietOption
@@ -85,6 +85,7 @@ def run(
     if until not in STAGES:
         raise UsageError("there is no such stage", where="--until", expected=" | ".join(STAGES), received=until,
                          hint=f"r2s2r run --until {STAGES[-1]}")  # fmt: skip
+    _require(tuple(source or ()), random, repeats)
     # Whoever imports a log named no robot, and none is to move by surprise.
     link = link_of(here, port, protocol)
     asked = port or (None if source else link.port)
@@ -102,10 +103,10 @@ def run(
         words = ("r2s2r", *step.words, "--iteration", str(place.number))
         if step.robot and step.target.exists():
             name, again = here.relative(step.target), (*step.words, "--force")
-            why = _cut_off(step.target)
+            why = cut_off(step.target)
             if not _moves(place, step, robot):
                 console.say(f"[{number}/{len(steps)}] {name} is there: the robot is not moved again")
-                _warn_of_old(here, step, typed, console)
+                warn_of_old(here, step.target, typed, console)
                 if why:
                     shown = robot_again(here, step.target, typed)
                     console.warn(f"{name} was cut off ({why}); to do it again: {shown}")
@@ -124,13 +125,25 @@ def run(
         console.say("nothing was done")
 
 
+def _require(source: Sequence[Path], random: int, repeats: int) -> None:
+    """What a stage would refuse only after those before it, and a dry run never. Raises InputError, UsageError."""
+    from r2s2r_cli.stages.import_ import check_source
+    from r2s2r_cli.stages.record.plan import require_repeats
+    from r2s2r_cli.stages.simulate.policies import require_length
+
+    require_length(random)
+    require_repeats(repeats)
+    for path in source:
+        check_source(path)
+
+
 def _moves(place: Iteration, step: Step, robot: Sequence[str]) -> bool:
     """Whether the robot does this step: it has not yet, or was cut off at it and nothing was made of that. What
     somebody went on from is theirs to judge."""
     if not step.target.exists():
         return step.robot
     used = place.artifact("estimate", executed=step.name == "execute").exists()
-    return step.robot and bool(robot) and not used and bool(_cut_off(step.target))
+    return step.robot and bool(robot) and not used and bool(cut_off(step.target))
 
 
 def _gate(place: Iteration, step: Step) -> None:
@@ -185,39 +198,6 @@ def _kept(project: Project, place: Iteration, step: Step, steps: Sequence[Step])
     except R2S2RError:  # damaged: the stage says so
         return ""
     return why and f"it cannot be made again here, {why}"
-
-
-def _warn_of_old(project: Project, step: Step, typed: Typed, console: Console) -> None:
-    """Runs whose plan or policies have become others since: they are compared as what they are, and it is said."""
-    from r2s2r_cli.store.header import read_header
-    from r2s2r_cli.store.staleness import input_reasons
-
-    made = read_header(step.target).provenance
-    changed = [text for ref in made.inputs for text in input_reasons(project, ref)]
-    if changed:
-        way = "To import it again" if made.stage == "import" else "To run the present policies"
-        console.warn(
-            f"{project.relative(step.target)} holds runs of what has changed since: {'; '.join(changed)}. "
-            f"{way}: {robot_again(project, step.target, typed)}"
-        )
-
-
-def _cut_off(target: Path) -> str:
-    """What ended a recording before its last run was through; empty: nothing, or it cannot be read, which the stage
-    that reads it says."""
-    from r2s2r_cli.store.again import MEASURED
-    from r2s2r_cli.store.header import read_header
-
-    try:
-        made = read_header(target).provenance
-    except R2S2RError:
-        return ""
-    if made.stage in MEASURED and not made.report:
-        return "recovered after a crash"
-    runs = [one for one in made.report.get("runs", ()) if one.get("ended", "complete") != "complete"]
-    early = [f"{one['run']}: {one['ended']}" for one in runs]
-    early += [f"{name}: not begun" for name in made.report.get("not_begun", ())]
-    return "; ".join(early)
 
 
 def _resumed(step: Step) -> tuple[str, ...]:

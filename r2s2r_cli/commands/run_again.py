@@ -1,4 +1,4 @@
-"""The command by which a robot would do again what `run` leaves as it is: the recorded one, with what was typed now."""
+"""Recordings that `run` finds: what ended them, what has changed since, and the command that makes them again."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from r2s2r_cli.console import Console
 from r2s2r_cli.errors import R2S2RError
 from r2s2r_cli.store.again import MEASURED, command_again
 from r2s2r_cli.store.header import read_header
@@ -39,6 +40,35 @@ def robot_again(project: Project, target: Path, typed: Typed) -> str:
     if not Path.cwd().resolve().is_relative_to(project.root.resolve()):
         words.append(shlex.join(["--project", os.path.relpath(project.root)]))
     return " ".join(words)
+
+
+def warn_of_old(project: Project, target: Path, typed: Typed, console: Console) -> None:
+    """Runs whose plan or policies have become others since: they are compared as what they are, and it is said."""
+    from r2s2r_cli.store.staleness import input_reasons
+
+    made = read_header(target).provenance
+    changed = [text for ref in made.inputs for text in input_reasons(project, ref)]
+    if changed:
+        way = "To import it again" if made.stage == "import" else "To run the present policies"
+        console.warn(
+            f"{project.relative(target)} holds runs of what has changed since: {'; '.join(changed)}. "
+            f"{way}: {robot_again(project, target, typed)}"
+        )
+
+
+def cut_off(target: Path) -> str:
+    """What ended a recording before its last run was through; empty: nothing, or it cannot be read, which the stage
+    that reads it says."""
+    try:
+        made = read_header(target).provenance
+    except R2S2RError:
+        return ""
+    if made.stage in MEASURED and not made.report:
+        return "recovered after a crash"
+    runs = [one for one in made.report.get("runs", ()) if one.get("ended", "complete") != "complete"]
+    early = [f"{one['run']}: {one['ended']}" for one in runs]
+    early += [f"{name}: not begun" for name in made.report.get("not_begun", ())]
+    return "; ".join(early)
 
 
 def _measured(project: Project, made: Provenance, target: Path, typed: Typed) -> Provenance:

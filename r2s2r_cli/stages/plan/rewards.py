@@ -41,6 +41,7 @@ class Outcomes:
         return Outcomes(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
 
+_ANOTHER = "--behaviour forward   # docs/guides/plan.md shows a function"
 Reward = Callable[[Outcomes], np.ndarray]
 
 BEHAVIOURS: dict[str, Reward] = {
@@ -63,6 +64,13 @@ def reward_named(name: str) -> Reward:
     Raises UsageError for a name that leads nowhere, or to something that is no function.
     """
     return BEHAVIOURS[name] if name in BEHAVIOURS else _checked(name, _brought_along(name))
+
+
+def try_out(reward: Reward) -> None:
+    """Ask a reward about two gaits that might be, before any is searched. Raises UsageError where it gives none."""
+    two = np.ones(2)
+    reward(Outcomes(np.array([[0.02, 0.2, 0.0], [-0.05, -0.1, 0.01]]), np.array([0.1, -0.3]), np.zeros(2, dtype=int),
+                    0.005 * two, 5.5 * two, 6 * np.ones(2, dtype=int)))  # fmt: skip
 
 
 def source_of(name: str) -> Path | None:
@@ -104,11 +112,15 @@ def _brought_along(name: str) -> Reward:
 
 def _checked(name: str, function: Reward) -> Reward:
     def reward(outcome: Outcomes) -> np.ndarray:
-        value = np.asarray(function(outcome), dtype=float)
+        try:
+            value = np.asarray(function(outcome), dtype=float)
+        except Exception as error:  # of code that is not ours
+            raise UsageError("the reward fails", where=f"--behaviour {name}", expected="a function of Outcomes",
+                             received=f"{type(error).__name__}: {error}", hint=_ANOTHER) from error  # fmt: skip
         if value.shape != (len(outcome),) or not np.isfinite(value).all():
             raise UsageError("the reward gives no number for every gait", where=f"--behaviour {name}",
                              expected=f"{len(outcome)} finite numbers", received=f"shape {value.shape}",
-                             hint="see docs/guides/plan.md for an example")  # fmt: skip
+                             hint=_ANOTHER)  # fmt: skip
         return value
 
     return reward

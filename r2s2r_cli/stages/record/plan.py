@@ -27,19 +27,14 @@ class RunPlan:
     rest: float
 
 
-def plans(
-    policies: Items[PolicyFile], *, repeats: int, rest: float, again: str = "record gait.toml"
-) -> tuple[RunPlan, ...]:
+def plans(policies: Items[PolicyFile], *, repeats: int, rest: float) -> tuple[RunPlan, ...]:
     """Every policy `repeats` times, named `<policy>`, or `<policy>-<repeat>` where there are several.
 
     The repeats of one policy do not follow each other: slow drift of the robot then looks like what it is, and not like
-    a difference between policies. again: the command that asks, as a hint repeats it. Raises UsageError where two runs
-    would have one name, or for a number of repeats that is none.
+    a difference between policies. Raises UsageError where two runs would have one name, or for a number of repeats that
+    is none.
     """
-    if not 1 <= repeats <= REPEATS_MAX:
-        raise UsageError("this is no number of repeats", where="--repeats", expected=f"1 to {REPEATS_MAX}",
-                         received=str(repeats),
-                         hint=f"r2s2r {again} --repeats 3 --port /dev/ttyUSB0")  # fmt: skip
+    require_repeats(repeats)
     found = [
         RunPlan(policy.name if repeats == 1 else f"{policy.name}-{number}", policy, number, rest)
         for number in range(1, repeats + 1)
@@ -53,6 +48,13 @@ def plans(
                 hint="change name in one of the policies, or record one at a time",
             )  # fmt: skip
     return tuple(found)
+
+
+def require_repeats(repeats: int) -> None:
+    """Raises UsageError for a number of repeats that is none."""
+    if not 1 <= repeats <= REPEATS_MAX:
+        raise UsageError("this is no number of repeats", where="--repeats", expected=f"1 to {REPEATS_MAX}",
+                         received=str(repeats), hint="--repeats 1")  # fmt: skip
 
 
 def with_rest(sequence: Sequence, *, rest: float, timeout: float) -> Sequence:

@@ -4,30 +4,24 @@ from __future__ import annotations
 
 import os
 import shlex
-import signal
-import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from r2s2r_cli.commands.asking import require_answer
 from r2s2r_cli.commands.robot_link import PortOption, ProtocolOption, link_of
 from r2s2r_cli.commands.run_again import Typed, cut_off, robot_again, warn_of_old
+from r2s2r_cli.commands.run_child import carry_out
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import ExitCode, Interrupted, R2S2RError, UsageError
-from r2s2r_cli.options import DrawOption, DryRunOption, IterationOption, ProjectOption, QuietOption
+from r2s2r_cli.errors import R2S2RError, UsageError
+from r2s2r_cli.options import DrawOption, DryRunOption, IterationOption, JsonOption, ProjectOption, QuietOption
 from r2s2r_cli.store.project import Iteration, Project
 
 STAGES = ("record", "estimate", "identify", "plan", "execute", "estimate-executed", "compare")
 """In their order; `import` takes the place of `record` where logs are given."""
-
-
-_STOPPED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Signals by which somebody stops a command; a child that another one ended has failed."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +60,7 @@ def run(
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before the robot executes the plan.")] = False,
     project: ProjectOption = None,
     iteration: IterationOption = None,
+    json: JsonOption = False,
     quiet: QuietOption = False,
     draw: DrawOption = True,
     dry_run: DryRunOption = False,
@@ -79,12 +74,14 @@ def run(
 
     Example: r2s2r run --port /dev/ttyUSB0 --camera realsense
     """  # fmt: skip
-    console = Console(quiet=quiet)
+    from schemas.results import RunResult, RunStep
+
+    console = Console(json=json, quiet=quiet)
     here = Project.find(project)
     place = here.iteration(iteration, create=True)
     if until not in STAGES:
         raise UsageError("there is no such stage", where="--until", expected=" | ".join(STAGES), received=until,
-                         hint=f"r2s2r run --until {STAGES[-1]}")  # fmt: skip
+                         hint=f"--until {STAGES[-1]}")  # fmt: skip
     _require(tuple(source or ()), random, repeats)
     # Whoever imports a log named no robot, and none is to move by surprise.
     link = link_of(here, port, protocol)
@@ -99,6 +96,12 @@ def run(
     typed = Typed(asked, link.protocol, camera, names, repeats, (random, seed))
     common = ("--project", str(here.root), "--iteration", str(place.number), *(("--quiet",) if quiet else ()),
               *(() if draw else ("--no-draw",)))  # fmt: skip
+    went: list[RunStep] = []
+
+    def note(step: Step, state: Literal["done", "kept", "dry_run"], words: Sequence[str]) -> None:
+        name = here.relative(step.target)
+        went.append(RunStep(stage=step.name, state=state, artifact=name, command=shlex.join(words)))
+
     for number, step in enumerate(steps, start=1):
         words = ("r2s2r", *step.words, "--iteration", str(place.number))
         if step.robot and step.target.exists():
@@ -110,17 +113,21 @@ def run(
                 if why:
                     shown = robot_again(here, step.target, typed)
                     console.warn(f"{name} was cut off ({why}); to do it again: {shown}")
+                note(step, "kept", words)
                 continue
             console.say(f"[{number}/{len(steps)}] {name} was cut off ({why}): it is done again, and kept as .replaced")
             words, step = ("r2s2r", *again, *words[-2:]), replace(step, words=again)
         if why := _kept(here, place, step, steps):
             console.say(f"[{number}/{len(steps)}] {here.relative(step.target)} is used as it is: {why}")
+            note(step, "kept", words)
             continue
         console.say(f"[{number}/{len(steps)}] {shlex.join(words)}")
+        note(step, "dry_run" if dry_run else "done", words)
         if dry_run:
             continue
-        _carry_out((*step.words, *common, *_resumed(step)), shlex.join(words))
-        _gate(place, step)
+        carry_out((*step.words, *common, *_resumed(step)), shlex.join(words), json=json)
+        _gate(place, step, json=json)
+    console.document(RunResult(iteration=place.number, stages=tuple(went)))
     if dry_run:
         console.say("nothing was done")
 
@@ -146,13 +153,13 @@ def _moves(place: Iteration, step: Step, robot: Sequence[str]) -> bool:
     return step.robot and bool(robot) and not used and bool(cut_off(step.target))
 
 
-def _gate(place: Iteration, step: Step) -> None:
+def _gate(place: Iteration, step: Step, *, json: bool) -> None:
     """What was recorded and estimated must pass `validate` before anything is learned from it. Leaves with its code."""
     if step.words[0] != "estimate" or not step.target.exists():
         return
     recording = place.artifact("recording", executed=step.name == "estimate-executed")
     files = [os.path.relpath(path) for path in (recording, step.target) if path.exists()]
-    _carry_out(("validate", *files, "--quiet"), shlex.join(["r2s2r", "validate", *files]))
+    carry_out(("validate", *files, "--quiet"), shlex.join(["r2s2r", "validate", *files]), json=json)
 
 
 def _steps(
@@ -205,23 +212,3 @@ def _resumed(step: Step) -> tuple[str, ...]:
     from r2s2r_cli.store.checkpoint import checkpoint_of
 
     return ("--resume",) if step.name in ("identify", "plan") and checkpoint_of(step.target).exists() else ()
-
-
-def _carry_out(words: Sequence[str], shown: str) -> None:
-    """One command in a process of its own, so that its memory is given back; its words are ours. Leaves with its code
-    where it fails."""
-    with subprocess.Popen([sys.executable, "-m", "r2s2r_cli", *words]) as child:
-        try:
-            code = child.wait()
-        except KeyboardInterrupt:
-            code = child.wait()  # it had the same signal, and stops what it does in its own way
-    if code < 0 and -code not in _STOPPED:
-        raise R2S2RError(
-            f"the system ended the process of: {shown}", where="r2s2r run", expected="a stage that ends by itself",
-            received=f"signal {-code}" + "; most often there was too little memory" * (code == -signal.SIGKILL),
-            hint=shlex.join(["r2s2r", *sys.argv[1:]]),
-        )  # fmt: skip
-    if code == ExitCode.INTERRUPTED or code < 0:
-        raise Interrupted(f"stopped in: {shown}", hint=shlex.join(["r2s2r", *sys.argv[1:]]))
-    if code != ExitCode.DONE:
-        raise typer.Exit(code)

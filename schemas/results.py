@@ -83,6 +83,26 @@ class StatusResult(Frozen):
     """The gap to the robot over the iterations, as the latest comparison says it."""
 
 
+class RunStep(Frozen):
+    """One stage of `run`."""
+
+    stage: str
+    state: Literal["done", "kept", "dry_run"]
+    """done: its command ended well, fresh or made; kept: what is there is used as it is."""
+    artifact: str
+    """Relative to the project."""
+    command: str
+
+
+class RunResult(Frozen):
+    """What `run` prints; where a stage fails, the document of that stage in its place."""
+
+    schema_: Literal["r2s2r.run/1"] = Field(default="r2s2r.run/1", alias="schema")
+    iteration: int
+    stages: tuple[RunStep, ...]
+    """Of those that were asked for, in their order."""
+
+
 class NodeInfo(Frozen):
     """One group or dataset in `inspect`."""
 

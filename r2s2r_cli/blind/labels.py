@@ -17,6 +17,7 @@ from r2s2r_cli.errors import InputError, UsageError
 
 INDEX, SETS, LABELS = "index.json", "sets", "labels"
 _SALT_BYTES = 32
+_KEYS = "find . -name '*.key'   # --key takes the one that `r2s2r blind make --key` wrote"
 
 
 def new_key(path: Path) -> bytes:
@@ -46,7 +47,7 @@ def read_key(path: Path) -> bytes:
     except (OSError, ValueError) as error:
         raise InputError(
             "the key of the labels cannot be read", where=str(path), expected="the file that `blind make --key` wrote",
-            received=str(error), hint="r2s2r blind score --key FILE",
+            received=str(error), hint=_KEYS,
         ) from error  # fmt: skip
     return key
 
@@ -83,7 +84,7 @@ def unsealed(sealed: bytes, key: bytes, commitment: str, *, where: str) -> tuple
     except InvalidToken as error:
         raise InputError(
             "a label cannot be opened with this key", where=where, expected="the key that sealed it",
-            received="another key, or a damaged file", hint="r2s2r blind score --key FILE",
+            received="another key, or a damaged file", hint=_KEYS,
         ) from error  # fmt: skip
     check(plain, commitment, where=where)
     found = json.loads(plain)

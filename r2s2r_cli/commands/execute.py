@@ -25,7 +25,7 @@ from r2s2r_cli.store.project import Iteration, Project
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from schemas.header import InputRef
+    from schemas.header import Header, InputRef
     from schemas.policy import PolicyFile
 
 
@@ -76,6 +76,7 @@ def execute(
 
     Example: r2s2r execute straight --repeats 3 --port /dev/ttyUSB0 --camera realsense
     """  # fmt: skip
+    from r2s2r_cli.commands.asking import answered, require_answer
     from r2s2r_cli.commands.cameras import stored_camera
     from r2s2r_cli.commands.execute_outcome import expect
     from r2s2r_cli.commands.outcome import require_model
@@ -109,8 +110,10 @@ def execute(
     )  # fmt: skip
     tell_of_no_camera(wish, console)
     if not dry_run:  # before the simulation, which takes its time
-        _require_somebody(link, yes=yes)
-        wish.recording().require_room(force=force)
+        _require_named(link)
+        # Both at once: who adds --force by the hint would be told of --yes next.
+        wish.recording().require_room(force=force, more=() if answered(yes=yes) else ("--yes",))
+        require_answer("execute", yes=yes)
     expect(here, place, runs, numbers, console, camera=camera is not None)
     if dry_run:
         look(wish, console)
@@ -120,20 +123,12 @@ def execute(
     carry_out(wish, console)
 
 
-def _require_somebody(link: RobotLink, *, yes: bool) -> None:
-    """Raises UsageError where no robot is named, or nobody is there to be asked whether it may move."""
-    import sys
-
-    from r2s2r_cli.commands.typed import typed_again
-
+def _require_named(link: RobotLink) -> None:
+    """Raises UsageError where no robot is named."""
     if link.port is None:
         raise UsageError("no robot is named", where="--port", expected="a device, socket://HOST:PORT or udp://HOST:PORT",
                          received="nothing",
                          hint="r2s2r doctor ports   # what to name, or set as link.port in project.toml")  # fmt: skip
-    if not yes and not sys.stdin.isatty():
-        raise UsageError("nobody is there to be asked whether the robot may move", where="r2s2r execute",
-                         expected="a terminal, or --yes", received="neither",
-                         hint=typed_again("execute", "--yes"))  # fmt: skip
 
 
 def _chosen(
@@ -211,10 +206,27 @@ def _require_fresh(project: Project, place: Iteration, plan: Path, console: Cons
         raise InputError(
             "the plan is stale: it was made for another robot or simulator than there is now",
             where=project.relative(plan), expected="a fresh plan", received="; ".join(found),
-            hint=f"r2s2r plan --iteration {place.number}",
+            hint=_planned_anew(project, place, plan, header),
         )  # fmt: skip
     for text in stale_inputs(project, header.provenance.inputs):
         console.warn(f"{project.relative(plan)}: {text}; `r2s2r status` says more")
+
+
+def _planned_anew(project: Project, place: Iteration, plan: Path, header: Header) -> str:
+    """What must be made first: `plan` refuses numbers of another robot.toml, for which `identify` comes before it."""
+    from r2s2r_cli.commands.freshness import own_reasons
+    from r2s2r_cli.commands.mend import mending
+    from r2s2r_cli.store.again import command_again
+    from r2s2r_cli.store.header import whole_header
+
+    numbers = place.artifact("identification")
+    if numbers.exists():
+        made = whole_header(numbers)
+        why = own_reasons(project, place, made)
+        first = mending(project, made, numbers, why).command if why else ""
+        if first:
+            return first
+    return command_again(header.provenance, plan)
 
 
 def _ask(console: Console) -> None:

@@ -8,15 +8,22 @@ import shlex
 import signal
 import threading
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from r2s2r_cli.errors import Interrupted
+from r2s2r_cli.errors import Interrupted, NumericalError, R2S2RError
+from r2s2r_cli.store.checkpoint import failed_of
 
 Item = TypeVar("Item")
 
 
 class Kept(Protocol):
     """A checkpoint."""
+
+    @property
+    def path(self) -> Path:
+        """Where it lies."""
+        ...
 
     def kept(self) -> bool:
         """Whether work of this very request lies there."""
@@ -52,9 +59,17 @@ def loaded(stage: str) -> Any:
 @contextlib.contextmanager
 def resumable(checkpoint: Kept, where: str, command: Sequence[str], *, done: str = "fitted") -> Iterator[None]:
     """Work that leaves a checkpoint (`where`, for people) when it is interrupted: raises Interrupted with `command` and
-    --resume as its hint; KeyboardInterrupt as it came where nothing was kept yet."""
+    --resume as its hint; KeyboardInterrupt as it came where nothing was kept yet.
+
+    After a failure that comes again whatever is resumed nothing is left to go on from: of numbers that went wrong
+    nothing, of a bug a file under another name, which a mended r2s2r may go on with. What the disk or the memory
+    refused, and what was wrong before the work began, is tried again from where it was."""
     try:
         yield
+    except NumericalError:
+        if checkpoint.kept():
+            checkpoint.path.unlink(missing_ok=True)
+        raise
     except KeyboardInterrupt:
         if not checkpoint.kept():
             raise
@@ -62,6 +77,14 @@ def resumable(checkpoint: Kept, where: str, command: Sequence[str], *, done: str
             f"what was {done} so far is kept in {where}, nothing else was written",
             hint=shlex.join(["r2s2r", *command, "--resume"]),
         ) from None
+    except (R2S2RError, OSError, MemoryError):
+        raise
+    except Exception as error:
+        if checkpoint.kept():
+            aside = failed_of(checkpoint.path)
+            checkpoint.path.replace(aside)
+            error.add_note(f"what was {done} so far is kept as {Path(where).with_name(aside.name)}")
+        raise
 
 
 @contextlib.contextmanager

@@ -15,6 +15,9 @@ from r2s2r_cli.store.staleness import input_reasons
 from schemas.header import Header, InputRef
 from schemas.versions import KINDS, STAGE_VERSIONS
 
+MOVES = "moves nothing; without --dry-run, with --port, the robot runs them again"
+"""Behind a command that shows runs: it mends nothing, what does is for people to decide."""
+
 
 @dataclass(frozen=True)
 class Mending:
@@ -32,6 +35,8 @@ def mending(project: Project, header: Header, path: Path, reasons: Sequence[str]
     made = header.provenance
     if made.stage in MEASURED:  # nothing makes it again: a robot must move
         return Mending(runs=_runs(project, header, path))
+    if made.stage not in STAGE_VERSIONS:  # its command line may be pasted nowhere, and is no hint
+        return Mending(why_not=f"another program makes it: {shlex.join(made.argv)}")
     lost = sorted((ref for ref in made.inputs if not (project.root / ref.path).exists()), key=lambda ref: ref.path)
     sources = [ref.path for ref in lost if ref.kind not in KINDS]
     if sources:
@@ -125,5 +130,6 @@ def _runs(project: Project, header: Header, path: Path) -> str:
         if not path.with_name(KINDS["plan"].filename).exists():
             return ""
         if any(input_reasons(project, ref) for ref in made.inputs):  # it may hold others by now
-            return shlex.join(["r2s2r", "execute", "--iteration", str(int(path.parent.name)), "--dry-run"])
-    return command_again(made, path, dry_run=True)
+            words = ["r2s2r", "execute", "--iteration", str(int(path.parent.name)), "--force", "--dry-run"]
+            return f"{shlex.join(words)}   # {MOVES}"
+    return f"{command_again(made, path, force=True, dry_run=True)}   # {MOVES}"

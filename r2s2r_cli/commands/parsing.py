@@ -38,6 +38,8 @@ def _path(arguments: Sequence[str]) -> str:
     return " ".join(["r2s2r", *(word for word in arguments[:1] if word in {**COMMANDS, **GROUPS})])
 
 
+EXAMPLES = {"--random": "15"}
+"""Values of options that cannot simply go where theirs is wrong: without them nothing is asked for."""
 Said = tuple[str, str, str, "list[str] | None"]
 """What, expected, received, and the command line mended; None: nobody knows how."""
 
@@ -82,6 +84,7 @@ def _value(error: Any, message: str, command: Any, words: list[str]) -> Said:
     begun = [one for one in choices if wrong.value and one.startswith(wrong.value)]
     near = begun if len(begun) == 1 else difflib.get_close_matches(wrong.value, choices, 1)
     usual = getattr(param.default, "value", param.default)
+    usual = EXAMPLES.get(wrong.option) if usual is None else usual
     right = near[0] if near else None if usual is None or param.multiple else str(usual)
     mended = None if choices and not near else wrong.replaced(words, right)
     return f"this is no value of {wrong.option}", expected, wrong.value, mended

@@ -82,7 +82,10 @@ class Asked:
 
     def check(self, settings: PlanSettings) -> None:
         """Find what is wrong with the request before any work. Raises UsageError, InputError, ArtifactError."""
-        self.request(settings)
+        from r2s2r_cli.stages.plan.rewards import try_out
+
+        for reward in self.request(settings).rewards.values():
+            try_out(reward)
 
     def request(self, settings: PlanSettings) -> Request:
         """The request. Raises UsageError for behaviours and goals that cannot be read, InputError for an
@@ -116,8 +119,9 @@ class Asked:
                 raise ValueError
         except ValueError as error:
             raise UsageError("this is no place to go to", where="--to", expected="X,Y,HEADING: metres and degrees",
-                             received=text, hint="r2s2r plan --to 0.5,1,90") from error  # fmt: skip
-        return Goal((x, y), math.radians(heading), settings.goal_within_m, math.radians(settings.goal_within_deg))
+                             received=text, hint="--to 0.5,1,90") from error  # fmt: skip
+        return Goal((x, y), math.radians(heading), settings.goal_within_m, math.radians(settings.goal_within_deg),
+                    text)  # fmt: skip
 
 
 @contextmanager

@@ -60,8 +60,9 @@ class Recording:
             return error
         return None
 
-    def require_room(self, *, force: bool) -> None:
-        """Raises UsageError where a recording is there: raw runs cannot be made again. force: it keeps another name."""
+    def require_room(self, *, force: bool, more: Sequence[str] = ()) -> None:
+        """Raises UsageError where a recording is there: raw runs cannot be made again. force: it keeps another name.
+        more: options that the command lacks beside."""
         journal = journal_of(self.target)
         busy = self.writer()
         if busy is not None:
@@ -76,15 +77,15 @@ class Recording:
             raise UsageError(
                 "this iteration has a recording already, and what a robot did cannot be made again",
                 where=self.project.relative(self.target), expected="none", received="one",
-                hint=self._elsewhere(),
+                hint=self._elsewhere(more),
             )  # fmt: skip
 
-    def _elsewhere(self) -> str:
+    def _elsewhere(self, more: Sequence[str]) -> str:
         """The command as it was typed, for where there is room: a recording starts a new iteration, what is executed
         belongs to the plan of its own."""
-        words = typed_words(self.stage)
+        words = [word for word in typed_words(self.stage) if word != "--dry-run"]  # which is not refused
         if self.stage == "execute":
-            return shlex.join(["r2s2r", *words, "--force"]) + "   # the old runs stay as .replaced"
+            return shlex.join(["r2s2r", *words, *more, "--force"]) + "   # the old runs stay as .replaced"
         at = next((k for k, word in enumerate(words) if word.split("=")[0] == "--iteration"), None)
         if at is not None:
             del words[at : at + (1 if "=" in words[at] else 2)]

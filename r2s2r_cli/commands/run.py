@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import os
 import shlex
-import signal
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
+from r2s2r_cli.commands.asking import require_answer
 from r2s2r_cli.commands.robot_link import PortOption, ProtocolOption, link_of
-from r2s2r_cli.commands.run_child import STOPPED, ended
+from r2s2r_cli.commands.run_again import Typed, cut_off, robot_again, warn_of_old
+from r2s2r_cli.commands.run_stage import carry_out
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import ExitCode, Interrupted, R2S2RError, UsageError
-from r2s2r_cli.options import DrawOption, DryRunOption, IterationOption, ProjectOption, QuietOption
+from r2s2r_cli.errors import R2S2RError, UsageError
+from r2s2r_cli.options import DrawOption, DryRunOption, IterationOption, JsonOption, ProjectOption, QuietOption
 from r2s2r_cli.store.project import Iteration, Project
 
 STAGES = ("record", "estimate", "identify", "plan", "execute", "estimate-executed", "compare")
@@ -60,6 +60,7 @@ def run(
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before the robot executes the plan.")] = False,
     project: ProjectOption = None,
     iteration: IterationOption = None,
+    json: JsonOption = False,
     quiet: QuietOption = False,
     draw: DrawOption = True,
     dry_run: DryRunOption = False,
@@ -73,12 +74,15 @@ def run(
 
     Example: r2s2r run --port /dev/ttyUSB0 --camera realsense
     """  # fmt: skip
-    console = Console(quiet=quiet)
+    from schemas.results import RunResult, RunStep
+
+    console = Console(json=json, quiet=quiet)
     here = Project.find(project)
     place = here.iteration(iteration, create=True)
     if until not in STAGES:
         raise UsageError("there is no such stage", where="--until", expected=" | ".join(STAGES), received=until,
-                         hint=f"r2s2r run --until {STAGES[-1]}")  # fmt: skip
+                         hint=f"--until {STAGES[-1]}")  # fmt: skip
+    _require(tuple(source or ()), random, repeats)
     # Whoever imports a log named no robot, and none is to move by surprise.
     link = link_of(here, port, protocol)
     asked = port or (None if source else link.port)
@@ -87,42 +91,75 @@ def run(
     names = tuple(policy or ())
     steps = list(_steps(here, place, tuple(source or ()), robot, (random, seed), names, repeats, yes=yes))
     steps = [step for step in steps if STAGES.index(step.name) <= STAGES.index(until)]
+    if not dry_run and any(step.name == "execute" and _moves(place, step, robot) for step in steps):
+        require_answer("run", yes=yes)  # now, not after the stages before it
+    typed = Typed(asked, link.protocol, camera, names, repeats, (random, seed))
     common = ("--project", str(here.root), "--iteration", str(place.number), *(("--quiet",) if quiet else ()),
               *(() if draw else ("--no-draw",)))  # fmt: skip
+    went: list[RunStep] = []
+
+    def note(step: Step, state: Literal["done", "kept", "dry_run"], words: Sequence[str]) -> None:
+        name = here.relative(step.target)
+        went.append(RunStep(stage=step.name, state=state, artifact=name, command=shlex.join(words)))
+
     for number, step in enumerate(steps, start=1):
         words = ("r2s2r", *step.words, "--iteration", str(place.number))
         if step.robot and step.target.exists():
             name, again = here.relative(step.target), (*step.words, "--force")
-            why = _cut_off(step.target)
-            # What somebody went on from is theirs to judge.
-            used = place.artifact("estimate", executed=step.name == "execute").exists()
-            if not why or used or not robot:
+            why = cut_off(step.target)
+            if not _moves(place, step, robot):
                 console.say(f"[{number}/{len(steps)}] {name} is there: the robot is not moved again")
-                _warn_of_old(here, step, console)
+                warn_of_old(here, step.target, typed, console)
                 if why:
-                    console.warn(f"{name} was cut off ({why}); to do it again: {shlex.join(['r2s2r', *again])}")
+                    shown = robot_again(here, step.target, typed)
+                    console.warn(f"{name} was cut off ({why}); to do it again: {shown}")
+                note(step, "kept", words)
                 continue
             console.say(f"[{number}/{len(steps)}] {name} was cut off ({why}): it is done again, and kept as .replaced")
             words, step = ("r2s2r", *again, *words[-2:]), replace(step, words=again)
         if why := _kept(here, place, step, steps):
             console.say(f"[{number}/{len(steps)}] {here.relative(step.target)} is used as it is: {why}")
+            note(step, "kept", words)
             continue
         console.say(f"[{number}/{len(steps)}] {shlex.join(words)}")
+        note(step, "dry_run" if dry_run else "done", words)
         if dry_run:
             continue
-        _carry_out((*step.words, *common, *_resumed(step)), shlex.join(words), robot=step.robot)
-        _gate(place, step)
+        carry_out((*step.words, *common, *_resumed(step)), shlex.join(words), robot=step.robot, json=json)
+        _gate(place, step, json=json)
+    console.document(RunResult(iteration=place.number, stages=tuple(went)))
     if dry_run:
         console.say("nothing was done")
 
 
-def _gate(place: Iteration, step: Step) -> None:
+def _require(source: Sequence[Path], random: int, repeats: int) -> None:
+    """What a stage would refuse only after those before it, and a dry run never. Raises InputError, UsageError."""
+    from r2s2r_cli.stages.import_ import check_source
+    from r2s2r_cli.stages.record.plan import require_repeats
+    from r2s2r_cli.stages.simulate.policies import require_length
+
+    require_length(random)
+    require_repeats(repeats)
+    for path in source:
+        check_source(path)
+
+
+def _moves(place: Iteration, step: Step, robot: Sequence[str]) -> bool:
+    """Whether the robot does this step: it has not yet, or was cut off at it and nothing was made of that. What
+    somebody went on from is theirs to judge."""
+    if not step.target.exists():
+        return step.robot
+    used = place.artifact("estimate", executed=step.name == "execute").exists()
+    return step.robot and bool(robot) and not used and bool(cut_off(step.target))
+
+
+def _gate(place: Iteration, step: Step, *, json: bool) -> None:
     """What was recorded and estimated must pass `validate` before anything is learned from it. Leaves with its code."""
     if step.words[0] != "estimate" or not step.target.exists():
         return
     recording = place.artifact("recording", executed=step.name == "estimate-executed")
     files = [os.path.relpath(path) for path in (recording, step.target) if path.exists()]
-    _carry_out(("validate", *files, "--quiet"), shlex.join(["r2s2r", "validate", *files]))
+    carry_out(("validate", *files, "--quiet"), shlex.join(["r2s2r", "validate", *files]), robot=False, json=json)
 
 
 def _steps(
@@ -171,55 +208,8 @@ def _kept(project: Project, place: Iteration, step: Step, steps: Sequence[Step])
     return why and f"it cannot be made again here, {why}{also}"
 
 
-def _warn_of_old(project: Project, step: Step, console: Console) -> None:
-    """Runs whose plan or policies have become others since: they are compared as what they are, and it is said."""
-    from r2s2r_cli.store.header import read_header
-    from r2s2r_cli.store.staleness import input_reasons
-
-    changed = [text for ref in read_header(step.target).provenance.inputs for text in input_reasons(project, ref)]
-    if changed:
-        console.warn(
-            f"{project.relative(step.target)} holds runs of what has changed since: {'; '.join(changed)}. To run the "
-            f"present policies: {shlex.join(['r2s2r', *step.words, '--force'])}"
-        )
-
-
-def _cut_off(target: Path) -> str:
-    """What ended a recording before its last run was through; empty: nothing, or it cannot be read, which the stage
-    that reads it says."""
-    from r2s2r_cli.store.again import MEASURED
-    from r2s2r_cli.store.header import read_header
-
-    try:
-        made = read_header(target).provenance
-    except R2S2RError:
-        return ""
-    if made.stage in MEASURED and not made.report:
-        return "recovered after a crash"
-    runs = [one for one in made.report.get("runs", ()) if one.get("ended", "complete") != "complete"]
-    early = [f"{one['run']}: {one['ended']}" for one in runs]
-    early += [f"{name}: not begun" for name in made.report.get("not_begun", ())]
-    return "; ".join(early)
-
-
 def _resumed(step: Step) -> tuple[str, ...]:
     """`--resume` where there is something to go on from."""
     from r2s2r_cli.store.checkpoint import checkpoint_of
 
     return ("--resume",) if step.name in ("identify", "plan") and checkpoint_of(step.target).exists() else ()
-
-
-def _carry_out(words: Sequence[str], shown: str, *, robot: bool = False) -> None:
-    """One command in a process of its own; its words are ours. Leaves with its code where it fails."""
-    code, stopped = ended(words, robot=robot)
-    if code < 0 and -code not in STOPPED:
-        raise R2S2RError(
-            f"the system ended the process of: {shown}", where="r2s2r run", expected="a stage that ends by itself",
-            received=f"signal {-code}" + "; most often there was too little memory" * (code == -signal.SIGKILL),
-            hint=shlex.join(["r2s2r", *sys.argv[1:]]),
-        )  # fmt: skip
-    # Stopped in its last moment it is done all the same; the next one is not begun.
-    if code == ExitCode.INTERRUPTED or code < 0 or (stopped and code == ExitCode.DONE):
-        raise Interrupted(f"stopped in: {shown}", hint=shlex.join(["r2s2r", *sys.argv[1:]]))
-    if code != ExitCode.DONE:
-        raise typer.Exit(code)

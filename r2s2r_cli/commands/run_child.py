@@ -21,11 +21,11 @@ _ALONE = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasatt
 """Those that `run` may get alone."""
 
 
-def ended(words: Sequence[str], *, robot: bool) -> tuple[int, bool]:
+def ended(words: Sequence[str], *, robot: bool, **streams: Any) -> tuple[int, bool]:
     """Exit code of one command in a process of its own, so that its memory is given back; and whether somebody stopped
-    it. robot: it moves one."""
+    it. robot: it moves one. streams: of the process, as `Popen` takes them."""
     with _passing_on(STOPPED if robot else _ALONE) as passing:
-        with subprocess.Popen([sys.executable, "-m", "r2s2r_cli", *words]) as child:
+        with subprocess.Popen([sys.executable, "-m", "r2s2r_cli", *words], **streams) as child:
             passing.to(child)
             try:
                 code = child.wait()

@@ -98,6 +98,8 @@ def simulate(
                          expected="a policy file, --random N or --replay RUN", received="none of them",
                          hint="r2s2r simulate --random 15")  # fmt: skip
     asked = Asked(here, place, tuple(policies or ()), random, seed, tuple(replay or ()), start, model)
+    if dry_run:
+        asked.check()
     run = StageRun(
         stage="simulate", kind="simulation", project=here, iteration=place, find_inputs=asked.refs,
         report_model=SimulateReport, overrides=overrides, flags=asked.flags(), dry_run=dry_run, force=force,

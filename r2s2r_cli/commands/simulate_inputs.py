@@ -73,6 +73,24 @@ class Asked:
             refs[ref.path] = ref
         return list(refs.values())
 
+    def check(self) -> None:
+        """What the stage itself would refuse of policies, runs and numbers, for a dry run. Raises InputError,
+        UsageError."""
+        from r2s2r_cli.stages.simulate.policies import require_length, sequence
+        from r2s2r_cli.stages.simulate.replay import recorded_commands
+
+        robot = self.project.robot()
+        for text in self.policies:
+            for policy in read_policies(text):
+                sequence(policy, robot)
+        if self.random is not None:
+            require_length(self.random)
+        for run in self.replay:
+            recorded_commands(self._data(run, "--replay"), run, len(robot.actuated))
+        if self.start not in (None, REST):
+            self._start(None)
+        self.simulator()
+
     def simulator(self) -> Identified | None:
         """The identified numbers that were asked for. Raises ArtifactError; InputError for those of another robot, or
         of robot.toml as it was before it was changed."""

@@ -11,8 +11,8 @@ from r2s2r_cli.errors import R2S2RError
 def whole(error: R2S2RError, arguments: Sequence[str]) -> str:
     """The hint of an error; where it reads `--name value`, the command line with it. arguments: as typed after `r2s2r`.
 
-    The option takes the place of the one that was wrong: of the same name, and with the value that the error received
-    or, of `--set KEY=VALUE`, the key. Where there is none it comes last.
+    The option takes the place of the one that was wrong: of the same name, and with the value that the error received,
+    or names as its place (`--to 5,5,0`), or, of `--set KEY=VALUE`, the key. Where there is none it comes last.
     """
     said, gap, remark = error.hint.partition("   #")
     try:
@@ -21,17 +21,22 @@ def whole(error: R2S2RError, arguments: Sequence[str]) -> str:
         return error.hint
     if len(words) != 2 or not words[0].startswith("--") or not arguments:
         return error.hint
-    return shlex.join(["r2s2r", *_placed(arguments, words[0], words[1], error.received)]) + gap + remark
+    return shlex.join(["r2s2r", *_placed(arguments, words[0], words[1], error)]) + gap + remark
 
 
-def _placed(arguments: Sequence[str], name: str, value: str, received: str) -> list[str]:
-    key = value.partition("=")[0]
-    wrong = {received, key, f"{key.rpartition('.')[0]}.{received}"}
+def _placed(arguments: Sequence[str], name: str, value: str, error: R2S2RError) -> list[str]:
+    key, received = value.partition("=")[0], error.received
+    wrong = {received, key, f"{key.rpartition('.')[0]}.{received}", error.where.removeprefix(f"{name} ")}
     found = list(arguments)
+    places: list[tuple[bool, int, bool]] = []
     for i, word in enumerate(found):
         option, equals, behind = word.partition("=")
         at, given = (i, behind) if equals else (i + 1, found[i + 1] if i + 1 < len(found) else "")
-        if option == name and ({given, given.partition("=")[0].strip()} & wrong or "=" not in value):
-            found[at] = f"{name}={value}" if equals else value
-            return found
-    return [*found, name, value]
+        exact = bool({given, given.partition("=")[0].strip()} & wrong)
+        if option == name and (exact or "=" not in value):
+            places.append((not exact, at, bool(equals)))
+    if not places:
+        return [*found, name, value]
+    _, at, joined = min(places)  # the one that was wrong, else the first of that name
+    found[at : at + 1] = [f"{name}={value}" if joined else value]
+    return found

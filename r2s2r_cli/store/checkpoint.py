@@ -61,8 +61,9 @@ class CheckpointFile:
         )
 
     def clear(self) -> None:
-        """Remove it: the artifact stands."""
+        """Remove it, and one that failed: the artifact stands."""
         self.path.unlink(missing_ok=True)
+        failed_of(self.path).unlink(missing_ok=True)
 
 
 def begin_anew(command: Sequence[str]) -> str:
@@ -83,6 +84,11 @@ def command_of(checkpoint: Path) -> tuple[str, ...] | None:
 def checkpoint_of(artifact: Path) -> Path:
     """Where the checkpoint of an artifact lies: it never has an artifact's name."""
     return artifact.with_suffix(PARTIAL)
+
+
+def failed_of(checkpoint: Path) -> Path:
+    """Where a checkpoint is kept that ended in a bug: nothing goes on from it by itself."""
+    return checkpoint.with_name(f"{checkpoint.name}.failed")
 
 
 def checkpoint_key(*parts: Any) -> str:

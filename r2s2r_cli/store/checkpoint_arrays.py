@@ -16,7 +16,7 @@ import numpy as np
 
 from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.atomic import disk_error
-from r2s2r_cli.store.checkpoint import begin_anew
+from r2s2r_cli.store.checkpoint import begin_anew, failed_of
 
 _FORM = "arrays-1"
 MOST_BYTES = 48_000_000
@@ -104,8 +104,9 @@ class ArrayCheckpoint:
             return False
 
     def clear(self) -> None:
-        """Remove it: the artifact stands."""
+        """Remove it, and one that failed: the artifact stands."""
         self.path.unlink(missing_ok=True)
+        failed_of(self.path).unlink(missing_ok=True)
 
     def _opened(self) -> int:
         """Where the first result begins."""

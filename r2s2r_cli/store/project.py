@@ -21,7 +21,7 @@ CONFIG_FILE = "config.toml"
 STATE_DIR = ".r2s2r"
 """What r2s2r keeps for itself: the write lock, compiled code. May be deleted while nothing runs."""
 MAX_ITERATION = 9999
-"""A larger number is a slip of the finger that would become "the latest"."""
+"""The largest number that an iteration has."""
 ITERATIONS = "iterations"
 JOURNAL_SUFFIX = ".journal"
 _A_NEW_ONE = "r2s2r init myrobot && cd myrobot"
@@ -102,7 +102,8 @@ class Project:
         """Iteration `number`, default the latest (with `create`: the first, where there is none). first:
         the command that a project without iterations is hinted.
 
-        Raises ArtifactError where there is none yet, UsageError where this one does not exist and is not to be created.
+        Raises ArtifactError where there is none yet, UsageError where this one does not exist and is not to be created,
+        or is beyond the next one: a slip of the finger would become "the latest".
         """
         existing = self.iterations()
         if number is None:
@@ -116,8 +117,13 @@ class Project:
             raise UsageError("there is no such iteration number", where="--iteration",
                              expected=f"1 to {MAX_ITERATION}", received=str(number), hint="r2s2r status")  # fmt: skip
         path = self.root / ITERATIONS / f"{number:03d}"
-        if create or path.is_dir():
+        following = existing[-1].number + 1 if existing else 1
+        if path.is_dir() or (create and number <= following):  # one that was removed may be made again
             return Iteration(number, path)
+        if create:
+            wanted = f"{following}, which is the next, or one before it" if existing else "1, the first"
+            raise UsageError(f"iteration {number} is not the next one", where="--iteration", expected=wanted,
+                             received=str(number), hint="r2s2r status")  # fmt: skip
         known = ", ".join(str(i.number) for i in existing) or "none yet"
         raise UsageError(f"iteration {number} does not exist", where="--iteration", expected=f"one of: {known}",
                          received=str(number), hint="r2s2r status")  # fmt: skip

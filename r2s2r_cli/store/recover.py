@@ -23,7 +23,7 @@ from r2s2r_cli.store.seal import seal
 from r2s2r_cli.store.verify import find_body
 from r2s2r_cli.store.write import write_artifact
 from schemas.header import Header, Provenance
-from schemas.versions import KINDS
+from schemas.versions import KINDS, STAGE_VERSIONS
 
 DAMAGED = ".damaged"
 
@@ -171,7 +171,7 @@ def _lost(path: Path, header: Header | None, found: Rescue) -> ArtifactError:
     names = ", ".join(f"{name} ({why})" for name, why in list(found.lost.items())[:3])
     more = f" and {len(found.lost) - 3} more" if len(found.lost) > 3 else ""
     where = f"{path}, rescued into {found.path}" if found.path else str(path)
-    if header is not None:
+    if header is not None and header.provenance.stage in STAGE_VERSIONS:  # another program's command line is no hint
         # A hint moves no robot: of what was measured it looks, and whoever pastes it decides.
         hint = command_again(header.provenance, path, force=True, dry_run=header.provenance.stage in MEASURED)
     elif (hint := command_at(path)) == "":

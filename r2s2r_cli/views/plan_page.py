@@ -23,7 +23,7 @@ def report_tables(report: PlanReport) -> Iterator[PageTable]:
     )
     if report.policies:
         yield PageTable(
-            "long policies",
+            "; ".join(["long policies", *(f"{one.name} leads to {_goal(one)}" for one in report.policies if one.goal)]),
             ["name", "targets", "shortcuts", "on paper x, y [m]", "turn [deg]", "simulated x, y [m]", "turn [deg]",
              "came back", "time [s]", "gaits"],
             [_policy(one) for one in report.policies],
@@ -66,15 +66,17 @@ def _gait(one: GaitFigures, pairs: int) -> list[str]:
     ]  # fmt: skip
 
 
+def _goal(one: PolicyFigures) -> str:
+    """Where it was to go. Its name stays the one that `execute` knows."""
+    x, y, turn = one.goal or (math.nan,) * 3
+    return f"({x:g}, {y:g}, {math.degrees(turn):.0f} deg)"
+
+
 def _policy(one: PolicyFigures) -> list[str]:
     (ex, ey), (x, y), (sx, sy) = one.expected_m, one.shift_m, one.shift_sd_m
-    name = one.name
-    if one.goal is not None:
-        gx, gy, turn = one.goal
-        name += f" ({gx:g}, {gy:g}, {math.degrees(turn):.0f} deg)"
     shortcuts = f"{one.shortcuts} (-{counted(one.saved, 'target')})" if one.shortcuts else "0"
     return [
-        name, str(one.targets), shortcuts, f"{ex:+.2f}, {ey:+.2f}",
+        one.name, str(one.targets), shortcuts, f"{ex:+.2f}, {ey:+.2f}",
         f"{math.degrees(one.expected_turn_rad):+.0f}", f"{x:+.2f} +- {sx:.2f}, {y:+.2f} +- {sy:.2f}",
         f"{math.degrees(one.turn_rad):+.0f} +- {math.degrees(one.turn_sd_rad):.0f}", f"{one.worked:.0%}",
         f"{one.duration_s:.0f}", " ".join(one.gaits),

@@ -10,6 +10,7 @@ import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.commands.execute import _ask, _long, _require_fresh
+from r2s2r_cli.commands.record_journal import Recording
 from r2s2r_cli.commands.typed import typed_again
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import UsageError
@@ -151,6 +152,31 @@ def test_nobody_to_ask_is_told_the_command_as_typed(project: Path, monkeypatch: 
     assert refused.stderr.endswith("hint: r2s2r execute gait.toml --port socket://h:1 --force --yes\n")
     assert typed_again("execute", "--dry-run") == "r2s2r execute gait.toml --port socket://h:1 --force --dry-run"
     assert typed_again("record", "--yes") == "r2s2r record --yes"
+
+
+def test_runs_in_the_way_and_nobody_to_ask_are_one_hint(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither option alone would do."""
+    place = project / "iterations" / "001"
+    place.mkdir(parents=True)
+    (place / "50-execute.h5").write_bytes(b"runs")
+    (project / "gait.toml").write_text(GAIT.format(robot="threebar", target=[0.5] * 6))
+    words = ["execute", "gait.toml", "--port", "socket://h:1"]
+    monkeypatch.setattr("sys.argv", ["r2s2r", *words])
+    refused = invoke(*words)
+    assert refused.exit_code == 2
+    assert f"hint: r2s2r {' '.join(words)} --yes --force   #" in refused.stderr
+
+
+def test_a_dry_run_leads_to_the_command_that_runs_them_again(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where runs are in the way: not to another dry run."""
+    place = project / "iterations" / "001"
+    place.mkdir(parents=True)
+    (place / "50-execute.h5").write_bytes(b"runs")
+    monkeypatch.setattr("sys.argv", ["r2s2r", "execute", "gait.toml", "--dry-run", "--port", "p"])
+    here = Project.find(project)
+    refusal = Recording(here, here.iteration(1), {}, {}, None, "execute").refusal(force=False)
+    assert refusal is not None
+    assert refusal.hint == "r2s2r execute gait.toml --port p --force   # the old runs stay as .replaced"
 
 
 @pytest.mark.parametrize("answer", [True, False])

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.commands.mend import MOVES
 from r2s2r_cli.commands.wanted import wanted
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
@@ -64,7 +65,7 @@ def said(name: str) -> str:
 def pasted() -> str:
     """The hint of `status`, after it was run in the project's directory and did what it says."""
     hint: str = document("status")["next"]
-    done = invoke(*shlex.split(hint)[1:])
+    done = invoke(*shlex.split(hint, comments=True)[1:])
     assert done.exit_code == 0, (hint, done.stderr)
     return hint
 
@@ -78,7 +79,7 @@ def test_states_whose_pictures_are_gone_are_not_asked_for(project: Path, stage: 
     config = project / "project.toml"
     config.write_text(config.read_text().replace("sensor_gap_s = 0.25", "sensor_gap_s = 0.5", 1))
     assert f"the pictures or end caps of iterations/001/{recording} are not kept" in said(estimate)
-    assert pasted() == f"r2s2r {stage} gait.toml --repeats 2 --iteration 1 --dry-run"
+    assert pasted() == f"r2s2r {stage} gait.toml --repeats 2 --iteration 1 --force --dry-run   # {MOVES}"
     (project / "gait.toml").unlink()
     assert document("status")["next"] == ""
 
@@ -125,9 +126,20 @@ def test_runs_that_are_stale_are_shown_where_their_plan_is_kept(project: Path, k
     put(project, "60-compare.h5", builders.comparison(), "compare")
     if not kept:
         (project / "iterations/001/40-plan.h5").unlink()
-    wanted = "r2s2r execute --iteration 1 --dry-run" if kept else "r2s2r plan --iteration 1"
+    wanted = f"r2s2r execute --iteration 1 --force --dry-run   # {MOVES}" if kept else "r2s2r plan --iteration 1"
     assert "input iterations/001/40-plan.h5" in said("50-execute.h5")
     assert document("status")["next"] == wanted
+
+
+def test_what_another_program_made_hides_no_hint(project: Path) -> None:
+    """How it is made is said where it stands; what comes next is a command."""
+    put(project, "10-record.h5", builders.recording(), "record")
+    put(project, "20-estimate.h5", builders.estimate(), "estimate")
+    states = ref(project, "20-estimate.h5").model_copy(update={"sha256": "1" * 64})
+    made = {"stage_version": 1, "settings": {}, "robot": {}, "argv": ("make.py", "out dir"), "inputs": (states,)}
+    put(project, "40-plan.h5", builders.plan(), "collect", **made)
+    assert said("40-plan.h5").endswith("another program makes it: make.py 'out dir'")
+    assert document("status")["next"] == "r2s2r identify --iteration 1"
 
 
 def test_a_missing_input_is_made_first(estimated: Path) -> None:

@@ -141,13 +141,13 @@ def test_a_recording_that_was_cut_off_and_used_stays(project: Path, calls: Calls
     result = invoke("run", "--port", "socket://nowhere:1", "--until", "plan")
     said = " ".join(result.stderr.split())
     assert result.exit_code == 0, result.stderr
-    assert "r2s2r record --random 15 --port socket://nowhere:1 --protocol checked --force" in said
+    assert "r2s2r record --random 15 --port socket://nowhere:1 --iteration 1 --force" in said
     assert stages(Child.calls) == ["estimate", "identify", "plan"]
 
 
 def test_the_next_iteration_records_nothing(estimated: Path, calls: Calls) -> None:
     """It learns from the runs of the one before."""
-    result = invoke("run", "--iteration", "2", "--port", "socket://nowhere:1", "--until", "execute")
+    result = invoke("run", "--iteration", "2", "--port", "socket://nowhere:1", "--until", "execute", "--yes")
     assert result.exit_code == 0, result.stderr
     assert stages(Child.calls) == ["identify", "plan", "execute"]
 

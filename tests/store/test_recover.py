@@ -18,9 +18,10 @@ from r2s2r_cli.store.header import MAGIC, block, read_header
 from r2s2r_cli.store.isolated import IsolatedReader
 from r2s2r_cli.store.read import checked_header, read_artifact
 from r2s2r_cli.store.recover import recover_file
+from r2s2r_cli.store.write import write_artifact
 from schemas.versions import KINDS
 from tests.store.conftest import Copy
-from tests.support import recorder
+from tests.support import builders, recorder
 from tests.support.builders import same
 from tests.support.mutate import KINDS_OF_DAMAGE, mutate
 from tests.support.soak import drawn
@@ -111,6 +112,15 @@ def test_one_damaged_dataset_costs_that_dataset_only(golden: Copy, reader: Isola
         assert array.dtype == expected[name].dtype and array.tobytes() == expected[name].tobytes()
     assert report["attributes"]["runs/walk"]["robot"] == "threebar"
     assert report["head"]["provenance"]["argv"] == ["r2s2r", "import", "walk.csv"]
+
+
+def test_what_another_program_made_is_hinted_by_no_command_of_it(tmp_path: Path, reader: IsolatedReader) -> None:
+    """Its command line can be pasted nowhere: what was rescued is shown."""
+    path = tmp_path / "policies.h5"
+    write_artifact(path, builders.policy(), builders.provenance(stage="collect", argv=("make.py", "out")))
+    path.write_bytes(path.read_bytes()[: int(path.stat().st_size * 0.9)])
+    error, _, _ = rescued(path, reader)
+    assert error.hint == f"unzip -p '{path}.rescued.npz' README.json"
 
 
 def test_a_file_cut_off_gives_what_was_before_the_cut(golden: Copy, reader: IsolatedReader) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -103,11 +102,6 @@ def _warnings(
         if one.goal is None and one.far > request.reach:
             said.append(f"{one.name}: comes {one.far:.2f} m from its start, and {request.reach:.2f} m are allowed: "
                         "the camera may lose the robot")  # fmt: skip
-        if one.goal is None:
-            continue
-        mean = one.reached.mean(axis=0)
-        if not one.goal.reached(mean[:2], mean[2]):
-            missed, turn = map(float, one.goal.left(mean[:2], mean[2]))
-            off = f"{missed:.2f} m and {math.degrees(turn):.0f} deg"
-            said.append(f"{one.name}: simulated whole, it ends {off} from the goal")
+        if off := one.off_goal():
+            said.append(f"{one.name}: {off}")
     return said

@@ -30,12 +30,13 @@ ON_PAPER = 0.5
 @dataclass(frozen=True)
 class Goal:
     """Where to go, in the frame of the start: x along the principal axis, y forward [m], heading: turn of the principal
-    axis [rad]. within_m, within_rad: near enough."""
+    axis [rad]. within_m, within_rad: near enough. typed: as it was asked for."""
 
     xy: tuple[float, float]
     heading: float
     within_m: float = 0.1
     within_rad: float = math.radians(20.0)
+    typed: str = ""
 
     def miss(self, paths: Paths) -> np.ndarray:
         """How far paths end from it, 1 each at the edge of what is near enough in place and in heading, (B,)."""
@@ -107,10 +108,12 @@ def way_to(moves: Moves, goal: Goal) -> Paths:
     if best[0] <= NEARLY:
         return near
     raise NumericalError(
-        "no sequence of the gaits leads there", where="--to", expected=f"({goal.xy[0]:g}, {goal.xy[1]:g}) m, "
+        "no sequence of the gaits leads there", where=f"--to {goal.typed}".rstrip(),
+        expected=f"({goal.xy[0]:g}, {goal.xy[1]:g}) m, "
         f"{math.degrees(goal.heading):g} deg, within {goal.within_m:g} m and {math.degrees(goal.within_rad):.0f} deg",
         received=f"nearest ({near.xy[0, -1, 0]:.2f}, {near.xy[0, -1, 1]:.2f}) m, "
-        f"{math.degrees(near.heading[0, -1]):.0f} deg", hint="r2s2r plan --set plan.goal_within_m=0.2",
+        f"{math.degrees(near.heading[0, -1]):.0f} deg",
+        hint=f"--to {near.xy[0, -1, 0]:.2f},{near.xy[0, -1, 1]:.2f},{math.degrees(near.heading[0, -1]):.0f}",
     )  # fmt: skip
 
 

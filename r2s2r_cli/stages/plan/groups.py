@@ -47,6 +47,19 @@ class LongPolicy:
         turn = turn + 2 * np.pi * np.round((self.expected[2] - turn) / (2 * np.pi))
         return np.column_stack([self.came.com[rows, :2], turn])
 
+    def off_goal(self) -> str:
+        """How far it ends from its goal, and what is near enough, where it is not: simulated, else on paper. Empty
+        where both are near enough, and without a goal."""
+        goal = self.goal
+        for how, end in (("simulated whole", self.reached.mean(axis=0)), ("on paper", self.expected)):
+            if goal is not None and not goal.reached(end[:2], end[2]):
+                far, turn = goal.left(end[:2], end[2])
+                return (
+                    f"{how}, it ends {far:.2f} m and {np.degrees(turn):.0f} deg from the goal; near enough are "
+                    f"{goal.within_m:g} m (plan.goal_within_m) and {np.degrees(goal.within_rad):.0f} deg"
+                )
+        return ""
+
 
 def symmetry_groups(reference: Reference) -> dict[str, Group]:
     """Groups `symmetry` and `reference`."""

@@ -46,6 +46,7 @@ class Outcomes:
         return Outcomes(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
 
+_ANOTHER = "--behaviour forward   # docs/guides/plan.md shows a function"
 Reward = Callable[[Outcomes], np.ndarray]
 
 BEHAVIOURS: dict[str, Reward] = {
@@ -68,6 +69,13 @@ def reward_named(name: str) -> Reward:
     Raises UsageError for a name that leads nowhere, or to something that is no function.
     """
     return BEHAVIOURS[name] if name in BEHAVIOURS else _checked(name, _brought_along(name))
+
+
+def try_out(reward: Reward) -> None:
+    """Ask a reward about two gaits that might be, before any is searched. Raises UsageError where it gives none."""
+    two = np.ones(2)
+    reward(Outcomes(np.array([[0.02, 0.2, 0.0], [-0.05, -0.1, 0.01]]), np.array([0.1, -0.3]), np.zeros(2, dtype=int),
+                    0.005 * two, 5.5 * two, 6 * np.ones(2, dtype=int)))  # fmt: skip
 
 
 def source_of(name: str) -> Path | None:
@@ -101,20 +109,20 @@ def _brought_along(name: str) -> Reward:
     except (ImportError, AttributeError) as error:
         raise UsageError("the reward cannot be loaded", where=f"--behaviour {name}", received=str(error),
                          expected="package.module:function that Python can import",
-                         hint="r2s2r plan --behaviour forward") from error  # fmt: skip
+                         hint=_ANOTHER) from error  # fmt: skip
     except Exception as error:  # whatever code of the user's raises
         raise UsageError("the file of the reward fails when it is imported", where=_raised_at(error, name),
                          expected="a module that Python can import", received=_described(error),
-                         hint="r2s2r plan --behaviour forward") from error  # fmt: skip
+                         hint=_ANOTHER) from error  # fmt: skip
     if not callable(made):
         raise UsageError("the reward is no function", where=f"--behaviour {name}", expected="a function of Outcomes",
-                         received=type(made).__name__, hint="r2s2r plan --behaviour forward")  # fmt: skip
+                         received=type(made).__name__, hint=_ANOTHER)  # fmt: skip
     found_reward: Reward = made
     return found_reward
 
 
 def _checked(name: str, function: Reward) -> Reward:
-    where, hint = f"--behaviour {name}", "r2s2r plan --behaviour forward"
+    where = f"--behaviour {name}"
 
     def reward(outcome: Outcomes) -> np.ndarray:
         wanted = f"{len(outcome)} finite numbers"
@@ -122,17 +130,17 @@ def _checked(name: str, function: Reward) -> Reward:
             given = function(outcome)
         except Exception as error:  # whatever code of the user's raises
             raise UsageError("the reward fails", where=_raised_at(error, name), expected=wanted,
-                             received=_described(error), hint=hint) from error  # fmt: skip
+                             received=_described(error), hint=_ANOTHER) from error  # fmt: skip
         try:
             value = np.asarray(given, dtype=float)
         except (TypeError, ValueError) as error:
             raise UsageError("the reward gives no numbers", where=where, expected=wanted,
-                             received=type(given).__name__, hint=hint) from error  # fmt: skip
+                             received=type(given).__name__, hint=_ANOTHER) from error  # fmt: skip
         bad = int((~np.isfinite(value)).sum())
         if value.shape != (len(outcome),) or bad:
             received = f"shape {value.shape}" if value.shape != (len(outcome),) else f"{bad} that are not finite"
             raise UsageError("the reward gives no number for every gait", where=where, expected=wanted,
-                             received=received, hint=hint)  # fmt: skip
+                             received=received, hint=_ANOTHER)  # fmt: skip
         return value
 
     return reward

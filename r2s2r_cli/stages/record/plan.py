@@ -36,10 +36,7 @@ def plans(
     a difference between policies. again: the command that asks, as a hint repeats it. Raises UsageError where two runs
     would have one name, or for a number of repeats that is none.
     """
-    if not 1 <= repeats <= REPEATS_MAX:
-        raise UsageError("this is no number of repeats", where="--repeats", expected=f"1 to {REPEATS_MAX}",
-                         received=str(repeats),
-                         hint=f"r2s2r {again} --repeats 3 --port /dev/ttyUSB0")  # fmt: skip
+    require_repeats(repeats)
     found = [
         RunPlan(policy.name if repeats == 1 else f"{policy.name}-{number}", policy, number, rest)
         for number in range(1, repeats + 1)
@@ -53,6 +50,13 @@ def plans(
                 received=name, hint=f"r2s2r {again} --repeats 2   # one policy twice; another one needs another name",
             )  # fmt: skip
     return tuple(found)
+
+
+def require_repeats(repeats: int) -> None:
+    """Raises UsageError for a number of repeats that is none."""
+    if not 1 <= repeats <= REPEATS_MAX:
+        raise UsageError("this is no number of repeats", where="--repeats", expected=f"1 to {REPEATS_MAX}",
+                         received=str(repeats), hint="--repeats 1")  # fmt: skip
 
 
 def with_rest(sequence: Sequence, *, rest: float, timeout: float) -> Sequence:

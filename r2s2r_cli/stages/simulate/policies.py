@@ -42,14 +42,19 @@ def sequence(policy: PolicyFile, robot: Robot) -> Sequence:
     return Sequence(np.tile(target, (policy.repeat, 1)), np.tile(hold, policy.repeat), np.tile(timeout, policy.repeat))
 
 
+def require_length(steps: int) -> None:
+    """Raises UsageError for a number of targets that no random policy has."""
+    if not 1 <= steps <= RANDOM_MAX:
+        raise UsageError("this is no length of a random policy", where="--random", expected=f"1 to {RANDOM_MAX}",
+                         received=str(steps), hint="--random 15")  # fmt: skip
+
+
 def random_policy(robot: Robot, steps: int, seed: int) -> PolicyFile:
     """`steps` binary target shapes, each another one than the one before; the first is not the rest shape (all long).
 
     The random policy of the paper, section "Random Policy and Real World Execution". Raises UsageError.
     """
-    if not 1 <= steps <= RANDOM_MAX:
-        raise UsageError("this is no length of a random policy", where="--random", expected=f"1 to {RANDOM_MAX}",
-                         received=str(steps), hint="r2s2r simulate --random 15 --seed 0")  # fmt: skip
+    require_length(steps)
     generator = np.random.default_rng(seed)
     before = np.ones(len(robot.actuated), dtype=int)
     shapes: list[dict[str, Any]] = []

@@ -199,3 +199,14 @@ def test_a_sequence_stays_within_reach() -> None:
     assert farthest(near)[0] == pytest.approx(0.5)
     assert near.picks.shape[1] < 6
     assert best_sequences(moves, 6, LONG["straight"], reach=0.01).picks.shape[1] == 0
+
+
+def test_a_goal_out_of_reach_is_answered_with_one_that_is_reached() -> None:
+    """As it would be typed in the place of what was."""
+    moves = simple((0.0, 0.0, 0.1))
+    with pytest.raises(NumericalError) as caught:
+        way_near(moves, Goal((1.0, 0.0), 0.0, typed="1,0,0"))
+    assert caught.value.where == "--to 1,0,0"
+    option, text = caught.value.hint.split()
+    x, y, heading = map(float, text.split(","))
+    assert option == "--to" and way_near(moves, Goal((x, y), np.radians(heading))).picks.shape[0] == 1

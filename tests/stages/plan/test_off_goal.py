@@ -1,0 +1,61 @@
+"""A policy that was asked to go to a place: how far it ends from there, and the name by which it is executed."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from r2s2r_cli.stages.plan.goal import Goal
+from r2s2r_cli.stages.plan.groups import LongPolicy
+from r2s2r_cli.stages.plan.rewards import Outcomes
+from r2s2r_cli.stages.plan.route import Paths, start_paths
+from r2s2r_cli.views.plan_page import report_tables
+from schemas.results_plan import PlanReport, PolicyFigures
+
+GOAL = Goal((0.2, 0.1), math.radians(30.0))
+
+
+def ended(paper: tuple[float, float, float], simulated: tuple[float, float, float], goal: Goal | None) -> LongPolicy:
+    """A policy that ends at these places [m] and headings [deg]."""
+    path = start_paths()
+    ends = {"xy": np.array([[[*paper[:2]]]]), "heading": np.radians([[paper[2]]])}
+    path = cast(Paths, type("Ended", (), {**{name: getattr(path, name) for name in path.__dataclass_fields__}, **ends}))
+    came = Outcomes(np.array([[*simulated[:2], 0.0]]), np.radians([simulated[2]]), *(np.zeros(1) for _ in range(4)))
+    return LongPolicy("to", cast(Any, None), path, came, np.array([True]), goal)
+
+
+@pytest.mark.parametrize(
+    ("paper", "simulated", "said"),
+    [
+        ((0.2, 0.1, 30.0), (0.25, 0.1, 40.0), ""),
+        ((0.2, 0.1, 30.0), (0.2, 0.35, 40.0), "simulated whole, it ends 0.25 m and 10 deg from the goal"),
+        ((0.2, -0.2, 30.0), (0.2, 0.1, 30.0), "on paper, it ends 0.30 m and 0 deg from the goal"),
+        ((0.2, 0.1, 30.0), (0.2, 0.1, 60.0), "simulated whole, it ends 0.00 m and 30 deg from the goal"),
+    ],
+)
+def test_what_ends_elsewhere_says_how_far_and_how_far_is_near_enough(
+    paper: tuple[float, float, float], simulated: tuple[float, float, float], said: str
+) -> None:
+    """Both numbers, of the simulation and else of the way on paper."""
+    found = ended(paper, simulated, GOAL).off_goal()
+    assert found == (f"{said}; near enough are 0.1 m (plan.goal_within_m) and 20 deg" if said else "")
+    assert ended(paper, simulated, None).off_goal() == ""
+
+
+def test_the_table_calls_it_as_execute_does() -> None:
+    """The name alone in its column; where it leads stands above."""
+    figures: dict[str, Any] = {
+        "name": "to", "gaits": ("forward-1",), "targets": 3, "shortcuts": 0, "saved": 0, "expected_m": (0.2, 0.1),
+        "expected_turn_rad": 0.5, "shift_m": (0.2, 0.1), "shift_sd_m": (0.0, 0.0), "turn_rad": 0.5, "turn_sd_rad": 0.0,
+        "worked": 1.0, "duration_s": 5.0, "goal": (0.2, 0.1, math.radians(30.0)),
+    }  # fmt: skip
+    report = PlanReport(
+        numbers="robot.toml", identified=False, symmetries=6, found=1, simulated=1, pruned=0, lost=0, draws=1, pairs=1,
+        gaits=(), policies=(PolicyFigures(**figures),), computed_by="machine code",
+    )  # fmt: skip
+    _, long, _ = report_tables(report)
+    assert [row[0] for row in long.rows] == ["to"]
+    assert long.title == "long policies; to leads to (0.2, 0.1, 30 deg)"

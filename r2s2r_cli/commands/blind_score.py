@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from r2s2r_cli.commands.typed import typed_words
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.options import DrawOption, JsonOption, QuietOption
@@ -173,18 +176,24 @@ def _bank(banks: list[Path], verdicts: Path | None, key: Path | None, command: s
     """Folder, verdicts and key. Raises UsageError where one of them is not given, InputError for a key that is none."""
     from r2s2r_cli.blind.labels import read_key
 
-    hint = f"r2s2r blind {command} {banks[0]} --verdicts verdicts --key labels.key"
     if len(banks) != 1:
         raise UsageError("several banks are put together from their published files", where="BANK", expected="one",
                          received=str(len(banks)), hint=f"r2s2r blind {command} --published FILE...")  # fmt: skip
-    for name, value in (("--verdicts", verdicts), ("--key", key)):
-        if value is None:
-            if banks[0].is_file():
-                hint = f"r2s2r blind {command} --published {banks[0]}"
-            raise UsageError("a bank is opened with its key and its verdicts", where=name, expected=f"{name} FILE",
-                             received="nothing", hint=hint)  # fmt: skip
+    given = {"--verdicts": (verdicts, "verdicts"), "--key": (key, "labels.key")}
+    lacking = [word for name, (value, usual) in given.items() if value is None for word in (name, usual)]
+    if lacking:
+        published = f"r2s2r blind {command} --published {banks[0]}"
+        raise UsageError("a bank is opened with its key and its verdicts", where=lacking[0],
+                         expected=f"{lacking[0]} FILE", received="nothing",
+                         hint=published if banks[0].is_file() else _typed(command, banks[0], lacking))  # fmt: skip
     assert verdicts is not None and key is not None  # noqa: S101 - just looked at
     return banks[0], verdicts, read_key(key)
+
+
+def _typed(command: str, bank: Path, more: Sequence[str]) -> str:
+    """The command line as it was typed, with what it lacks; where another program runs it, command and bank alone."""
+    words = typed_words("blind")
+    return shlex.join(["r2s2r", *(words if len(words) > 1 else ["blind", command, str(bank)]), *more])
 
 
 def _alone(verdicts: Path | None, key: Path | None) -> None:

@@ -69,3 +69,13 @@ def test_a_key_is_looked_for_and_not_asked_for_by_another_command(tmp_path: Path
         unsealed(label, new_key(tmp_path / "two.key"), commitment, where="there")
     for caught in (missing, other):
         assert shlex.split(caught.value.hint, comments=True) == ["find", ".", "-name", "*.key"]
+
+
+def test_what_a_bank_is_opened_with_is_added_to_what_was_typed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both at once, and --out stays, without which the hint would be refused."""
+    monkeypatch.chdir(tmp_path)
+    for lacking, given in (("--verdicts verdicts --key labels.key", ""), ("--key labels.key", " --verdicts v")):
+        words = f"blind calibrate bank --out c.json{given}"
+        monkeypatch.setattr("sys.argv", ["r2s2r", *words.split()])
+        refused = invoke(*words.split())
+        assert refused.exit_code == 2 and refused.stderr.endswith(f"hint: r2s2r {words} {lacking}\n")

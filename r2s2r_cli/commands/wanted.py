@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from r2s2r_cli.installed import installed_words
 from r2s2r_cli.store.again import MEASURED
 from r2s2r_cli.store.project import Iteration, Project
-from r2s2r_cli.store.staleness import Wanted
+from r2s2r_cli.store.staleness import BORROWED, Wanted
 from schemas.header import Provenance
 from schemas.versions import STAGE_VERSIONS
 
@@ -59,19 +59,12 @@ def wanted(
     """What `stage` would use if it ran now. Raises InputError or UsageError for wrong settings."""
     config = project.config(iteration, overrides).model_dump(mode="json", by_alias=True)
     settings = {**config.get(stage, {}), "flags": dict(flags)}
-    settings |= _shared(stage, config["simulate"])
+    if stage in SHARED:
+        settings[BORROWED] = {name: config[BORROWED][name] for name in SHARED[stage]}
     own = installed_words() if stage == "diagnose" else ""
     if own:  # it looks for them beside the catalogue's
         settings["installed_effects"] = own
     return Wanted(STAGE_VERSIONS.get(stage, 1), settings, robot_part(stage, project.robot()))
-
-
-def _shared(stage: str, simulate: Mapping[str, Any]) -> dict[str, Any]:
-    """Those that are not the default: what was made with the defaults, or before they were noted, stays fresh."""
-    from schemas.config import SimulateSettings
-
-    usual = SimulateSettings().model_dump(mode="json", by_alias=True)
-    return {f"simulate.{name}": simulate[name] for name in SHARED.get(stage, ()) if simulate[name] != usual[name]}
 
 
 def wanted_again(project: Project, iteration: Iteration | None, made: Provenance) -> Wanted:

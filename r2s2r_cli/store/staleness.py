@@ -23,6 +23,11 @@ OPTIONAL = {"plan": ("identification",), "compare": ("floor",), "diagnose": ("fl
 """Of every stage the kinds that it reads where they are there, of the project or of its iteration."""
 
 
+BORROWED = "simulate"
+"""Among the settings of another stage: those of this one that it uses. An artifact from before they were noted does not
+say what they were, and is not judged by them."""
+
+
 @dataclass(frozen=True)
 class Wanted:
     """What a stage would use if it ran now."""
@@ -38,7 +43,8 @@ def reasons(project: Project, header: Header, wanted: Wanted) -> list[str]:
     found: list[str] = []
     if made.stage_version != wanted.stage_version:
         found.append(f"stage {made.stage} changed: made by version {made.stage_version}, now {wanted.stage_version}")
-    found += [f"setting {made.stage}.{text}" for text in differences(made.settings, wanted.settings)]
+    settings = {name: value for name, value in wanted.settings.items() if name != BORROWED or name in made.settings}
+    found += [f"setting {made.stage}.{text}" for text in differences(made.settings, settings)]
     found += [f"robot.toml: {text}" for text in differences(made.robot, wanted.robot)]
     for ref in made.inputs:
         found += input_reasons(project, ref)

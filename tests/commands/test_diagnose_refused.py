@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -119,6 +120,7 @@ def test_another_robot_is_refused(estimated: Path) -> None:
     one = asked(estimated)
     robot = estimated / "robot.toml"
     robot.write_text(robot.read_text().replace('name = "threebar"', 'name = "sixbar"', 1))
+    one = dataclasses.replace(one, project=Project.find(estimated))
     with pytest.raises(InputError, match="identified for another robot"):
         one.evidence()
     recording = ArtifactData("recording", {"runs/walk": Group({}, {"robot": "sixbar"})})

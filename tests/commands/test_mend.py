@@ -118,7 +118,7 @@ def test_runs_that_are_stale_are_shown_where_their_plan_is_kept(project: Path, k
     put(project, "10-record.h5", builders.recording(), "record")
     put(project, "20-estimate.h5", builders.estimate(), "estimate")
     put(project, "30-identify.h5", builders.identification(), "identify")
-    put(project, "40-plan.h5", builders.plan(), "plan")
+    put(project, "40-plan.h5", builders.plan(), "plan", inputs=(ref(project, "30-identify.h5"),))
     plan = ref(project, "40-plan.h5").model_copy(update={"sha256": "1" * 64})
     put(project, "50-execute.h5", builders.recording(), "execute", inputs=(plan,),
         settings={"flags": {**FLAGS, "policies": ["gone-7"]}})  # fmt: skip

@@ -94,7 +94,7 @@ def test_whoever_stops_it_stops_the_robot(project: Path, calls: Calls, number: i
     for code in (130, 0):
         Child.codes = {"record": code}
         before = signal.getsignal(number)
-        result = invoke("run", "--port", "socket://nowhere:1")
+        result = invoke("run", "--port", "socket://nowhere:1", "--yes")
         assert result.exit_code == 130 and "stopped in: r2s2r record" in result.stderr
         assert stages(Child.calls) == ["record"] and signal.getsignal(number) == before
         assert Child.told == [signal.SIGTERM, signal.SIGCONT]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 import sys
 from collections.abc import Generator, Iterator
 from pathlib import Path
@@ -18,6 +19,12 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 # A loaded machine is slow, which is no fault of the code under test: no test here asserts a time.
 settings.register_profile("loaded", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("loaded")
+
+# A suite that a shell starts with `&` is deaf to the two keys, and so are all processes that it starts: tests of them
+# would fail. In a worker of pytest-xdist tests run in the main thread too.
+for _number, _usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGQUIT, signal.SIG_DFL)):
+    if signal.getsignal(_number) is signal.SIG_IGN:
+        signal.signal(_number, _usual)
 
 REAL = Path(__file__).resolve().parents[2] / "shared" / "real"
 

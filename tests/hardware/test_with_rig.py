@@ -123,12 +123,13 @@ def test_a_bad_wire_is_borne_and_counted(link: str) -> None:
         )),
     ],
 )  # fmt: skip
-def test_a_link_that_goes_ends_as_one_error_and_comes_back(kind: str, link: str) -> None:
+def test_a_link_that_goes_ends_as_one_error_and_comes_back(kind: str, link: str, tmp_path: Path) -> None:
     """In real time, after 0.3 s, for 0.6 s: LinkError or stale sensors; the rig's motors are off; reconnect works."""
     robot = calibrated()
     world = World.model_validate({"faults": [{"kind": kind, "at_s": 0.8, "for_s": 0.7}]})
+    device = tmp_path / "robot" if link == "pty" else None
     with (
-        running_rig(robot, world, link=link, lock=False) as rig,
+        running_rig(robot, world, link=link, lock=False, device=device) as rig,
         GuardedLink(open_link(rig.address, robot), robot) as host,
     ):
         with pytest.raises((LinkError, SafetyStop)) as caught:

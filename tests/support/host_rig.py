@@ -6,6 +6,7 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 
@@ -27,12 +28,13 @@ def free_udp_port() -> int:
 @contextmanager
 def running_rig(
     robot: Robot, world: World | None = None, *, link: str = "pty", protocol: str = "checked", lock: bool = True,
-    shared: bool = False,
+    shared: bool = False, device: Path | None = None,
 ) -> Iterator[Rig]:  # fmt: skip
-    """A rig that serves in a thread of this process. shared: one UDP socket for all boards."""
+    """A rig that serves in a thread of this process. shared: one UDP socket for all boards. device: a name for the
+    pty, which one that comes back keeps; its number may have been taken by then."""
     over = threading.Event()
     port = free_udp_port() if link == "udp" else None
-    outlet = Outlet(link=link, protocol=protocol, port=port, lock=lock, shared=shared)
+    outlet = Outlet(link=link, protocol=protocol, port=port, lock=lock, shared=shared, device=device)
     with Rig(robot, world or World(), outlet) as rig:
         thread = threading.Thread(target=rig.serve, args=(over.is_set,))
         thread.start()

@@ -11,11 +11,9 @@ from collections.abc import Iterator, Sequence
 from types import FrameType
 from typing import Any
 
-STOPPED = tuple(
-    getattr(signal, name)
-    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
-    if hasattr(signal, name)
-)  # fmt: skip
+from r2s2r_cli.hardware.signals import ENDING
+
+STOPPED = (signal.SIGINT, *ENDING)
 """Signals by which somebody stops a command; a child that another one ended has failed."""
 _ALONE = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 """Those that `run` may get alone."""

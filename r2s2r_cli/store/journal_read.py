@@ -90,15 +90,11 @@ def torn_at(path: Path, end: int) -> int:
     """Where the torn last record of a journal begins, behind its last whole record, which ends at `end`; the size of
     the file where it ended cleanly. What lies between is damaged: records that are all there and not what was written.
     """
-    size = position = path.stat().st_size
+    size, last = path.stat().st_size, end
     with path.open("rb") as file:
-        at = end
-        while at < size:
-            later = _next_mark(file, at + 1, size)
-            if later == size and _is_cut(file, at, size):
-                position = at
-            at = later
-    return position
+        while (later := _next_mark(file, last + 1, size)) < size:
+            last = later
+        return last if _is_cut(file, last, size) else size
 
 
 def _is_cut(file: BinaryIO, position: int, size: int) -> bool:

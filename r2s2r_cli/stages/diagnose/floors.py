@@ -37,7 +37,7 @@ def floor_for(evidence: Evidence) -> tuple[FloorGiven, list[str]]:
     said."""
     if evidence.floor is not None:
         return evidence.floor, []
-    sensor = _sensor(evidence.runs)
+    sensor = _sensor(evidence.only(evidence.fit) or evidence.runs)
     steps = [
         step for run in evidence.runs
         for one in evidence.fit if one.run == run.name for step in steps_of(run.caps, one.intervals)

@@ -138,3 +138,11 @@ def test_a_longer_interval_is_filled() -> None:
     ends = np.searchsorted(run.t_command, [0.0, 0.5, 2.0, 3.5, 4.0])
     inside = [set(given[a:b].round(3)) for a, b in pairwise(ends)]
     assert all(len(values) == 1 for values in inside)
+
+
+def test_runs_that_are_judged_have_no_part_in_the_floor() -> None:
+    """Ten times the noise there: the floor is that of what is fitted."""
+    loud = replace(run_data("b"), noise=np.full((6, 3), 1e-2))
+    split = evidence(run_data(), loud, fit=(Selection("walk", (1, 2)),), judge=(Selection("b", (1, 2)),))
+    alone = evidence(run_data(), fit=split.fit)
+    assert floor_for(split)[0] == floor_for(alone)[0]

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.parity.finding import Element
+from r2s2r_cli.stages.diagnose.where.found import SegmentGap
 from r2s2r_cli.stages.diagnose.where.onset import reached
 from r2s2r_cli.stages.diagnose.where.seat import Seat, seat
+from r2s2r_cli.stages.diagnose.where.where import _onset
 from r2s2r_cli.stages.diagnose.which.found import Ranked
 
 RANKING = (
@@ -95,3 +97,40 @@ def test_a_place_begins_where_a_cap_first_slides_over_it() -> None:
     high.caps.p_WE[..., 2] = 0.1
     assert reached([high], **at) is None  # type: ignore[arg-type, list-item]
     assert reached(runs, **{**at, "within_m": 0.04}) is None  # type: ignore[arg-type]
+
+
+def test_no_place_begins_in_an_interval_that_is_judged() -> None:
+    """A cap slides over it from frame 15 on, in intervals 2 to 4; where the second is judged the third is the first
+    that may be looked at, and where all of them are nothing is known."""
+    runs = [_run(15, speed=0.1)]
+    at = {"xy_m": (1.05, 0.0), "within_m": 0.1, "cap_radius": np.array([0.02, 0.02]), "gain": 5.0}
+    for judged, interval in (((), 2), ((("h", 2),), 2), ((("g", 2),), 3), ((("g", 2), ("g", 3)), 4)):
+        found = reached(runs, **at, judged=judged)  # type: ignore[arg-type]
+        assert found is not None and found.interval == interval and found.order == interval - 1
+    assert reached(runs, **at, judged=[("g", k) for k in (2, 3, 4)]) is None  # type: ignore[arg-type]
+
+
+def _compared(*elpd: np.ndarray) -> SimpleNamespace:
+    """Fits of effects by themselves, the first of which stands first, and their densities over the refit nominal."""
+    names = [f"effect{k}" for k in range(len(elpd))]
+    fits = [SimpleNamespace(hypothesis=SimpleNamespace(effects=(name,), parts=(name,))) for name in names]
+    scores = [SimpleNamespace(elpd=one) for one in elpd]
+    best = SimpleNamespace(effect="effect0", element=None, size={})
+    return SimpleNamespace(
+        which=SimpleNamespace(best=best, verdict="effect"), fits=fits, scores=scores,
+        refit=SimpleNamespace(elpd=np.zeros(len(elpd[0]))),
+    )  # fmt: skip
+
+
+def test_a_fall_that_is_hit_by_chance_does_not_hide_a_beginning() -> None:
+    """An effect gains 3 nats in each interval from the 12th of 28 on, and 80 at a fall in the third: as in the ranking
+    the fall counts 6 at most, so the beginning is found; and where another effect hits a fall in the 15th interval by
+    500 nats, which the refit model does as badly, it is the same."""
+    segments = tuple(
+        SegmentGap("g", "g", k + 1, k, (k, k + 1.0), 1.0, 100.0, 0.5, False, 0.01, (0.0, 0.0)) for k in range(28)
+    )
+    mine, other = np.zeros(28), np.zeros(28)
+    mine[11:], mine[2], other[14] = 3.0, 80.0, 500.0
+    for compared in (_compared(mine), _compared(mine, other)):
+        found = _onset(SimpleNamespace(judge=()), segments, None, compared, 0, None)  # type: ignore[arg-type]
+        assert found is not None and found.interval == 12

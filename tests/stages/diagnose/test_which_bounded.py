@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH, bounded, gains_over_first
+from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH, bounded, gains_over_first, over_first
 
 
 def test_what_many_pieces_say_a_little_counts_in_full() -> None:
@@ -43,3 +43,11 @@ def test_the_order_of_a_piece_stays() -> None:
     near = table > table.max(axis=0) - ENOUGH
     assert (np.abs(found - table)[near] <= np.log(2.0) + 1e-12).all()
     assert (found >= table.max(axis=0) - ENOUGH).all()
+
+
+def test_pieces_one_by_one_add_up_to_what_is_ranked() -> None:
+    """And a piece at which every hypothesis breaks off says nothing of any."""
+    table = np.random.default_rng(1).normal(0.0, 8.0, (5, 40))
+    assert over_first(table).sum(axis=1) == pytest.approx(gains_over_first(table))
+    broken = np.concatenate([table, np.full((5, 1), -np.inf)], axis=1)
+    assert over_first(broken)[:, :-1] == pytest.approx(over_first(table)) and not over_first(broken)[:, -1].any()

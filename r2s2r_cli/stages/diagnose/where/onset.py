@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,10 +65,12 @@ def onset(segments: Sequence[SegmentGap], gain: np.ndarray, seed: int) -> Onset 
 
 
 def reached(
-    runs: Sequence[Run], xy_m: tuple[float, float], within_m: float, cap_radius: np.ndarray, gain: float
-) -> Onset | None:
+    runs: Sequence[Run], xy_m: tuple[float, float], within_m: float, cap_radius: np.ndarray, gain: float,
+    judged: Collection[tuple[str, int]] = (),
+) -> Onset | None:  # fmt: skip
     """The target interval in which a cap first slides over a place (x, y) on the floor [m]: what sits there begins with
-    it. within_m: of its middle; cap_radius (cap,) [m]; gain: what speaks for the place [nats]. None: none ever does."""
+    it. within_m: of its middle; cap_radius (cap,) [m]; gain: what speaks for the place [nats]; judged: intervals (run
+    and number) that are not looked at. None: none ever does."""
     before = 0
     for run in runs:
         caps = run.caps
@@ -77,9 +79,9 @@ def reached(
         speed, sd = np.linalg.norm(caps.v_WE, axis=-1), np.sqrt(np.mean(caps.sd_v**2, axis=-1))
         over = low & near & (speed > np.maximum(SLIDES, SURE * sd))
         frames = np.flatnonzero(over.any(axis=1))
-        frames = frames[frames >= caps.intervals.first[0]]
-        if len(frames):
-            interval = int(np.searchsorted(caps.intervals.first, frames[0], side="right"))
+        slid = np.unique(np.searchsorted(caps.intervals.first, frames, side="right")).tolist()
+        interval = next((k for k in slid if k and (caps.name, k) not in judged), None)
+        if interval is not None:
             return Onset(before + interval - 1, caps.name, interval, gain, 0.0)
         before += len(caps.intervals)
     return None

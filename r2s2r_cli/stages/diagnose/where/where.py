@@ -17,6 +17,7 @@ from r2s2r_cli.stages.diagnose.where.onset import knocked, onset, reached
 from r2s2r_cli.stages.diagnose.where.place import place_map
 from r2s2r_cli.stages.diagnose.where.readings import readings
 from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.bounded import over_first
 
 if TYPE_CHECKING:
     from r2s2r_cli.stages.diagnose.which.which import Compared
@@ -110,12 +111,21 @@ def _onset(
         return knocked(evidence.runs, found.knock, found.nats()[best.effect].get(None, 0.0))
     if mine is None:
         return None  # what the logs alone show is there throughout
-    by_name = compared.scores[mine].elpd - compared.refit.elpd
+    by_name = _by_name(compared, mine)
     radius = best.size.get("friction_field.patch_radius_m")
     if best.element is not None and best.element.xy_m is not None and radius is not None:
         caps = np.repeat([rod.cap_radius_m for rod in evidence.robot.rods], 2)
-        return reached(evidence.runs, best.element.xy_m, radius, caps, float(np.sum(by_name)))
+        judged = {(one.run, k) for one in evidence.judge for k in one.intervals}
+        return reached(evidence.runs, best.element.xy_m, radius, caps, float(np.sum(by_name)), judged)
     return onset(segments, by_name, seed)
+
+
+def _by_name(compared: Compared, mine: int) -> np.ndarray:
+    """What a fit of one effect gains over the refit nominal model at every piece, (segment,) [nats], bounded as in the
+    ranking: one fall is worth no more than any other piece that is explained."""
+    single = [k for k, fit in enumerate(compared.fits) if len(fit.hypothesis.parts) == 1]
+    table = np.array([compared.refit.elpd, *(compared.scores[k].elpd for k in single)])
+    return over_first(table)[single.index(mine)]
 
 
 def _groups(arena: Arena, made: Design) -> tuple[np.ndarray, list[str]]:

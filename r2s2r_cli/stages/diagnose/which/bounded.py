@@ -24,3 +24,10 @@ def gains_over_first(table: np.ndarray, enough: float = ENOUGH) -> np.ndarray:
     """Of all hypotheses but the first over the first one, (hypothesis - 1,) [nats]."""
     total = bounded(table, enough).sum(axis=1)
     return np.asarray(total[1:] - total[0])
+
+
+def over_first(table: np.ndarray, enough: float = ENOUGH) -> np.ndarray:
+    """The same piece by piece, (hypothesis - 1, piece) [nats]; 0 at one where all of them break off."""
+    own = bounded(table, enough)
+    known = np.isfinite(own[0])
+    return np.where(known, own[1:], 0.0) - np.where(known, own[0], 0.0)

@@ -26,7 +26,6 @@ def healthy_floor(healthy: Healthy) -> FloorGiven:
     """Of the healthy runs, as their own refit leaves them."""
     sensor = float(np.sqrt(np.mean([np.sum(one.noise[-1] ** 2, axis=-1).mean() for one in healthy.arena.whole])))
     squared = healthy.score.squared
-    squared = squared[np.isfinite(squared)]
     rmse, usual = kept_rmse(squared, KEPT), kept_rmse(squared, USUAL)
     words = f"the healthy runs, refitted, the best {100 * KEPT:.0f} % of their intervals"
     return FloorGiven(rmse, min(sensor, rmse), words, True, KEPT, (usual, USUAL))

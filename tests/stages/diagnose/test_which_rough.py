@@ -128,4 +128,4 @@ def test_equivalence_counts_the_share_that_the_floor_was_taken_from() -> None:
     one = Score(np.zeros(40), np.ones(40), key, np.zeros(1), np.zeros((1, 1)))
     assert not no_gap(one, 0.005).equivalent
     assert no_gap(one, 0.005, kept=0.9).equivalent
-    assert not no_gap(replace(one, key=2.0 * key), 0.005, kept=0.9).equivalent
+    assert not no_gap(replace(one, ends=2.0 * key), 0.005, kept=0.9).equivalent

@@ -16,6 +16,7 @@ from r2s2r_cli.stages.diagnose.which.rivals import chance, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score, gains, scores
 from r2s2r_cli.stages.diagnose.which.screen import Response, screen
 from r2s2r_cli.stages.diagnose.which.search import WIDE, picked_of
+from r2s2r_cli.stages.diagnose.which.starting import LOST_M
 from tests.support.linear_arena import EACH, LinearArena, candidate
 
 
@@ -180,6 +181,43 @@ def test_equivalence_needs_data() -> None:
     two = Score(np.zeros(2), np.ones(2), np.stack([np.full((6, 3), 0.001), np.full((6, 3), 0.006)]), np.zeros(1),
                 np.zeros((1, 1)))  # fmt: skip
     assert not no_gap(two, 0.005).equivalent
+
+
+def of_ends(*off: float) -> Score:
+    """All caps of an interval off by so much in x [m], one number an interval."""
+    ends = np.zeros((len(off), 6, 3))
+    ends[..., 0] = np.array(off)[:, None]
+    return Score(np.zeros(len(off)), np.ones(len(off)), ends, np.zeros(1), np.zeros((1, 1)))
+
+
+def test_a_lost_interval_counts_at_the_bound() -> None:
+    """Off by 30 cm is worse than by 14 cm, no worse than by 25 cm, and as bad as what cannot be simulated; nothing that
+    comes nearer is said to be worse, whatever the direction."""
+    rmse = {off: float(np.sqrt(of_ends(0.01, off).squared.mean())) for off in (0.14, 0.25, 0.30, 3.0, np.nan)}
+    assert rmse[0.14] < rmse[0.25] == rmse[0.30] == rmse[3.0] == rmse[np.nan]
+    assert rmse[0.30] == pytest.approx(np.sqrt((1e-4 + LOST_M**2) / 2))
+    way = np.random.default_rng(0).normal(size=(6, 3))
+    one = of_ends(0.0)
+    said = [float(replace(one, ends=size * way[None]).squared[0]) for size in np.linspace(0.0, 1.0, 40)]
+    assert (np.diff(said) >= 0).all() and said[-1] == pytest.approx(LOST_M**2)
+
+
+def test_from_where_a_fall_led_to_nothing_is_learned() -> None:
+    """One lost cap makes an interval NaN for the black box and the pictures; the others stay as they are."""
+    ends = np.zeros((3, 6, 3))
+    ends[1, 4, 2], ends[2] = -0.26, 0.24
+    key = replace(of_ends(0.0, 0.0, 0.0), ends=ends).key
+    assert np.isnan(key[1]).all() and (key[0] == 0.0).all() and (key[2] == 0.24).all()
+
+
+def test_two_intervals_of_three_that_are_lost_are_a_gap() -> None:
+    """The others at the floor prove nothing: with them left out there would be none. One of ten may be set aside, as in
+    the floor."""
+    near = [0.005, -0.005] * 10
+    assert no_gap(of_ends(*near), 0.005).equivalent
+    lost = no_gap(of_ends(*near, *[0.4] * 40), 0.005)
+    assert not lost.equivalent and lost.rmse > 0.2
+    assert no_gap(of_ends(*near, 0.4, np.nan), 0.005, kept=0.9).equivalent
 
 
 def test_a_response_that_nuisances_explain_is_absorbed() -> None:

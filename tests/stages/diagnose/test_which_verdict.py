@@ -212,4 +212,4 @@ def _score(squared: np.ndarray) -> Score:
     key = np.zeros((len(squared), 6, 3))
     key[..., 0] = np.sqrt(squared)[:, None]
     none = np.zeros(len(squared))
-    return Score(elpd=none, misfit=none, key=key, sd=np.zeros(0), without=np.zeros((1, 0)))
+    return Score(elpd=none, misfit=none, ends=key, sd=np.zeros(0), without=np.zeros((1, 0)))

@@ -42,8 +42,8 @@ class NoGap:
 
 def no_gap(refit: Score, floor_m: float, *, kept: float = 1.0) -> NoGap:
     """Of the refit nominal model. kept: share of the intervals, the best ones, that the floor was taken from: the same
-    share counts here."""
-    squared = refit.squared[np.isfinite(refit.squared)]
+    share counts here. An interval that is lost is one of the worst, and counts among them (`Score.squared`)."""
+    squared = refit.squared
     squared = squared[counting(squared, kept)] if len(squared) else squared
     rmse = float(np.sqrt(squared.mean())) if len(squared) else float("inf")
     bound = upper_bound(squared, level=0.90) if len(squared) else None

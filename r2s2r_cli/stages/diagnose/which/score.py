@@ -32,21 +32,31 @@ SILENT = 0.01
 @dataclass(frozen=True)
 class Score:
     """elpd (stretch,): log predictive density of each stretch without its gait [nats], up to a constant that all
-    hypotheses share. misfit (stretch,): squares over how many there are, 1 where noise and floor explain it. key
-    (interval, cap, 3): predicted minus observed caps at its end [m]. sd (n,): of the fitted numbers, all gaits: what
-    noise leaves unsure, and how far apart simulations close together want them; without (group, n): the numbers without
-    each group."""
+    hypotheses share. misfit (stretch,): squares over how many there are, 1 where noise and floor explain it. ends
+    (interval, cap, 3): predicted minus observed caps at its end [m], NaN where nothing could be simulated. sd (n,): of
+    the fitted numbers, all gaits: what noise leaves unsure, and how far apart simulations close together want them;
+    without (group, n): the numbers without each group."""
 
     elpd: np.ndarray
     misfit: np.ndarray
-    key: np.ndarray
+    ends: np.ndarray
     sd: np.ndarray
     without: np.ndarray
 
     @property
+    def key(self) -> np.ndarray:
+        """As `ends`, NaN in the whole of an interval at the end of which a cap is lost: there is nothing to be learned
+        from where a fall led to."""
+        lost = ~(np.abs(self.ends).max(axis=(1, 2)) <= LOST_M)
+        return np.where(lost[:, None, None], np.nan, self.ends)
+
+    @property
     def squared(self) -> np.ndarray:
-        """Mean squared 3-D distance of the caps at the end of each interval, (interval,) [m^2]."""
-        return np.asarray(np.sum(self.key**2, axis=-1).mean(axis=-1))
+        """Mean squared 3-D distance of the caps at the end of each interval, (interval,) [m^2]. A lost cap counts
+        LOST_M, wherever it is, and so does one that could not be simulated: left out of a mean, an effect that is off
+        by 30 cm would look better than one that is off by 14 cm."""
+        square = np.sum(self.ends**2, axis=-1)
+        return np.asarray(np.minimum(np.where(np.isfinite(square), square, np.inf), LOST_M**2).mean(axis=-1))
 
 
 def gains(refit: Score, others: Sequence[Score], enough: float = ENOUGH) -> np.ndarray:
@@ -102,7 +112,7 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: b
     normals = [(*own, *solver.normal(fit, own)) for fit, own in zip(fits, products, strict=True)]
     n, caps = len(fits), arena.whole[0].caps.shape[1]
     elpd, misfit = np.full((n, len(groups)), -np.inf), np.full((n, len(groups)), np.inf)
-    key = np.full((n, len(of_whole), caps, 3), np.nan)
+    reached = np.full((n, len(of_whole), caps, 3), np.nan)
     without: list[list[np.ndarray]] = [[] for _ in fits]
     away = np.repeat(np.array([fit.away for fit in fits]), DRAWS, axis=0)
     weights = [solver.weights(fit) for fit in fits]
@@ -120,15 +130,14 @@ def scores(arena: Arena, fits: Sequence[Fit], groups: np.ndarray, *, held_out: b
         white = arena.settled(values, z, own.tolist(), away).reshape(n, DRAWS, -1)
         first = slice(None, None, DRAWS)
         if len(ends):  # where the robot tips over as an interval begins, there is no key frame
-            key[:, ends] = arena.keys(values[first], z[first], ends.tolist())
+            reached[:, ends] = arena.keys(values[first], z[first], ends.tolist())
         for i, (fit, one) in enumerate(zip(fits, left, strict=True)):
             without[i].append(one.points[0])
             for k in own:
                 elpd[i, k], misfit[i, k], pull = _piece(arena.white[k], fit.jacobian, white[i], one, weights[i][k])
                 pulls[i] += pull
-    key[np.abs(key).max(axis=(2, 3)) > LOST_M] = np.nan
     sds = [_sd(H, pull) for (_, _, H, _), pull in zip(normals, pulls, strict=True)]
-    return [Score(elpd[i], misfit[i], key[i], sds[i], np.array(without[i])) for i in range(n)]
+    return [Score(elpd[i], misfit[i], reached[i], sds[i], np.array(without[i])) for i in range(n)]
 
 
 def _sd(H: np.ndarray, pulls: np.ndarray) -> np.ndarray:

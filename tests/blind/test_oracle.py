@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from r2s2r_cli.blind.make import oracle
+from r2s2r_cli.blind.make import one, oracle
 from r2s2r_cli.blind.make.looks import Looks
-from r2s2r_cli.blind.make.oracle import MOST, _Told
+from r2s2r_cli.blind.make.oracle import MOST, Detectable, _Told
 from r2s2r_cli.blind.make.worlds import Hidden, hidden
 from r2s2r_cli.blind.split import Bank, Kind
 
@@ -59,9 +61,9 @@ def test_it_is_taken_off_on_the_average() -> None:
 
 def test_no_interval_counts_for_more_than_the_next() -> None:
     """One that differs alone is nothing, two are worth MOST each at most."""
-    one = told([looks()] * 4)
-    assert one(looks({0: 1.0}))[0] == pytest.approx(0.0, abs=1e-6)
-    assert one(looks({0: 1.0, 1: 1.0}))[0] == pytest.approx(np.sqrt(2.0) * MOST, rel=1e-6)
+    plain = told([looks()] * 4)
+    assert plain(looks({0: 1.0}))[0] == pytest.approx(0.0, abs=1e-6)
+    assert plain(looks({0: 1.0, 1: 1.0}))[0] == pytest.approx(np.sqrt(2.0) * MOST, rel=1e-6)
 
 
 def test_a_fall_that_pushes_bring_about_is_part_of_the_floor_of_cables_too() -> None:
@@ -69,3 +71,22 @@ def test_a_fall_that_pushes_bring_about_is_part_of_the_floor_of_cables_too() -> 
     still, there = looks(), looks({0: 0.01, 1: 0.01})
     shaken = [looks(dict.fromkeys(range(2), sign * 0.05)) for sign in (1.0, -1.0)] * 3
     assert told([still], shaken)(there)[0] < 0.5 * told([still])(there)[0]
+
+
+@pytest.mark.parametrize(("gaits", "told"), [(1, [0]), (3, [0, 1]), (5, [0, 1, 2]), (8, [0, 1, 2, 3, 4])])
+def test_judged_gaits_do_not_make_a_set_clear(
+    gaits: int, told: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever the last third of the gaits shows, d is of those that a diagnosis is given to fit."""
+    asked: list[list[int]] = []
+
+    def detectable(robot: object, hidden: Hidden, runs: list[int]) -> Detectable:
+        asked.append(runs)
+        return Detectable(9.0, (9.0,), 1.0)
+
+    monkeypatch.setattr(one, "drive", lambda robot, world, gait, number, **how: number)
+    monkeypatch.setattr(one, "write_seen", lambda *_: None)
+    monkeypatch.setattr(one, "detectability", detectable)
+    world = hidden(Bank.CALIBRATION, 150_321, Kind.SINGLE, effects=("sensor_bias",), gaits=gaits)
+    label = one.make_set(world, tmp_path / "set")
+    assert asked == [told] and label["d"] == 9.0 and label["gaits"] == gaits

@@ -14,6 +14,7 @@ from r2s2r_cli.blind.make.onset import onset
 from r2s2r_cli.blind.make.oracle import Detectable, detectability
 from r2s2r_cli.blind.make.worlds import Hidden
 from r2s2r_cli.blind.make.write import robot_text, write_seen
+from r2s2r_cli.blind.split import judged
 from schemas.robot import Robot
 
 
@@ -21,7 +22,7 @@ def make_set(hidden: Hidden, folder: Path, *, observed: int = 0, oracle: bool = 
     """Write the set into `folder` (which must not be there yet) and return its label.
 
     observed: which draw of the camera's noise; other ones are other observations of the same motion. oracle: compute
-    how well the effect can be told (three more simulations of every run).
+    how well the effect can be told from the gaits that are fitted (more simulations of each of them).
 
     Raises NumericalError where MuJoCo breaks down, FileExistsError.
     """
@@ -41,8 +42,14 @@ def make_set(hidden: Hidden, folder: Path, *, observed: int = 0, oracle: bool = 
             noise = np.random.default_rng([hidden.seed, 14, observed, number])
             write_seen(folder / part, run, world, number, robot, noise)
             runs += [run] if part == "gaits" else []
-    found = detectability(robot, hidden, runs) if oracle and _wrong(hidden) else None
+    found = detectability(robot, hidden, fitted(runs)) if oracle and _wrong(hidden) else None
     return label(hidden, runs, found, observed)
+
+
+def fitted(runs: list[Driven]) -> list[Driven]:
+    """Gaits that a diagnosis of the set is given to fit (`sets.read_set`): what the judged ones show, the last, it
+    never learns from. Of a single gait, which is no set to be judged, that one."""
+    return runs[: len(runs) - judged(len(runs))] or runs
 
 
 def label(hidden: Hidden, runs: list[Driven], found: Detectable | None, observed: int) -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """How well an effect can be told: noise-free pairs of the rig with it and without it, what nuisances could explain
 projected off.
 
-Every target interval of every gait is simulated again without what is wrong, from the true state at its start and under
-the recorded duties (command replay). The difference of end caps and sensor lengths is whitened with the noise and the
+Every target interval of every gait that is fitted is simulated again without what is wrong, from the true state at its
+start and under the recorded duties (command replay). The difference of end caps and sensor lengths is whitened with the noise and the
 floor, and projected on the complement of the rig's own sensitivities to friction, motor speed (both common to the set)
 and start pose (x, y and heading of every interval: exact, the floor is the same everywhere). The rest of the pose is
 known as well as the camera's noise allows: every interval is simulated a few times more from a start that was pushed
@@ -68,7 +68,7 @@ class _Reach:
 
 
 def detectability(robot: Robot, hidden: Hidden, runs: list[Driven]) -> Detectable:
-    """Of a set whose gaits ran as `runs`. Raises NumericalError as the rig does."""
+    """Of a set whose gaits that are fitted ran as `runs`, the first ones. Raises NumericalError as the rig does."""
     plain = hidden.healthy()
     base = [replayed(robot, plain, run, g) for g, run in enumerate(runs)]
     rub = [replayed(robot, replace(plain, friction=plain.friction * (1 + STEP)), run, g) for g, run in enumerate(runs)]

@@ -1,6 +1,7 @@
 """The table of the trials: closed forms, and that nobody passes it who does not look."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -93,6 +94,20 @@ def test_a_set_that_failed_is_a_miss_everywhere() -> None:
     rows = {row.name: row for row in result.rows}
     assert result.failed == 1 and rows["top1_clear"].value == 0.0 and rows["share_named"].value == 0.0
     assert result.misses[0].why == "the diagnosis broke off"
+
+
+def test_the_90_percent_set_of_a_diagnosis_that_broke_off_holds_nothing() -> None:
+    """Two sets of three are right and hold two names, one broke off: coverage is 2 of 3, and the median of the sizes
+    that of the two."""
+    label = next(one for one in LABELS if one["kind"] == "single" and one["d"] > 8)
+    truth = truth_of(label)
+    broken = said_of({"failed": "no memory", "diagnosis": {}})
+    good = replace(broken, failed=False, verdict="effect", order=(str(truth.right),), probability=(0.9,),
+                   set90=(str(truth.right), "none"))  # fmt: skip
+    found = [("a", truth, good), ("b", truth, good), ("c", truth, broken)]
+    rows = {row.name: row for row in score_of(found, tier="B", bank="test", sets=3, index="0").rows}
+    assert rows["coverage"].n == 3 and rows["coverage"].value == pytest.approx(2 / 3)
+    assert rows["set_size"].n == 2 and rows["set_size"].value == 2.0
 
 
 def test_of_shuffled_commands_only_the_control_is_told() -> None:

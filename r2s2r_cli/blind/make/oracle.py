@@ -2,12 +2,12 @@
 projected off.
 
 Every target interval of every gait that is fitted is simulated again without what is wrong, from the true state at its
-start and under the recorded duties (command replay). The difference of end caps and sensor lengths is whitened with the noise and the
-floor, and projected on the complement of the rig's own sensitivities to friction, motor speed (both common to the set)
-and start pose (x, y and heading of every interval: exact, the floor is the same everywhere). The rest of the pose is
-known as well as the camera's noise allows: every interval is simulated a few times more from a start that was pushed
-as far, and what that changes of caps and lengths, a fall that comes earlier, is no effect's; neither is a clock that is
-some milliseconds off.
+start and under the recorded duties (command replay). The difference of end caps and sensor lengths is whitened with
+the noise and the floor, and projected on the complement of the rig's own sensitivities to friction, motor speed (both
+common to the set) and start pose (x, y and heading of every interval: exact, the floor is the same everywhere). The
+rest of the pose is known as well as the camera's noise allows: every interval is simulated a few times more from a
+start that was pushed as far, and what that changes of caps and lengths, a fall that comes earlier, is no effect's;
+neither is a clock that is some milliseconds off.
 d is the length of what is left: with d >= 8 no test would miss it.
 No interval counts for more than MOST, nor for more than the one that counts next: one tip-over that happens in one
 world and not in the other is worth more than all the rest together, and says nothing about which effect it was. Nor

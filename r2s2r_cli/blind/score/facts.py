@@ -16,8 +16,8 @@ WEAK, CLEAR = 3.0, 8.0
 class Truth:
     """kind: none | single | pair | outside. effects: ids. d: of everything together, 0 where nothing is wrong (up to
     `blind-b-11` of all gaits, since then of the fitted ones); each: of every effect. element: {"kind", "index"} of a
-    single one that has one. place: of a patch [m]. onset: target interval
-    of the set with which it begins, 1-based; None: it holds throughout. noise_m, gaits, rate_hz: of what was recorded.
+    single one that has one. place: of a patch [m]. onset: target interval of the set with which it begins, 1-based;
+    None: it holds throughout. noise_m, gaits, rate_hz: of what was recorded.
     """
 
     kind: str

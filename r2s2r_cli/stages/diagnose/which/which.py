@@ -85,7 +85,9 @@ def compare_effects(
     said = marginal_gains(arena, base, fits).less(old)
     # Beside an effect that gains no more than chance does even left out, a second one is no second cause.
     likely = said.counted.max(initial=0.0) > by_chance
-    pairs = pairs_of(arena, base, fits, said.counted, responses, told_by or {}) if likely else []
+    # Directions of the screening are white under the floor of then, and its nuisances begin where the base was then.
+    now = screen(arena, base, known) if likely and wider > 1.0 else responses
+    pairs = pairs_of(arena, base, fits, said.counted, now, told_by or {}) if likely else []
     if pairs:
         first = int(said.counted.argmax())
         alone = led(Fits(arena), fits[first], pairs, iterations=ITERATIONS)

@@ -10,6 +10,7 @@ import numpy as np
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run, whole
 from r2s2r_cli.stages.diagnose.floors import NUMERICS_M, floor_for, healthy_floor
+from r2s2r_cli.stages.diagnose.parity.fitted import unheard
 from r2s2r_cli.stages.diagnose.parity.lengths import late_readings
 from r2s2r_cli.stages.diagnose.starts import Starts, as_known
 from r2s2r_cli.stages.diagnose.which.arena import Arena
@@ -95,7 +96,7 @@ def refit(
         floor = floor if evidence.floor is not None else healthy_floor(healthy)
         told("healthy runs", 1, 1)
     arena, base = _fitted(
-        evidence.runs, evidence.fit, replayer, simulator, (noise, lasts), prior, starts, begin, late, told
+        unheard(evidence), evidence.fit, replayer, simulator, (noise, lasts), prior, starts, begin, late, told
     )
     if not again:
         arena, base = _frozen(arena, base, prior)

@@ -10,8 +10,9 @@ import pytest
 
 from r2s2r_cli.stages.diagnose.evidence import Evidence, Run
 from r2s2r_cli.stages.diagnose.parity import parity
-from r2s2r_cli.stages.diagnose.parity.fitted import fitted_runs
+from r2s2r_cli.stages.diagnose.parity.fitted import fitted_runs, unheard
 from r2s2r_cli.stages.diagnose.parity.lengths import late_readings
+from r2s2r_cli.stages.diagnose.sensor_noise import noise_of
 from r2s2r_cli.stages.identify.data import Selection
 from tests.support.parity_log import INTERVALS, evidence_of, swaying, with_caps
 
@@ -118,3 +119,26 @@ def test_a_run_that_is_judged_whole_is_not_there(swayed: Run) -> None:
     both = replace(evidence_of((swayed, swaying("h", 4))), fit=(Selection("h", EVERY),), judge=(Selection("g", EVERY),))
     (only,) = fitted_runs(both)
     assert only is both.runs[1]
+
+
+@pytest.mark.parametrize("judged", SPLITS[::5])
+def test_sensors_are_not_heard_in_judged_intervals(swayed: Run, judged: tuple[int, ...]) -> None:
+    """Where the simulator is refitted readings of judged intervals are not there, all others are, and the caps, which
+    start states go through, stay."""
+    (run,) = unheard(split(swayed, judged))
+    assert run.caps is swayed.caps and run.lengths is not None and swayed.lengths is not None
+    kept = ~of_judged(swayed, judged, swayed.lengths.t)
+    assert np.array_equal(run.lengths.t, swayed.lengths.t[kept])
+    assert np.array_equal(run.lengths.length, swayed.lengths.length[kept])
+
+
+def test_how_much_a_sensor_scatters_is_not_learned_from_judged_intervals(swayed: Run) -> None:
+    """Twenty times the noise in the last three of six intervals: that of a sensor is what it was."""
+    lengths = swayed.lengths
+    assert lengths is not None
+    loud, later = lengths.length.copy(), of_judged(swayed, (4, 5, 6), lengths.t)
+    loud[later] += 0.01 * np.random.default_rng(0).standard_normal(loud[later].shape)
+    (run,) = unheard(split(replace(swayed, lengths=replace(lengths, length=loud)), (4, 5, 6)))
+    assert run.lengths is not None
+    assert noise_of(run.lengths.length) == pytest.approx(noise_of(lengths.length[~later]))
+    assert (noise_of(loud) > 2 * noise_of(run.lengths.length)).all()

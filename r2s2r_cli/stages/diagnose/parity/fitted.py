@@ -30,6 +30,27 @@ def fitted_runs(evidence: Evidence) -> tuple[Run, ...]:
     return tuple(found)
 
 
+def unheard(evidence: Evidence) -> tuple[Run, ...]:
+    """All runs, whole, but for what sensors read in judged intervals: how much they scatter is learned from all of a
+    run's readings, and those about a key frame reach into the next interval. Caps stay: a start state is that of the
+    whole run up to there."""
+    found = []
+    for run in evidence.runs:
+        judged = _intervals(evidence.judge, run.name)
+        if run.lengths is None or not judged:
+            found.append(run)
+            continue
+        caps, table = run.caps, run.caps.intervals
+        kept = np.ones(len(run.lengths.t), dtype=bool)
+        for k in judged:
+            first = int(table.first[k - 1])
+            begin = _stop(caps, first, table.target[k - 1]) if first else -np.inf
+            end = float(caps.t[table.first[k]]) if k < len(table) else np.inf
+            kept &= (run.lengths.t < begin) | (run.lengths.t >= end)
+        found.append(replace(run, lengths=replace(run.lengths, t=run.lengths.t[kept], length=run.lengths.length[kept])))
+    return tuple(found)
+
+
 def _intervals(part: Sequence[Selection], run: str) -> list[int]:
     return [k for one in part if one.run == run for k in one.intervals]
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.next_apart import apart, left
-from r2s2r_cli.stages.diagnose.next_gait import SETTLE_S, _commands, _imagined
+from r2s2r_cli.stages.diagnose.next_gait import SETTLE_S, _commands, _imagined, _name, _remaining
 from r2s2r_cli.stages.diagnose.sample import _at_rest, planted
 from r2s2r_cli.stages.diagnose.stage import library_of
 from r2s2r_cli.stages.diagnose.which.arena import Arena
@@ -18,6 +21,7 @@ from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
 from r2s2r_cli.stages.diagnose.which.stretches import stretch_of
+from r2s2r_cli.stages.diagnose.which.which import Compared
 from r2s2r_cli.stages.identified import nominal
 from r2s2r_cli.stages.identify.windows import window
 from tests.support.builders import robot
@@ -38,6 +42,31 @@ def test_the_library_has_the_excitations_and_what_was_planned() -> None:
     made = library_of(robot(), {"straight": [[1.0] * 6, [0.0] * 6]}).gaits
     assert {"ramps", "holds", "reversals", "repeats", "straight"} <= set(made)
     assert made["straight"][1] == (0.0,) * 6
+
+
+def _compared(set90: Sequence[str], ranked: Mapping[str, float], fitted: Sequence[str]) -> Compared:
+    """A ranking by name with its probabilities, and which of it was fitted."""
+    fits = [SimpleNamespace(hypothesis=SimpleNamespace(parts=(name,), effects=(name,))) for name in fitted]
+    ranking = [SimpleNamespace(effect=name, probability=p) for name, p in ranked.items()]
+    base = SimpleNamespace(hypothesis=SimpleNamespace(parts=(), effects=()))
+    return cast("Compared", SimpleNamespace(base=base, fits=fits, which=SimpleNamespace(set90=set90, ranking=ranking)))
+
+
+def test_nothing_wrong_is_always_a_candidate_and_what_predicts_nothing_never() -> None:
+    """Most probable first; three effects of the 90 % set at most; where it has none that a replay tells, the best of
+    the rest stands against nothing wrong."""
+    ranked = {"payload": 0.4, "none": 0.2, "unknown": 0.1, "dropout": 0.1, "a": 0.08, "b": 0.06, "c": 0.05}
+    fits, p = _remaining(
+        _compared(("payload", "dropout", "unknown", "a", "b", "c"), ranked, ("c", "b", "a", "payload"))
+    )
+    assert [_name(fit) for fit in fits] == ["payload", "none", "a", "b"]
+    assert p.tolist() == [0.4, 0.2, 0.08, 0.06]
+    fits, _ = _remaining(
+        _compared(("none", "unknown"), {"none": 0.7, "unknown": 0.1, "a": 0.01, "b": 0.01}, ("b", "a"))
+    )
+    assert [_name(fit) for fit in fits] == ["none", "a"]
+    fits, _ = _remaining(_compared(("dropout",), {"dropout": 0.9, "none": 0.1}, ()))
+    assert [_name(fit) for fit in fits] == ["none"]
 
 
 def _pieces(seed: int, count: int = 12, numbers: int = 40) -> list[np.ndarray]:

@@ -104,6 +104,8 @@ class ShrinkageFound(Frozen):
 
 INDISTINCT = 3.0
 """[nats] Two effects that runs tell apart by less than this cannot be told apart."""
+IN_WORDS = {"none": "nothing wrong", "unknown": "something unnamed"}
+"""Names of a ranking that are no effects, in a sentence."""
 BY_CHANCE = 4.0
 """[nats] That the parity stage says for the best of a whole catalogue where nothing is wrong: less than that says
 nothing, and weighed like more it outdoes gains that are real."""
@@ -117,9 +119,12 @@ class NextGaitFound(Frozen):
     """A policy file for `r2s2r record FILE`; None with --no-draw: it is written beside the pictures."""
     targets: tuple[tuple[float, ...], ...]
     nats: float
-    """By which it separates the two candidates that are nearest to each other."""
+    """What it is worth: equally probable candidates would have to stand so far apart for the right one to become as
+    much likelier as is expected after it."""
     now: float | None
-    """The same of the gaits that were run."""
+    """The same of the gaits that were run, were the best of them run again."""
+    candidates: tuple[str, ...] = ()
+    """Names that it would tell apart, most probable first; `none`: nothing wrong."""
 
 
 class SegmentFound(Frozen):

@@ -236,12 +236,14 @@ def _policy(report: DiagnoseReport) -> bytes:
     """The next gait as a policy file."""
     import tomlkit
 
+    from schemas.results_diagnose import IN_WORDS
+
     one = report.next_gait
     assert one is not None  # noqa: S101 - asked by the caller
-    pairs = ", ".join(sorted({name for pair in report.confusable for name in pair[:2]}))
+    names = ", ".join(IN_WORDS.get(name, name) for name in one.candidates)
     head = {
         "schema_version": 1, "robot": report.robot, "name": "next-gait",
-        "description": f"{one.name}: separates what diagnose could not decide between ({pairs})",
+        "description": f"{one.name}: to tell apart what diagnose could not ({names})",
         "steps": [{"target": list(target)} for target in one.targets],
     }  # fmt: skip
     return tomlkit.dumps(head).encode()

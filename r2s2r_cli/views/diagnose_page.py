@@ -10,7 +10,7 @@ from r2s2r_cli.views.diagnose_ranking import element_words, ranking_table
 from r2s2r_cli.views.diagnose_words import HELD_OUT, LEFT_OUT, TWO_ERRORS, WHY_NONE, verdict_words
 from r2s2r_cli.views.page import Page, PageTable, Picture, counted, render
 from schemas.people import plain_name, quantity, share_of_gap
-from schemas.results_diagnose import INDISTINCT
+from schemas.results_diagnose import IN_WORDS, INDISTINCT
 
 if TYPE_CHECKING:
     from schemas.results_diagnose import DiagnoseReport, NextGaitFound, PairFound, RankedName
@@ -126,7 +126,7 @@ def _limits(report: DiagnoseReport) -> Iterator[list[str]]:
     if command:
         yield ["use it", command]
     if report.next_gait is None:
-        yield ["run next", f"no gait of the library would decide more{_healthy(report)}"]
+        yield ["run next", f"no gait of the library is likely to decide more{_healthy(report)}{_any(report)}"]
     else:
         yield ["run next", _next(report.next_gait, _free(report))]
 
@@ -163,6 +163,13 @@ def _healthy(report: DiagnoseReport) -> str:
     return f"; healthy runs would, of the robot as it was when nothing was wrong: {', then '.join(commands)}"
 
 
+def _any(report: DiagnoseReport) -> str:
+    """What runs of any kind are good for where no gait tells candidates apart: that nothing is wrong is a test of a
+    bound, which narrows with them."""
+    open_ = report.verdict == "ambiguous" and report.ranking and report.ranking[0].effect == "none"
+    return "; more runs of any gait narrow the bound that `no_gap` is judged by" if open_ else ""
+
+
 def _next(one: NextGaitFound, where: str) -> str:
     """What to run (where: the option that says in which iteration), and what it is worth beside the runs so far."""
     how = f": r2s2r record {one.file}{where} --repeats 2 {ROBOT}" if one.file else ""
@@ -170,7 +177,9 @@ def _next(one: NextGaitFound, where: str) -> str:
         return f"nothing separates the candidates better than these runs; the best of the library is {one.name}{how}"
     beside = "" if one.now is None else f", these runs by {one.now:.1f}"
     enough = "" if one.nats >= INDISTINCT else " (too few to tell them apart)"
-    return f"{one.name}: would separate the likeliest candidates by {one.nats:.1f} nats{enough}{beside}{how}"
+    names = [IN_WORDS.get(name, name) for name in one.candidates]
+    whom = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "the likeliest candidates"
+    return f"{one.name}: would separate {whom} by {one.nats:.1f} nats{enough}{beside}{how}"
 
 
 def _how(report: DiagnoseReport, *, brief: bool) -> Iterator[list[str]]:

@@ -175,7 +175,7 @@ LEFT_OUT = {
     ("PublishedRank", "RankedName"): {"ci90", "units", "on_bound"},
     ("PublishedWhere", "WhereFound"): {"segments", "onset"},
     ("PublishedShrinkage", "ShrinkageFound"): {"metric", "judged_on", "set_aside", "within_run"},
-    ("PublishedNext", "NextGaitFound"): {"file", "targets"},
+    ("PublishedNext", "NextGaitFound"): {"file", "targets", "candidates"},
     ("PublishedDiagnosis", "DiagnoseReport"): {
         "iteration", "free_iteration", "robot", "floor_from", "floor_given", "left_out", "segments", "hidden",
         "missing", "refit", "refit_units", "rollouts", "within_run", "wall_s", "seconds", "warnings",

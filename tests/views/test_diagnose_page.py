@@ -131,6 +131,22 @@ def test_what_to_run_next_is_said_beside_what_was_run(nats: float, now: float | 
     assert rows == [["run next", f"{words}: {command}"]]
 
 
+def test_what_would_be_told_apart_is_named_nothing_wrong_among_it() -> None:
+    """The refit nominal model is a candidate too, in words."""
+    one = NextGaitFound(name="ramps", file=None, targets=((1.0,),), nats=9.0, now=None,
+                        candidates=("none", "payload", "com_offset"))  # fmt: skip
+    rows = [row for table in diagnose_tables(report().model_copy(update={"next_gait": one})) for row in table.rows]
+    assert ["run next", "ramps: would separate nothing wrong, payload and com_offset by 9.0 nats"] in rows
+
+
+def test_more_runs_are_asked_for_where_the_bound_of_no_gap_is_what_is_open() -> None:
+    """Nothing wrong is the likeliest, and no gait tells it from effects: any run narrows the bound."""
+    nothing = report().ranking[0].model_copy(update={"effect": "none", "size": {}})
+    made = report().model_copy(update={"verdict": "ambiguous", "effects": (), "ranking": (nothing,)})
+    (advice,) = [row[1] for table in diagnose_tables(made) for row in table.rows if row[0] == "run next"]
+    assert advice.endswith("; more runs of any gait narrow the bound that `no_gap` is judged by")
+
+
 def test_no_error_lies_outside_of_its_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     """Panels share an axis of errors: the largest of the last run is seen as well, and 0 is its lower end."""
     figures: list[Figure] = []
@@ -171,5 +187,5 @@ def test_where_no_gait_helps_healthy_runs_would() -> None:
 
     assert f"r2s2r record --random 15 --repeats 2 --iteration 2 {ROBOT}" in advice(undecided)
     assert "r2s2r diagnose --iteration 1 --also 2 --healthy RUN" in advice(undecided)
-    plain = "no gait of the library would decide more"
+    plain = "no gait of the library is likely to decide more"
     assert advice(undecided.model_copy(update={"missing": ()})) == plain == advice(report().model_copy(update=lacking))

@@ -89,9 +89,10 @@ def diagnose(
         again=settings.refit_baseline, with_floor=settings.with_floor,
     )  # fmt: skip
     at_floor, kept = fitted.floor.equivalence
+    learned = settings.calibration or calibration()
     compared = compare_effects(
         fitted.arena, fitted.base, floor_m=at_floor, kept=kept,
-        calibration=settings.calibration or calibration(),
+        calibration=learned,
         sizes={} if said is None else said.starts(), told_by=None if said is None else said.nats(),
         effects=settings.effects, seed=settings.seed, told=progress,
         strangers=settings.with_unknown, healthy=fitted.healthy,
@@ -115,7 +116,7 @@ def diagnose(
             evidence, compared, floor=fitted.floor, healthy=fitted.healthy, starts=starts, seed=settings.seed,
             told=progress,
         )  # fmt: skip
-    after = next_gait(evidence, compared, settings.library, told=progress)
+    after = next_gait(evidence, compared, settings.library, calibration=learned, told=progress)
     sd = compared.refit.sd
     return Diagnosis(
         robot=evidence.robot.name, floor=fitted.floor, parity=said, where=found, which=compared.which, much=shrunk,

@@ -1,8 +1,10 @@
-"""How far two candidates would stand apart on a policy that nobody has run, counted as the comparison counts.
+"""How far candidates would stand apart on a policy that nobody has run, counted as the comparison counts.
 
-The policy is imagined with the first candidate as the truth, and cut into pieces that begin anew where that one would
-have been seen. The other one may fit its nuisances and its own numbers to what it sees there: only what is left tells
-them apart, and no piece decides alone (`which/mixture.py`).
+The policy is imagined, and cut into pieces that begin anew where the most probable candidate would have been seen. Each
+candidate in turn is the truth, with nuisances a little off from where its fit stands. All may fit nuisances and their
+own numbers to what is seen then: only what is left tells them apart, and no piece decides alone (`which/bounded.py`).
+The truth may be left with something as well. Where a robot tips over a little nuisance is enough for another instant,
+so that even the right simulator errs by decimetres there: such a piece speaks for nobody, or for the wrong one.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import SECANT, Arena
+from r2s2r_cli.stages.diagnose.which.bounded import bounded
 from r2s2r_cli.stages.diagnose.which.fit import PRIOR_SCALES, Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.mixture import ENOUGH
@@ -24,55 +27,77 @@ from r2s2r_cli.stages.diagnose.which.white import FLOOR_S
 from r2s2r_cli.stages.identify.windows import Window
 
 ROUNDS = 6
+PAIRS = 2
+"""Of draws of the nuisances, one to each side, that a truth is imagined with."""
 
 
-def apart(arena: Arena, whole: Stretch, truth: Fit, others: Sequence[Fit]) -> tuple[float, ...]:
-    """Nats between the truth and each of others on an imagined policy `whole`, whose frames alone count."""
+def apart(arena: Arena, whole: Stretch, fits: Sequence[Fit]) -> np.ndarray:
+    """Nats (truth, candidate) by which each truth is told from each candidate, 0 from itself, on an imagined policy
+    `whole`, whose frames alone count. fits: most probable first; the refit nominal model, where it is one of them, is
+    where derivatives by the nuisances are taken."""
     solver = Fits(arena)
-    own = solver.values(truth.hypothesis, truth.z[None], truth.x[None])
-    many = _pieces(arena, whole, own[0])
-    p = len(arena.engine)
+    p, drawn = len(arena.engine), _drawn(arena)
+    middle = next((fit for fit in fits if not fit.hypothesis.parts), fits[0])
     by = SECANT * np.array([arena.model.numbers[k].sd for k in arena.engine])
-    moved = np.clip(truth.z[:p] + np.where(truth.z[:p] + by > arena.upper[:p], -by, by), arena.lower[:p], None)
-    around = np.repeat(truth.z[None], p, axis=0)
+    moved = np.clip(middle.z[:p] + np.where(middle.z[:p] + by > arena.upper[:p], -by, by), arena.lower[:p], None)
+    around = np.repeat(middle.z[None], p, axis=0)
     around[np.arange(p), np.arange(p)] = moved
-    rows = [own, solver.values(truth.hypothesis, around, np.repeat(truth.x[None], p, axis=0))]
-    for fit in others:
-        rows.append(solver.values(fit.hypothesis, np.repeat(fit.z[None], 1 + len(fit.x), axis=0), _sizes(fit)))
+    rows, places, at = [], [], 0
+    for fit in fits:  # of each: where it stands, its own numbers moved, its nuisances drawn
+        sizes, count = _sizes(fit), len(fit.x)
+        z = np.repeat(fit.z[None], 1 + count + len(drawn), axis=0)
+        z[1 + count :, :p] = np.clip(fit.z[:p] + drawn, arena.lower[:p], arena.upper[:p])
+        rows.append(solver.values(fit.hypothesis, z, np.concatenate([sizes, np.repeat(fit.x[None], len(drawn), 0)])))
+        places.append((at, slice(at + 1, at + 1 + count), slice(at + 1 + count, at + len(z))))
+        at += len(z)
+    rows.append(solver.values(middle.hypothesis, around, np.repeat(middle.x[None], p, axis=0)))
+    many = _pieces(arena, whole, rows[0][0])
     seen = [_white(arena, one, sight) for one, sight in zip(many, _sights(arena, many, rows), strict=True)]
-    step = np.where(moved == truth.z[:p], np.inf, moved - truth.z[:p])
-    found, first = [], 1 + p
-    for fit in others:
-        last = first + 1 + len(fit.x)
-        width = np.array([size - fit.x for size in _sizes(fit)[1:]]).sum(axis=1) if len(fit.x) else np.zeros(0)
-        columns = [
-            np.concatenate(
-                [(one[1 : 1 + p] - one[0]) / step[:, None], (one[first + 1 : last] - one[first]) / width[:, None]]
-            )
-            for one in seen
-        ]
+    step = np.where(moved == middle.z[:p], np.inf, moved - middle.z[:p])
+    middle_row = places[[fit is middle for fit in fits].index(True)][0]
+    truths = [one[np.concatenate([np.r_[drawn_rows] for _, _, drawn_rows in places])] for one in seen]
+    costs = []
+    for fit, (own, sizes_rows, _) in zip(fits, places, strict=True):
+        width = np.diag(_sizes(fit)[1:] - fit.x)[:, None] if len(fit.x) else np.zeros((0, 1))
+        columns = []
+        for one in seen:
+            by_nuisance = (one[at:] - one[middle_row]) / step[:, None]
+            by_nuisance[[k for k in solver.overruled(fit.hypothesis) if k < p]] = 0.0
+            columns.append(np.concatenate([by_nuisance, (one[sizes_rows] - one[own]) / width]))
         prior = np.zeros((p + len(fit.x), p + len(fit.x)))
         prior[:p, :p] = arena.precision[:p, :p]
         prior[range(p, len(prior)), range(p, len(prior))] = (PRIOR_SCALES * fit.hypothesis.stack("scale")) ** -2.0
-        found.append(left([one[first] - one[0] for one in seen], columns, prior))
-        first = last
-    return tuple(found)
+        costs.append(left([truth - one[own] for truth, one in zip(truths, seen, strict=True)], columns, prior))
+    nats = np.mean(np.array(costs).reshape(len(fits), len(fits), len(drawn)), axis=2).T
+    return np.asarray(nats - np.diag(nats)[:, None])
 
 
-def left(difference: Sequence[np.ndarray], columns: Sequence[np.ndarray], prior: np.ndarray) -> float:
-    """What is left [nats] of differences (number,) by piece, white, when the numbers whose columns (n, number) are
-    given are fitted to them, with prior precision (n, n): half the squares of each piece fully up to ENOUGH, by their
-    logarithm above."""
+def left(difference: Sequence[np.ndarray], columns: Sequence[np.ndarray], prior: np.ndarray) -> np.ndarray:
+    """What counts (case,) [nats] of differences (case, number) by piece, white, when the numbers whose columns (n,
+    number) are given are fitted to each case, with prior precision (n, n). They are fitted as fits are, each piece
+    fully up to `mixture.ENOUGH` and by its logarithm above, and counted as the ranking does: less of each piece."""
     H = np.array([J @ J.T for J in columns])
-    g = np.array([J @ d for J, d in zip(columns, difference, strict=True)])
-    square = np.array([d @ d for d in difference])
-    x, best = np.zeros(len(prior)), np.inf
+    g = np.array([d @ J.T for J, d in zip(columns, difference, strict=True)])
+    square = np.array([np.sum(d**2, axis=1) for d in difference])
+    x, best = np.zeros(g.shape[1:]), np.full(square.shape[1], np.inf)
     for _ in range(ROUNDS):
-        half = 0.5 * np.maximum(square - 2.0 * g @ x + np.einsum("i,kij,j->k", x, H, x), 0.0)
-        best = min(best, float(np.sum(ENOUGH * np.log1p(half / ENOUGH)) + 0.5 * x @ prior @ x))
+        fitted = np.sum((np.einsum("kij,cj->kci", H, x) - 2.0 * g) * x, axis=2)
+        half = 0.5 * np.maximum(square + fitted, 0.0)
+        nothing, counted = bounded(np.stack([np.zeros_like(half), -half]))
+        best = np.minimum(best, np.sum(nothing - counted, axis=0) + 0.5 * np.sum(x @ prior * x, axis=1))
         w = 1.0 / (1.0 + half / ENOUGH)
-        x = np.linalg.lstsq(np.einsum("k,kij->ij", w, H) + prior, w @ g, rcond=None)[0]
+        normal = np.einsum("kc,kij->cij", w, H) + prior
+        x = np.linalg.solve(normal, np.einsum("kc,kci->ci", w, g)[..., None])[..., 0]
     return best
+
+
+def _drawn(arena: Arena) -> np.ndarray:
+    """What nuisances of the engine are off by, (draw, p): SECANT of their prior sd, which the runs so far leave open.
+    The same ones for all policies, which are compared."""
+    p = len(arena.engine)
+    root = np.linalg.cholesky(np.linalg.inv(arena.precision)[:p, :p])
+    one = SECANT * np.random.default_rng(0).standard_normal((PAIRS, p)) @ root.T
+    return np.concatenate([one, -one])
 
 
 def _sizes(fit: Fit) -> np.ndarray:
@@ -111,15 +136,15 @@ def _cut(whole: Stretch, a: int, b: int) -> Window:
 
 
 def _sights(arena: Arena, many: Sequence[Stretch], rows: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """What is seen of each piece, (k, channel, F) [m]; at most LOST_M from what the truth, the first row, shows."""
+    """What is seen of each piece, (k, channel, F) [m]; at most LOST_M from what the first row shows."""
     found = []
     for one, sight in zip(many, arena.replayer.seen(many, np.concatenate(rows)), strict=True):
         parts = [sight.caps.reshape(*sight.caps.shape[:2], -1)]
         if one.length is not None:
             parts.append(sight.length)
         seen = np.concatenate(parts, axis=-1).transpose(0, 2, 1)
-        truth = np.nan_to_num(seen[:1])
-        found.append(truth + np.clip(np.nan_to_num(seen, nan=LOST_M) - truth, -LOST_M, LOST_M))
+        first = np.nan_to_num(seen[:1])
+        found.append(first + np.clip(np.nan_to_num(seen, nan=LOST_M) - first, -LOST_M, LOST_M))
     return found
 
 

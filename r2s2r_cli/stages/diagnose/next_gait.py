@@ -1,13 +1,14 @@
-"""What to run next: the gait of a library under which the remaining candidates differ most.
+"""What to run next: the gait of a library after which one is expected to be surest of the right candidate.
 
-T-optimal (Hunter and Reiner 1965): the largest of the smallest distances between the most probable candidate, as if it
-were the truth, and another one, with what that one's nuisances and numbers can make up for taken off. Commands are
-those of an ideal controller, the same for all candidates, as in the replay of a recorded run.
+Candidates are the names that remain, nothing wrong among them, each as probable as the ranking says and each in turn
+taken as the truth (`next_settled.py`); how far a gait tells them apart is counted as the ranking counts
+(`next_apart.py`). Commands are those of an ideal controller, the same for all candidates, as in the replay of a
+recorded run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,10 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Evidence
 from r2s2r_cli.stages.diagnose.next_apart import apart
+from r2s2r_cli.stages.diagnose.next_settled import settled, unsettled, worth
 from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.calibration import Calibration
+from r2s2r_cli.stages.diagnose.which.found import NONE
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.diagnose.which.which import Compared
@@ -30,8 +34,13 @@ SETTLE_S = 0.3
 RATE_HZ = 10.0
 LONGEST = 8
 """Targets of a policy that are simulated: a longer one goes on as it began."""
-REMAINING = 4
-"""Candidates that are told apart."""
+REMAINING = 3
+"""Effects that are told from each other and from nothing wrong: simulations, and so seconds, go with their number."""
+WORTH_IT = 0.02
+"""Expected probability of the right candidate that a gait must add: less is not worth a run, nor sure to be there with
+a few draws of each truth."""
+LEAST = 1e-9
+"""Probability of a candidate that the ranking has at 0, whose logarithm is asked for."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +52,10 @@ class GaitLibrary:
 
 @dataclass(frozen=True)
 class NextGait:
-    """name, targets: the policy. separates: the first candidate with every other one and the nats that it tells them
-    apart by. nats: the smallest of these; now: that of the best of the gaits that were run, in the same manner.
-    typical: median over the library, which is what a gait taken at random is worth."""
+    """name, targets: the policy. separates: the most probable candidate, taken as the truth, with every other one and
+    the nats that it is told from that by; `none` is the refit nominal model. nats: what the gait is worth
+    (`next_settled.worth`); now: the best of the gaits that were run, were it run again. typical: median over the
+    library, which is what a gait taken at random is worth."""
 
     name: str
     targets: Targets
@@ -56,63 +66,65 @@ class NextGait:
 
 
 def next_gait(
-    evidence: Evidence, compared: Compared, library: GaitLibrary, *, told: Callable[[str, int, int], None]
-) -> NextGait | None:
-    """None where fewer than two candidates remain, or there is no gait to choose from."""
-    fits = _remaining(compared)
+    evidence: Evidence, compared: Compared, library: GaitLibrary, *, calibration: Calibration,
+    told: Callable[[str, int, int], None],
+) -> NextGait | None:  # fmt: skip
+    """None where there is no gait to choose from, or none is worth a run. calibration: of the ranking."""
+    fits, p = _remaining(compared)
     if len(fits) < 2 or not library.gaits:
         return None
     told("next gait", 0, 1)
     own = {f"as run: {run.name}": _targets(run.caps.intervals.target) for run in evidence.only(evidence.fit)}
-    names = {**library.gaits, **own}
-    found: dict[str, tuple[tuple[str, str, float], ...]] = {}
-    for name, targets in names.items():
-        pairs = _distances(compared.arena, fits, targets[:LONGEST])
-        if pairs:
-            found[name] = pairs
+    nats: dict[str, np.ndarray] = {}
+    for name, targets in {**library.gaits, **own}.items():
+        for whole in _imagined(compared.arena, targets[:LONGEST]):
+            nats[name] = apart(compared.arena, whole, fits)
     told("next gait", 1, 1)
-    fresh = {name: min(nats for _, _, nats in pairs) for name, pairs in found.items() if name in library.gaits}
-    if not fresh:
+    names = [_name(fit) for fit in fits]
+    sure = {
+        name: settled(p, own_nats, calibration.temperature, none=names.index(NONE),
+                      nothing=-calibration.none / calibration.temperature)
+        for name, own_nats in nats.items()
+    }  # fmt: skip
+    before = unsettled(p)
+    best = chosen(before, {name: one for name, one in sure.items() if name in library.gaits})
+    if best is None:
         return None
-    best = max(fresh, key=lambda name: fresh[name])
-    ran = [min(nats for _, _, nats in found[name]) for name in own if name in found]
+    value = {name: worth(before, one, calibration.temperature) for name, one in sure.items()}
     return NextGait(
-        best,
-        library.gaits[best],
-        found[best],
-        fresh[best],
-        max(ran) if ran else None,
-        float(np.median(list(fresh.values()))),
-    )
+        best, library.gaits[best], tuple((names[0], names[j], float(nats[best][0, j])) for j in range(1, len(names))),
+        value[best], max((value[name] for name in own if name in value), default=None),
+        float(np.median([value[name] for name in library.gaits if name in value])),
+    )  # fmt: skip
 
 
-def _remaining(compared: Compared) -> list[Fit]:
-    """The best fits of the effects that are still in the 90 % set, at least of two; one a name."""
-    wanted = [name for name in compared.which.set90 if name not in ("none", "unknown")]
-    ranked = [one.effect for one in compared.which.ranking if one.effect not in ("none", "unknown")]
-    names = [*wanted, *(name for name in ranked if name not in wanted)][: max(2, min(len(wanted), REMAINING))]
-    found: dict[str, Fit] = {}
+def chosen(before: float, sure: Mapping[str, float]) -> str | None:
+    """The gait after which the expected probability of the truth is largest, sure by name; None where no gait adds
+    enough to that of before."""
+    best = max(sure, key=lambda name: sure[name], default=None)
+    return None if best is None or sure[best] < before + WORTH_IT else best
+
+
+def _remaining(compared: Compared) -> tuple[list[Fit], np.ndarray]:
+    """The refit nominal model and the best fits of the effects in the 90 % set, one a name and at least one, most
+    probable first, and how probable they are. `unknown` predicts nothing, and some effects change no prediction."""
+    fits: dict[str, Fit] = {NONE: compared.base}
     for fit in compared.fits:
-        if len(fit.hypothesis.parts) == 1 and fit.hypothesis.effects[0] in names:
-            found.setdefault(fit.hypothesis.effects[0], fit)
-    return list(found.values())
+        if len(fit.hypothesis.parts) == 1:
+            fits.setdefault(_name(fit), fit)
+    ranked = {one.effect: max(one.probability, LEAST) for one in compared.which.ranking if one.effect in fits}
+    effects = [name for name in ranked if name != NONE]
+    within = [name for name in effects if name in compared.which.set90][:REMAINING] or effects[:1]
+    kept = [name for name in ranked if name == NONE or name in within]
+    return [fits[name] for name in kept], np.array([ranked[name] for name in kept])
+
+
+def _name(fit: Fit) -> str:
+    return fit.hypothesis.effects[0] if fit.hypothesis.parts else NONE
 
 
 def _targets(targets: np.ndarray) -> Targets:
     return tuple(tuple(float(x) for x in row) for row in np.nan_to_num(targets, nan=1.0))
-
-
-def _distances(arena: Arena, fits: Sequence[Fit], targets: Targets) -> tuple[tuple[str, str, float], ...]:
-    """Between the first candidate, taken as the truth, and every other one; empty where there is nothing to see."""
-    many = _imagined(arena, targets)
-    if not many:
-        return ()
-    first, *others = fits
-    found = apart(arena, many[0], first, others)
-    return tuple(
-        (first.hypothesis.effects[0], other.hypothesis.effects[0], nats)
-        for other, nats in zip(others, found, strict=True)
-    )
 
 
 def _imagined(arena: Arena, targets: Targets) -> list[Stretch]:

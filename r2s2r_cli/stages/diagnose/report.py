@@ -97,7 +97,10 @@ def _next(found: Diagnosis) -> NextGaitFound | None:
     one = found.next_gait
     if one is None:
         return None
-    return NextGaitFound(name=one.name, file=None, targets=one.targets, nats=one.nats, now=one.now)
+    candidates = (one.separates[0][0], *(other for _, other, _ in one.separates))
+    return NextGaitFound(
+        name=one.name, file=None, targets=one.targets, nats=one.nats, now=one.now, candidates=candidates
+    )
 
 
 def _segments(found: Diagnosis) -> tuple[SegmentFound, ...]:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Which
+from r2s2r_cli.stages.diagnose.which.found import Which
 from schemas.people import share_of_gap
-from schemas.results_diagnose import INDISTINCT
+from schemas.results_diagnose import IN_WORDS, INDISTINCT
 
 if TYPE_CHECKING:
     from r2s2r_cli.stages.diagnose.diagnosis import Diagnosis
@@ -115,4 +115,4 @@ def _alike(which: Which, name: str) -> list[str]:
 
 
 def _named(name: str) -> str:
-    return {NONE: "nothing wrong", UNKNOWN: "something unnamed"}.get(name, name)
+    return IN_WORDS.get(name, name)

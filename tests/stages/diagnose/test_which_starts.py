@@ -86,3 +86,29 @@ def test_who_stands_badly_is_shown_where_the_others_stand() -> None:
     assert lost.z == pytest.approx([0.3, -0.2]) and lost.away == pytest.approx(found.away)
     assert len(lost.x) == 0 and found.x == pytest.approx([0.1])
     assert not lost.ended
+
+
+def test_a_size_that_is_far_off_is_found_beside_the_nuisances_of_another() -> None:
+    """A fit at a fifth of its size with nuisances that make up for the rest, beside one whose nuisances are right: its
+    own size alone leaves it where it is or worse, five times of it brings it home, and nobody is worse than before."""
+    arena = begun_away(truth=0.6, bend=0.0)
+    solver = Fits(arena)  # type: ignore[arg-type]
+    wrong = Hypothesis((candidate("wrong", 1),))
+    home = fitted(arena, RIGHT)
+    beside, held = solver.begun([(wrong, home.z, np.array([0.3])), (RIGHT, np.array([4.0, -4.0]), np.array([0.12]))])
+    before = beside.cost, held.cost
+    (_, alone), (first, found) = (exchanged(solver, [beside, held], others=by) for by in ((), (5.0, 2.0, 0.5)))
+    assert found.x == pytest.approx([0.6]) and found.z == pytest.approx(home.z)
+    assert found.cost < alone.cost - 20 and found.cost == pytest.approx(home.cost, abs=5.0)
+    assert alone.x == pytest.approx([0.12])
+    assert first.cost <= before[0] and found.cost <= before[1]
+
+
+def test_other_sizes_stay_within_the_bounds() -> None:
+    """Five times a size that is half the bound is the bound, where the truth lies beyond it."""
+    arena = begun_away(truth=8.0, bend=0.0)
+    solver = Fits(arena)  # type: ignore[arg-type]
+    part = candidate("right", 0)
+    (one,) = solver.begun([(Hypothesis((part,)), np.zeros(2), 0.5 * part.upper)])
+    (found,) = exchanged(solver, [one], others=(5.0,))
+    assert found.x == pytest.approx(part.upper)

@@ -28,6 +28,8 @@ LED, LED_ON = 4, 4
 """Fits from whose nuisances and starts the refit nominal model is tried again, and its iterations there."""
 GIVING = 6
 """Fits whose nuisances and starts all are tried with."""
+OTHERS = (5.0, 2.0, 0.5)
+"""Shares of its size that a fit is tried at as well after each round, beside the nuisances of others."""
 SUSPECTED, LEAST_SAID = 3, 2.0
 """Effects that are fitted because the parity stage speaks for them, with so many nats at least."""
 
@@ -74,7 +76,7 @@ def fitted(arena: Arena, base: Fit, picked: Sequence[Response], told_by: Said, t
     for number, (iterations, kept) in enumerate(ROUNDS):
         fits.run([nominal, *going], iterations=iterations)
         going = _kept(best_of(going), told_by, kept)
-        nominal, *going = exchanged(fits, [nominal, *going])
+        nominal, *going = exchanged(fits, [nominal, *going], others=OTHERS)
         told("fits", number + 1, len(ROUNDS) + 1)
     fits.run([nominal, *going], iterations=LAST)
     nominal = led(fits, nominal, best_of(going)[:LED], iterations=LED_ON)
@@ -85,24 +87,42 @@ def fitted(arena: Arena, base: Fit, picked: Sequence[Response], told_by: Said, t
     return nominal, best_of(going)
 
 
-def exchanged(fits: Fits, found: Sequence[Fit]) -> list[Fit]:
+def exchanged(fits: Fits, found: Sequence[Fit], *, others: Sequence[float] = ()) -> list[Fit]:
     """The fits, best first, each with the nuisances and starts of whichever of the first GIVING serves it best. Costs
     are rough: one that has found a better place shows it to the others, the refit nominal model above all, else
-    everything gains against it."""
-    givers = list(found[:GIVING])
-    points = [(one.hypothesis, other.z, one.x) for one in found for other in givers]
-    away = [other.away for _ in found for other in givers]
-    costs = fits.costs(points, away).reshape(len(found), len(givers))
-    costs[range(len(givers)), range(len(givers))] = [one.cost for one in givers]
-    best = costs.argmin(axis=1)
-    moved = [i for i, one in enumerate(found) if costs[i, best[i]] < one.cost - LEAST_GAIN]
-    begun = fits.begun([points[i * len(givers) + best[i]] for i in moved], [givers[best[i]].away for i in moved])
+    everything gains against it. others: shares of its size that an effect is tried at as well. Where nuisances have
+    made up for most of an effect they hold its fit at what they left of it, and no small step leads out of there; at
+    five times the size beside the nuisances of a fit that is not held so, one does."""
+    points, away, of = [], [], []
+    for i, one in enumerate(found):
+        for other in (*found[:GIVING], *(() if i < GIVING else (one,))):
+            for size in (one.x, *_other_sizes(one, others)):
+                if other is not one or size is not one.x:
+                    points.append((one.hypothesis, other.z, size))
+                    away.append(other.away)
+                    of.append(i)
+    costs, of_fit = fits.costs(points, away), np.array(of)
+    best = [int(rows[costs[rows].argmin()]) for rows in (np.flatnonzero(of_fit == i) for i in range(len(found)))]
+    moved = [i for i, one in enumerate(found) if costs[best[i]] < one.cost - LEAST_GAIN]
+    begun = fits.begun([points[best[i]] for i in moved], [away[best[i]] for i in moved])
     new = dict(zip(moved, begun, strict=True))
     for one in (*found, *begun):
         one.ended, one.damping = False, DAMPING
     for i, one in new.items():
         one.start = found[i].start
     return [new.get(i, one) for i, one in enumerate(found)]
+
+
+def _other_sizes(one: Fit, shares: Sequence[float]) -> list[np.ndarray]:
+    """Shares of the fit's size, within its bounds; none for the refit nominal model."""
+    parts = one.hypothesis.parts
+    if not parts:
+        return []
+    edges = np.cumsum([len(part.off) for part in parts])[:-1]
+    own = np.split(one.x, edges)
+    sizes = [np.concatenate([part.share(x, share) for part, x in zip(parts, own, strict=True)]) for share in shares]
+    inside = [np.clip(size, one.hypothesis.stack("lower"), one.hypothesis.stack("upper")) for size in sizes]
+    return [size for size in inside if not np.allclose(size, one.x)]
 
 
 def led(fits: Fits, one: Fit, by: Sequence[Fit], *, iterations: int) -> Fit:

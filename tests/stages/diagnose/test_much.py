@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.much.blackbox import corrected
-from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, foretold, share_with_interval
+from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, foretold, share_with_interval, squared_of
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.measures.gap import counting, own_share
 
@@ -29,28 +29,67 @@ def test_at_the_floor_there_is_no_share() -> None:
     assert share is None and ends is None
 
 
+def _errors(squared: np.ndarray, rng: np.random.Generator | None = None) -> np.ndarray:
+    """Errors (segment, 6, 3) [m] with so large mean squared distances, all caps one way; rng: of a random one."""
+    way = np.tile([1.0, 0.0, 0.0], (len(squared), 1))
+    way = way if rng is None else rng.standard_normal(way.shape)
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    return np.repeat((np.sqrt(squared)[:, None] * way)[:, None], 6, axis=1)
+
+
+NOWHERE = np.zeros((1, 6, 6, 3))
+"""Of six further segments, on which refit and effect do not part."""
+
+
 def test_a_forecast_holds_what_as_many_further_segments_have() -> None:
-    """Shares of 6 further segments of the same kind: 90 % intervals from 24 others hold 80 to 100 % of 50 of them. One
-    fall that the effect explains moves the ratio of all by more than 20 points, the forecast of 6 by less than 10."""
+    """An effect that leaves 12 mm and moves the robot by 16 mm, whichever way: 90 % intervals from 24 segments hold 80
+    to 100 % of 50 shares of 6 further ones, be it believed or only measured."""
     rng = np.random.default_rng(1)
     groups = [f"g{k // 6}" for k in range(24)]
 
-    def drawn(count: int) -> tuple[np.ndarray, np.ndarray]:
-        return 4e-4 * rng.gamma(4.0, 0.25, count), 1.5e-4 * rng.gamma(4.0, 0.25, count)
+    def drawn(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        after = _errors(1.5e-4 * rng.gamma(4.0, 0.25, count), rng)
+        apart = _errors(2.5e-4 * rng.gamma(4.0, 0.25, count), rng)
+        return after + apart, after, apart
 
-    held, widths = [], []
-    for seed in range(50):
-        told, ends = foretold(*drawn(24), 0.005, groups=groups, count=6, seed=seed)
-        share = own_share(*drawn(6), 0.005)
-        assert told is not None and ends is not None and share is not None
-        held.append(ends[0] <= share <= ends[1])
-        widths.append(ends[1] - ends[0])
-    assert np.mean(held) >= 0.80
-    assert np.mean(widths) < 0.5
+    for likely in (0.0, 1.0):
+        held, widths = [], []
+        for seed in range(50):
+            (before, after, _), (later, left, apart) = drawn(24), drawn(6)
+            told, ends = foretold(before, after, apart[None], 0.005, groups=groups, likely=likely, seed=seed)
+            share = own_share(squared_of(later), squared_of(left), 0.005)
+            assert told is not None and ends is not None and share is not None
+            held.append(ends[0] <= share <= ends[1])
+            widths.append(ends[1] - ends[0])
+        assert np.mean(held) >= 0.80
+        assert np.mean(widths) < 0.7
+
+
+def test_what_an_effect_does_elsewhere_is_no_forecast() -> None:
+    """An effect that takes all of 20 mm off the fitted gaits: on commands under which it moves nothing its share is 0,
+    on others it is as large as it moves the robot; a name that is surely wrong has the share that was measured."""
+    before, after = _errors(np.full(24, 4e-4)), _errors(np.full(24, 4e-5))
+    groups = [f"g{k // 6}" for k in range(24)]
+    measured, _ = foretold(before, after, NOWHERE, 0.005, groups=groups, likely=0.0)
+    assert measured == pytest.approx(0.80, abs=0.01)
+    assert foretold(before, after, NOWHERE, 0.005, groups=groups)[0] == pytest.approx(0.0)
+    moved = _errors(np.full(6, 1e-3))[None]
+    share = own_share(squared_of(after[:6] + moved[0]), squared_of(after[:6]), 0.005)
+    assert foretold(before, after, moved, 0.005, groups=groups)[0] == pytest.approx(share)
+    # Between the two: what is likelier decides, and the interval holds both.
+    for likely, middle in ((0.8, 0.0), (0.2, 0.80)):
+        told, ends = foretold(before, after, NOWHERE, 0.005, groups=groups, likely=likely)
+        assert told == pytest.approx(middle, abs=0.01)
+        assert ends == pytest.approx((0.0, 0.80), abs=0.01)
+
+
+def test_one_fall_that_an_effect_explains_moves_the_forecast_little() -> None:
+    """It moves the ratio of all by more than 20 points, the forecast of 6 by less than 10."""
+    groups = [f"g{k // 6}" for k in range(24)]
     before, after = np.full(24, 4e-4), np.full(24, 2.9e-4)
-    plain, _ = foretold(before, after, 0.005, groups=groups, count=6)
+    plain, _ = foretold(_errors(before), _errors(after), NOWHERE, 0.005, groups=groups, likely=0.0)
     before[3], after[3] = 1e-2, 2.9e-4
-    told, _ = foretold(before, after, 0.005, groups=groups, count=6)
+    told, _ = foretold(_errors(before), _errors(after), NOWHERE, 0.005, groups=groups, likely=0.0)
     share, _ = share_with_interval(before, after, 0.005)
     assert plain is not None and told is not None and share is not None
     assert share - plain > 0.2
@@ -59,10 +98,11 @@ def test_a_forecast_holds_what_as_many_further_segments_have() -> None:
 
 def test_at_the_floor_nothing_is_foretold() -> None:
     """Errors at the floor, no segments, nothing to be judged: no forecast."""
-    at = np.full(8, 0.005**2)
-    assert foretold(at, at / 2, 0.005, groups=["g"] * 8, count=4) == (None, None)
-    assert foretold(np.full(8, np.nan), at, 0.005, groups=["g"] * 8, count=4) == (None, None)
-    assert foretold(4 * at, at, 0.005, groups=["g"] * 8, count=0) == (None, None)
+    at = _errors(np.full(8, 0.005**2))
+    groups = ["g"] * 8
+    assert foretold(at, at / 2, NOWHERE, 0.005, groups=groups) == (None, None)
+    assert foretold(np.full_like(at, np.nan), at, NOWHERE, 0.005, groups=groups) == (None, None)
+    assert foretold(2 * at, at, NOWHERE[:, :0], 0.005, groups=groups) == (None, None)
 
 
 @pytest.mark.parametrize(("count", "left"), [(1, 1), (2, 1), (5, 4), (10, 9), (11, 10), (12, 10), (21, 19)])
@@ -88,7 +128,9 @@ def test_one_fall_decides_no_share() -> None:
     before, after = np.full(10, 4 * 0.006**2), np.full(10, 0.006**2)
     before[4] = after[4] = 0.2**2
     share, ends = share_with_interval(before, after, 0.006, kept=0.9)
-    told, _ = foretold(before, after, 0.006, groups=[f"g{k // 5}" for k in range(10)], count=10, kept=0.9)
+    told, _ = foretold(
+        _errors(before), _errors(after), NOWHERE, 0.006, groups=[f"g{k // 5}" for k in range(10)], likely=0.0, kept=0.9
+    )  # fmt: skip
     plain, _ = share_with_interval(before, after, 0.006)
     assert share == pytest.approx(1.0) and ends is not None and ends[1] == pytest.approx(1.0)
     assert told is not None and told > 0.9

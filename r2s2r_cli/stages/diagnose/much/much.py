@@ -9,8 +9,9 @@ import numpy as np
 from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run, whole
 from r2s2r_cli.stages.diagnose.floors import KEPT
+from r2s2r_cli.stages.diagnose.much.ahead import ahead
 from r2s2r_cli.stages.diagnose.much.blackbox import corrected
-from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, foretold, share_with_interval
+from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, foretold, share_with_interval, squared_of
 from r2s2r_cli.stages.diagnose.starts import Starts
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.before import Healthy
@@ -68,11 +69,11 @@ def much(
         except NumericalError as error:
             missing.append(f"{name}: {error.what}")
             continue
-        squared[name] = _squared(errors)
+        squared[name] = squared_of(errors)
         names = tuple(one.name for one in judged)
         if name == "refit":
             left = corrected(arena.whole, refit.key, judged, errors)
-            squared["ceiling"] = _squared(left)
+            squared["ceiling"] = squared_of(left)
     told("judged", len(models), len(models))
     share, ci90 = (None, None)
     if "refit" in squared and "effect" in squared:
@@ -109,14 +110,15 @@ def _predicted(
     starts: Starts,
     seed: int,
 ) -> tuple[float | None, tuple[float, float] | None]:
-    """Own share that the judged intervals will have, and its interval: fitted ones are measured as those will be, from
-    causal starts, with numbers that were fitted without their gait."""
+    """Own share that the judged intervals will have, and its interval, from their targets: how far refit and effect
+    will part there, and how they err on fitted ones, measured as the judged ones will be, from causal starts, with
+    numbers that were fitted without their gait."""
     arena = compared.arena
     solver = Fits(arena)
     groups = groups_of(arena)
     p = len(fit.z)
     models = ((compared.base, compared.refit), (fit, score))
-    squared: list[list[np.ndarray]] = [[], []]
+    errors: list[list[np.ndarray]] = [[], []]
     runs: list[str] = []
     for number, group in enumerate(np.unique(groups)):
         own = {(one.run, one.interval) for one, g in zip(arena.many, groups, strict=True) if g == group}
@@ -132,14 +134,25 @@ def _predicted(
                 found.append(_errors(evidence.runs, part, arena, values, at[:p], starts))
         except NumericalError:
             continue  # one model fell to pieces there: nothing to compare
-        for own_squared, (errors, _) in zip(squared, found, strict=True):
-            own_squared.append(_squared(errors))
+        for so_far, (error, _) in zip(errors, found, strict=True):
+            so_far.append(error)
         runs += [one.run for one in found[0][1]]
     if not runs:
         return None, None
-    count = sum(len(one.intervals) for one in evidence.judge)
-    before, after = (np.concatenate(own) for own in squared)
-    return foretold(before, after, floor_m, groups=runs, count=count, kept=kept, seed=seed)
+    refit, effect = (
+        solver.values(one.hypothesis, one.z[None], one.x[None])[0] for one in (compared.base, fit)
+    )  # fmt: skip
+    apart = [
+        ahead(arena, evidence.run(one.run).caps.intervals.target, one.intervals, effect, refit)
+        for one in evidence.judge if one.intervals
+    ]  # fmt: skip
+    if not apart:
+        return None, None
+    before, after = (np.concatenate(one) for one in errors)
+    return foretold(
+        before, after, np.concatenate(apart, axis=1), floor_m, groups=runs, likely=compared.which.probability,
+        kept=kept, seed=seed,
+    )  # fmt: skip
 
 
 def _alike(runs: Sequence[Run], healthy: Healthy, floor: FloorGiven, starts: Starts) -> tuple[float, float]:
@@ -152,13 +165,8 @@ def _alike(runs: Sequence[Run], healthy: Healthy, floor: FloorGiven, starts: Sta
         errors, _ = _errors(runs, whole(runs), arena, values, base.z, starts)
     except NumericalError:
         return floor.rmse, floor.kept
-    squared = _squared(errors)
+    squared = squared_of(errors)
     return kept_rmse(squared, KEPT), KEPT
-
-
-def _squared(errors: np.ndarray) -> np.ndarray:
-    """Mean squared distance of the caps (segment,) [m^2] of errors (segment, cap, 3) [m]."""
-    return np.asarray(np.sum(errors**2, axis=-1).mean(axis=-1))
 
 
 def _errors(

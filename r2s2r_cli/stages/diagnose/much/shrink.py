@@ -24,10 +24,10 @@ class Shrinkage:
 
     names: of the judged segments, `RUN:3`; squared: by model (nominal, refit, effect, ceiling), mean squared 3-D
     distance of the caps (segment,) [m^2]. effects: whose effect it is, best guess where nothing was committed to.
-    share: own share of the effect, None at the floor; ci90 by bootstrap over segments; predicted: what it will be, from
-    the same measure on fitted intervals, each with numbers fitted without its gait, before the judged ones were looked
-    at; predicted_ci90: where as many intervals as are judged will have it. within_run: judged segments share their run
-    with fitted ones. kept: share of the segments that count, the best ones, as in the floor.
+    share: own share of the effect, None at the floor; ci90 by bootstrap over segments; predicted, predicted_ci90: what
+    it will be, and where, from the targets of the judged intervals and the errors of fitted ones, each with numbers
+    fitted without its gait, before the judged ones were looked at (`foretold`). within_run: judged segments share their
+    run with fitted ones. kept: share of the segments that count, the best ones, as in the floor.
     """
 
     effects: tuple[str, ...]
@@ -116,20 +116,19 @@ def share_with_interval(
 
 
 def foretold(
-    before: np.ndarray,
-    after: np.ndarray,
-    floor: float,
-    *,
-    groups: Sequence[str],
-    count: int,
-    kept: float = 1.0,
-    seed: int = 0,
-) -> tuple[float | None, tuple[float, float] | None]:
-    """Own share that `count` further segments will have, from squared errors (segment,) of others that were left out:
-    median and 90 % interval over draws of so many, runs (`groups`) first. A fall makes a share of few segments whatever
-    it likes, so the ratio of all that were seen is no forecast. kept: share of the segments that count, in every draw.
-    None where most draws are at the floor."""
-    known = np.isfinite(before) & np.isfinite(after)
+    before: np.ndarray, after: np.ndarray, apart: np.ndarray, floor: float, *, groups: Sequence[str],
+    likely: float = 1.0, kept: float = 1.0, seed: int = 0,
+) -> tuple[float | None, tuple[float, float] | None]:  # fmt: skip
+    """Own share that further segments will have: median and 90 % interval over draws.
+
+    before, after: errors (segment, cap, 3) [m] of refit and effect at other segments, which were left out; apart
+    (begin, further, cap, 3) [m]: by how much refit and effect will differ at the further ones (`ahead`). Where the
+    effect is right, which is as probable as `likely`, it errs there as elsewhere, and the refit model by `apart` more.
+    Where it is wrong nothing is known of what is, and both err as they did elsewhere. Runs (`groups`) are drawn first.
+    kept: share of the segments that count, in every draw: a fall makes a share of few segments whatever it likes, so
+    the ratio of all that were seen is no forecast. None where most draws are at the floor."""
+    known = np.isfinite(before).all(axis=(1, 2)) & np.isfinite(after).all(axis=(1, 2))
+    count = apart.shape[1]
     if not known.any() or count < 1:
         return None, None
     names = [g for g, keep in zip(groups, known, strict=True) if keep]
@@ -143,13 +142,22 @@ def foretold(
     turn = rng.permuted(np.tile(np.arange(len(size)), (DRAWS // 4, 1)), axis=1)
     run = own[np.argsort(turn[:, own], axis=1, kind="stable")][:, np.arange(count) % len(own)]
     rows = first[run] + (rng.random(run.shape) * size[run]).astype(int)
-    means = _means(before[rows], after[rows], kept)
+    right = rng.random(len(rows)) < likely
+    begin = rng.integers(0, len(apart), len(rows))
+    with_effect = after[rows]
+    refit = np.where(right[:, None, None, None], with_effect + apart[begin], before[rows])
+    means = _means(squared_of(refit), squared_of(with_effect), kept)
     G, H = (np.sqrt(np.maximum(mean - floor**2, 0.0)) for mean in means)
     above = (floor / 2 <= G) & (G > 0)
     if above.mean() < 0.5:
         return None, None
     low, middle, high = np.quantile(1.0 - H[above] / G[above], [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2])
     return float(middle), (float(low), float(high))
+
+
+def squared_of(errors: np.ndarray) -> np.ndarray:
+    """Mean squared distance of the caps (...,) [m^2] of errors (..., cap, 3) [m]."""
+    return np.asarray(np.sum(errors**2, axis=-1).mean(axis=-1))
 
 
 def _rows(rng: np.random.Generator, runs: Sequence[np.ndarray], count: int) -> np.ndarray:

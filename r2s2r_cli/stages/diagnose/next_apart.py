@@ -15,6 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from r2s2r_cli.stages.diagnose.imagined import part
 from r2s2r_cli.stages.diagnose.which.arena import SECANT, Arena
 from r2s2r_cli.stages.diagnose.which.bounded import bounded
 from r2s2r_cli.stages.diagnose.which.fit import PRIOR_SCALES, Fits
@@ -24,7 +25,6 @@ from r2s2r_cli.stages.diagnose.which.pieces import LEAST_SPEED_SD, length_of
 from r2s2r_cli.stages.diagnose.which.starting import LOST_M
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.diagnose.which.white import FLOOR_S
-from r2s2r_cli.stages.identify.windows import Window
 
 ROUNDS = 6
 PAIRS = 2
@@ -113,26 +113,15 @@ def _pieces(arena: Arena, whole: Stretch, values: np.ndarray) -> list[Stretch]:
     frames = len(whole.t)
     count = max(1, round(float(whole.t[-1] - whole.window.start) / length_of(run)))
     edges = sorted({0, *(round(frames * k / count) for k in range(1, count)), frames})
-    before = [replace(whole, window=_cut(whole, 0, edge), piece=0) for edge in edges[1:-1]]
+    before = [part(whole, 0, edge) for edge in edges[1:-1]]
     states = arena.replayer.finals(before, values) if before else None
     found = []
     for k, (a, b) in enumerate(pairwise(edges)):
-        window = _cut(whole, a, b)
+        one = replace(part(whole, a, b), piece=k, order=k)
         if k and states is not None:
-            window = replace(window, state=states.select(k - 1))
-        found.append(replace(
-            whole, window=window, piece=k, order=k, caps=whole.caps[a:b], noise=whole.noise[a:b],
-            length=None if whole.length is None else whole.length[a:b],
-            length_sd=None if whole.length_sd is None else whole.length_sd[a:b],
-        ))  # fmt: skip
+            one = replace(one, window=replace(one.window, state=states.select(k - 1)))
+        found.append(one)
     return found
-
-
-def _cut(whole: Stretch, a: int, b: int) -> Window:
-    """Frames a to b of a policy, after the one before them."""
-    window = whole.window
-    frames = window.frames[a:b]
-    return replace(window, first=int(frames[0]) - 1, frames=frames, key=window.key[a:b], place=window.place[a:b])
 
 
 def _sights(arena: Arena, many: Sequence[Stretch], rows: Sequence[np.ndarray]) -> list[np.ndarray]:

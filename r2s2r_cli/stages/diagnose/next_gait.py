@@ -9,29 +9,19 @@ recorded run.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Evidence
+from r2s2r_cli.stages.diagnose.imagined import Targets, imagined, targets_of
 from r2s2r_cli.stages.diagnose.next_apart import apart
 from r2s2r_cli.stages.diagnose.next_settled import settled, unsettled, worth
-from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.found import NONE
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
-from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.diagnose.which.which import Compared
-from r2s2r_cli.stages.identify.windows import Window
 
-if TYPE_CHECKING:
-    from r2s2r_cli.engine import State
-
-Targets = tuple[tuple[float, ...], ...]
-SETTLE_S = 0.3
-"""After the last cable of a target is there."""
-RATE_HZ = 10.0
 LONGEST = 8
 """Targets of a policy that are simulated: a longer one goes on as it began."""
 REMAINING = 3
@@ -74,10 +64,10 @@ def next_gait(
     if len(fits) < 2 or not library.gaits:
         return None
     told("next gait", 0, 1)
-    own = {f"as run: {run.name}": _targets(run.caps.intervals.target) for run in evidence.only(evidence.fit)}
+    own = {f"as run: {run.name}": targets_of(run.caps.intervals.target) for run in evidence.only(evidence.fit)}
     nats: dict[str, np.ndarray] = {}
     for name, targets in {**library.gaits, **own}.items():
-        for whole in _imagined(compared.arena, targets[:LONGEST]):
+        for whole in imagined(compared.arena, targets[:LONGEST]):
             nats[name] = apart(compared.arena, whole, fits)
     told("next gait", 1, 1)
     names = [_name(fit) for fit in fits]
@@ -121,51 +111,3 @@ def _remaining(compared: Compared) -> tuple[list[Fit], np.ndarray]:
 
 def _name(fit: Fit) -> str:
     return fit.hypothesis.effects[0] if fit.hypothesis.parts else NONE
-
-
-def _targets(targets: np.ndarray) -> Targets:
-    return tuple(tuple(float(x) for x in row) for row in np.nan_to_num(targets, nan=1.0))
-
-
-def _imagined(arena: Arena, targets: Targets) -> list[Stretch]:
-    """The policy as one stretch from where a fitted run began, its targets driven by an ideal controller."""
-    like = arena.many[0]
-    robot = arena.model.robot
-    state: State = like.window.state
-    speed = float(arena.model.theta(arena.model.values0).speed_in.mean())
-    control, t = _commands(targets, robot.pid.range_m, speed)
-    frames = np.arange(1, int(t[-1] * RATE_HZ) + 1) / RATE_HZ
-    if not len(frames):
-        return []
-    noise = np.broadcast_to(like.noise.mean(axis=0), (len(frames), *like.noise.shape[1:]))
-    length = sd = None
-    if like.length is not None and like.length_sd is not None:
-        length = np.zeros((len(frames), len(like.sensors)))
-        sd = np.broadcast_to(like.length_sd.mean(axis=0), length.shape)
-    run = replace(
-        like.window.run, t=np.concatenate([[0.0], frames]), t_command=t, control=control, sampled=False,
-        observed=np.broadcast_to(like.caps[0], (len(frames) + 1, *like.caps[0].shape)),
-    )  # fmt: skip
-    window = Window(
-        run=run, intervals=(1,), first=0, frames=np.arange(1, len(frames) + 1), key=np.zeros(len(frames), bool),
-        place=np.zeros(len(frames), dtype=int), state=state,
-    )  # fmt: skip
-    caps = np.zeros((len(frames), *like.caps[0].shape))
-    return [Stretch("imagined", "imagined", 1, 0, window, caps, noise, length, sd, like.sensors)]
-
-
-def _commands(targets: Targets, wide: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
-    """Motor commands (row, actuated) at times (row,): full speed until each cable is there, from all cables long."""
-    before = np.ones(len(targets[0]))
-    begin = 0.0
-    rows, times = [np.zeros(len(before))], [0.0]
-    for target in targets:
-        goal = np.array(target)
-        need = np.abs(goal - before) * wide / max(speed, 1e-6)
-        sign = np.sign(before - goal)  # shorter: reel in, +1
-        for at in (0.0, *sorted(set(need[need > 0].tolist()))):
-            rows.append(np.where(need > at + 1e-9, sign, 0.0))
-            times.append(begin + at)
-        begin += float(need.max(initial=0.0)) + SETTLE_S
-        before = goal
-    return np.array([*rows, np.zeros(len(before))]), np.array([*times, begin])

@@ -10,8 +10,9 @@ from typing import cast
 import numpy as np
 import pytest
 
+from r2s2r_cli.stages.diagnose.imagined import SETTLE_S, commands, imagined
 from r2s2r_cli.stages.diagnose.next_apart import apart, left
-from r2s2r_cli.stages.diagnose.next_gait import SETTLE_S, _commands, _imagined, _name, _remaining
+from r2s2r_cli.stages.diagnose.next_gait import _name, _remaining
 from r2s2r_cli.stages.diagnose.sample import _at_rest, planted
 from r2s2r_cli.stages.diagnose.stage import library_of
 from r2s2r_cli.stages.diagnose.which.arena import Arena
@@ -30,7 +31,7 @@ from tests.support.builders import robot
 def test_commands_wind_each_cable_as_far_as_its_target_asks() -> None:
     """Speed times the integral of the command is the way between targets, and shorter means +1."""
     targets = ((0.0, 1.0), (0.5, 0.25))
-    control, t = _commands(targets, 0.1, 0.05)
+    control, t = commands(targets, 0.1, 0.05)
     wound = 0.05 * np.sum(control[:-1] * np.diff(t)[:, None], axis=0)
     assert wound == pytest.approx([0.1 * 0.5, 0.1 * 0.75])
     assert control[1].tolist() == [1.0, 0.0]
@@ -145,7 +146,7 @@ def test_motors_that_run_tell_a_late_one_from_a_slow_one(tmp_path: Path) -> None
     still = ((1.0,) * 6,) * 6
     nats = {}
     for name, targets in {"six": six, "two": six[:2], "still": still}.items():
-        found = apart(arena, _imagined(arena, targets)[0], [late, slow])
+        found = apart(arena, imagined(arena, targets)[0], [late, slow])
         assert np.diag(found).tolist() == [0.0, 0.0]
         nats[name] = float(found[0, 1])
     assert nats["six"] > nats["two"] > 1.0

@@ -11,10 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from r2s2r_cli.stages.diagnose.next_gait import _commands, _imagined, _targets
+from r2s2r_cli.stages.diagnose.imagined import ends, imagined, part, targets_of
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.starting import LOST_M
-from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 
 
 def ahead(
@@ -27,19 +26,19 @@ def ahead(
     robot tips hangs on millimetres, and nobody knows yet how this one will be put down. At each interval both models
     begin where the truth is then, as start states of judged intervals will be where the robot was seen.
     """
-    wanted = _targets(targets[: max(numbers)])
+    wanted = targets_of(targets[: max(numbers)])
     begins = list({one.run: one for one in reversed(arena.many)}.values())
-    found = _imagined(arena, wanted)
+    found = imagined(arena, wanted)
     if not found:
         return np.zeros((len(begins), len(numbers), *arena.many[0].caps.shape[1:]))
-    edges = _edges(arena, found[0], wanted)
+    edges = ends(arena, found[0], wanted)
     parts, before = [], []
     for like in begins:
         window = replace(found[0].window, state=like.window.state)
         whole = replace(found[0], run=f"imagined {like.run}", window=window)
         for number in numbers:
-            before.append(_part(whole, 0, max(edges[number - 1], 1)))
-            parts.append(replace(_part(whole, edges[number - 1], edges[number]), interval=number))
+            before.append(part(whole, 0, max(edges[number - 1], 1)))
+            parts.append(replace(part(whole, edges[number - 1], edges[number]), interval=number))
     states = arena.replayer.finals(before, truth)
     for k, one in enumerate(parts):
         if one.window.first:
@@ -48,26 +47,3 @@ def ahead(
     apart = np.array([one.caps[1, -1] - one.caps[0, -1] for one in seen])
     apart = np.clip(np.nan_to_num(apart, nan=LOST_M), -LOST_M, LOST_M)
     return np.asarray(apart.reshape(len(begins), len(numbers), *apart.shape[1:]))
-
-
-def _edges(arena: Arena, whole: Stretch, targets: Sequence[Sequence[float]]) -> list[int]:
-    """Frames of an imagined policy before which its targets end, 0 first."""
-    speed = float(arena.model.theta(arena.model.values0).speed_in.mean())
-    wide = arena.model.robot.pid.range_m
-    rows = tuple(map(tuple, targets))
-    ends = np.array([_commands(rows[: k + 1], wide, speed)[1][-1] for k in range(len(rows))])
-    return [0, *np.searchsorted(whole.t - whole.window.start, ends + 1e-9, side="right").tolist()]
-
-
-def _part(whole: Stretch, a: int, b: int) -> Stretch:
-    """Frames a to b of an imagined policy, after the one before them; the state is still that of its beginning."""
-    window = whole.window
-    frames = window.frames[a:b]
-    return replace(
-        whole, caps=whole.caps[a:b], noise=whole.noise[a:b],
-        length=None if whole.length is None else whole.length[a:b],
-        length_sd=None if whole.length_sd is None else whole.length_sd[a:b],
-        window=replace(
-            window, first=int(frames[0]) - 1, frames=frames, key=window.key[a:b], place=window.place[a:b]
-        ),
-    )  # fmt: skip

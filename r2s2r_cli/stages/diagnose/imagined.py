@@ -1,0 +1,98 @@
+"""Policies that nobody has run, imagined: as one stretch, driven by an ideal controller from where a fitted run began.
+
+Commands are the same for all candidates, as in the replay of a recorded run: what differs is the robot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.stretches import Stretch
+from r2s2r_cli.stages.identify.windows import Window
+
+if TYPE_CHECKING:
+    from r2s2r_cli.engine import State
+
+Targets = tuple[tuple[float, ...], ...]
+SETTLE_S = 0.3
+"""After the last cable of a target is there."""
+RATE_HZ = 10.0
+
+
+def targets_of(targets: np.ndarray) -> Targets:
+    """Of the target intervals of a run (interval, actuated); where none is known the cable is long."""
+    return tuple(tuple(float(x) for x in row) for row in np.nan_to_num(targets, nan=1.0))
+
+
+def imagined(arena: Arena, targets: Targets) -> list[Stretch]:
+    """The policy as one stretch from where a fitted run began, its targets driven by an ideal controller; nothing for
+    one without a frame. Nobody has seen it: caps and lengths are 0."""
+    like = arena.many[0]
+    robot = arena.model.robot
+    state: State = like.window.state
+    control, t = commands(targets, robot.pid.range_m, _speed(arena))
+    frames = np.arange(1, int(t[-1] * RATE_HZ) + 1) / RATE_HZ
+    if not len(frames):
+        return []
+    noise = np.broadcast_to(like.noise.mean(axis=0), (len(frames), *like.noise.shape[1:]))
+    length = sd = None
+    if like.length is not None and like.length_sd is not None:
+        length = np.zeros((len(frames), len(like.sensors)))
+        sd = np.broadcast_to(like.length_sd.mean(axis=0), length.shape)
+    run = replace(
+        like.window.run, t=np.concatenate([[0.0], frames]), t_command=t, control=control, sampled=False,
+        observed=np.broadcast_to(like.caps[0], (len(frames) + 1, *like.caps[0].shape)),
+    )  # fmt: skip
+    window = Window(
+        run=run, intervals=(1,), first=0, frames=np.arange(1, len(frames) + 1), key=np.zeros(len(frames), bool),
+        place=np.zeros(len(frames), dtype=int), state=state,
+    )  # fmt: skip
+    caps = np.zeros((len(frames), *like.caps[0].shape))
+    return [Stretch("imagined", "imagined", 1, 0, window, caps, noise, length, sd, like.sensors)]
+
+
+def commands(targets: Targets, wide: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
+    """Motor commands (row, actuated) at times (row,): full speed until each cable is there, from all cables long."""
+    before = np.ones(len(targets[0]))
+    begin = 0.0
+    rows, times = [np.zeros(len(before))], [0.0]
+    for target in targets:
+        goal = np.array(target)
+        need = np.abs(goal - before) * wide / max(speed, 1e-6)
+        sign = np.sign(before - goal)  # shorter: reel in, +1
+        for at in (0.0, *sorted(set(need[need > 0].tolist()))):
+            rows.append(np.where(need > at + 1e-9, sign, 0.0))
+            times.append(begin + at)
+        begin += float(need.max(initial=0.0)) + SETTLE_S
+        before = goal
+    return np.array([*rows, np.zeros(len(before))]), np.array([*times, begin])
+
+
+def part(whole: Stretch, a: int, b: int) -> Stretch:
+    """Frames a to b of an imagined policy, after the one before them; the state is still that of its beginning."""
+    window = whole.window
+    frames = window.frames[a:b]
+    return replace(
+        whole, caps=whole.caps[a:b], noise=whole.noise[a:b],
+        length=None if whole.length is None else whole.length[a:b],
+        length_sd=None if whole.length_sd is None else whole.length_sd[a:b],
+        window=replace(
+            window, first=int(frames[0]) - 1, frames=frames, key=window.key[a:b], place=window.place[a:b]
+        ),
+    )  # fmt: skip
+
+
+def ends(arena: Arena, whole: Stretch, targets: Targets) -> list[int]:
+    """Frames of an imagined policy before which its targets end, 0 first."""
+    speed, wide = _speed(arena), arena.model.robot.pid.range_m
+    at = np.array([commands(targets[: k + 1], wide, speed)[1][-1] for k in range(len(targets))])
+    return [0, *np.searchsorted(whole.t - whole.window.start, at + 1e-9, side="right").tolist()]
+
+
+def _speed(arena: Arena) -> float:
+    """Of the winches at full drive, as robot.toml has it [m/s]."""
+    return float(arena.model.theta(arena.model.values0).speed_in.mean())

@@ -7,10 +7,13 @@ scheduler (extra `cluster`), where the same package is installed and the same fo
 from __future__ import annotations
 
 import multiprocessing
+import os
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing.connection import wait
 from typing import TypeVar
 
 from r2s2r_cli.errors import HardwareError, R2S2RError, UsageError, install_extra
@@ -30,7 +33,8 @@ def open_executor(spec: str, workers: int) -> Iterator[Executor]:
     close: Callable[[], object] = lambda: None  # noqa: E731 - what an executor of somebody else's needs beside shutdown
     if spec == LOCAL:
         # Fresh interpreters: nothing of this process (loaded modules, threads of torch) goes along.
-        executor: Executor = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+        fresh = multiprocessing.get_context("spawn")
+        executor: Executor = ProcessPoolExecutor(workers, mp_context=fresh, initializer=_end_with_parent)
     elif spec.startswith(DASK):
         executor, close = _dask(spec)
     else:
@@ -47,6 +51,18 @@ def open_executor(spec: str, workers: int) -> Iterator[Executor]:
         executor.shutdown()
     finally:
         close()
+
+
+def _end_with_parent() -> None:
+    """In a worker: nobody waits for what it computes once who asked for it is gone, killed for instance."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_until_gone, args=(parent.sentinel,), daemon=True).start()
+
+
+def _until_gone(sentinel: int) -> None:
+    wait([sentinel])
+    os._exit(1)
 
 
 def each(

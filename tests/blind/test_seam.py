@@ -1,11 +1,19 @@
 """Independent work through one seam, whoever does it."""
 
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 
 from r2s2r_cli.blind.seam import each, open_executor
 from r2s2r_cli.errors import InputError, UsageError
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_all_is_done_and_little_is_handed_out() -> None:
@@ -34,6 +42,48 @@ def test_an_error_comes_back_whole_from_another_process() -> None:
 def refuse(name: str) -> None:
     """Says no."""
     raise InputError("no", where=name, expected="y", received="n", hint="look")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are looked up in /proc")
+def test_workers_end_with_who_asked_them(tmp_path: Path) -> None:
+    """Killed without a chance to say so: a worker that would go on for minutes is gone too."""
+    told = tmp_path / "pid"
+    script = f"from tests.blind.test_seam import hand_out; hand_out({str(told)!r})"
+    with subprocess.Popen([sys.executable, "-c", script], cwd=ROOT) as asker:
+        assert until(told.exists)
+        asker.kill()
+    worker = int(told.read_text())
+    assert until(lambda: gone(worker))
+
+
+def hand_out(name: str) -> None:
+    """One piece of work that never ends, to one worker; what a process of the test above runs."""
+    with open_executor("local", 1) as pool:
+        list(each(pool, linger, [name], at_once=1))
+
+
+def linger(name: str) -> None:
+    """Says who it is, then works for longer than any test."""
+    scratch = Path(f"{name}.part")
+    scratch.write_text(str(os.getpid()))
+    scratch.rename(name)
+    time.sleep(600)
+
+
+def until(true: Callable[[], bool], seconds: float = 60.0) -> bool:
+    """Whether it comes true in time."""
+    end = time.monotonic() + seconds
+    while not true() and time.monotonic() < end:
+        time.sleep(0.05)
+    return true()
+
+
+def gone(pid: int) -> bool:
+    """Whether no such process is there, or only its exit status is."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
+    except OSError:
+        return True
 
 
 def test_another_address_is_refused() -> None:

@@ -51,6 +51,8 @@ class PublishedRank(Frozen):
     fitted: bool = True
     seen_sd: float | None = None
     """Since version 14 of `diagnose`."""
+    strain_nats: float | None = None
+    """Since version 20 of `diagnose`."""
     probability: float
     size: dict[str, float] = Field(default_factory=dict)
     channel: str | None = None

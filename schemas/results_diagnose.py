@@ -40,6 +40,9 @@ class RankedName(Frozen):
     seen_sd: float | None = None
     """How far these gaits would show it, at the largest size that is tried, nuisances taken off: whitened length [sd];
     None: no replay shows it, or before version 14."""
+    strain_nats: float | None = None
+    """What it costs that its nuisances are not where healthy runs, or robot.toml, have them [nats]; None: it was not
+    fitted, or before version 20."""
     probability: float
     size: dict[str, float] = Field(default_factory=dict)
     """Of its numbers, by name, in `units`."""

@@ -30,7 +30,7 @@ class LinearArena:
         self.mean, self.precision = np.zeros(2), np.eye(2)
         self.lower, self.upper = np.full(2, -10.0), np.full(2, 10.0)
         self.by_nuisance = _kinds(self.A.T).T
-        self.engine = [0, 1]
+        self.engine, self.shared = [0, 1], 2
         self.many = tuple(SimpleNamespace(run="a", interval=k + 1, caps=np.zeros((1, 1, 3))) for k in range(STRETCHES))
         self.whole = self.many
         self.gait = np.arange(STRETCHES) // 2

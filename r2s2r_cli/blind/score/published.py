@@ -144,7 +144,7 @@ def _diagnosis(document: Mapping[str, Any]) -> dict[str, Any]:
 def _rank(row: Mapping[str, Any]) -> dict[str, Any]:
     found = _part(row, PublishedRank) | _element(row)
     found["size"] = {name: _short(value) for name, value in row.get("size", {}).items()}
-    for key in ("elpd_gain_sd", "seen_sd"):
+    for key in ("elpd_gain_sd", "seen_sd", "strain_nats"):
         if key in found:
             found[key] = _short(found[key])
     return {name: value for name, value in found.items() if (name, value) not in _USUAL}

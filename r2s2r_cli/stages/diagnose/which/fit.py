@@ -243,6 +243,14 @@ class Fits:
             fit.jacobian[:, len(fit.z) + i] = np.where(np.isfinite(column), column, 0.0)
 
 
+def strain(arena: Arena, fit: Fit) -> float:
+    """What it costs that the nuisances of a fit that all runs share are not where they were known to be [nats]: where
+    no effect that is fitted is the cause, they make up for it."""
+    n = arena.shared
+    away = (fit.z - arena.mean)[:n]
+    return float(0.5 * away @ arena.precision[:n, :n] @ away)
+
+
 def unlikely(arena: Arena, z: np.ndarray) -> np.ndarray:
     """-log prior density of nuisances z (k, p + q), up to a constant, (k,) [nats]."""
     away = z - arena.mean

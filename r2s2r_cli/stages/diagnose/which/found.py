@@ -25,6 +25,7 @@ class Ranked:
     gain_sd: of the gain, from how much what was left out differs in it [nats]. parity: what the parity stage says for
     it [nats]. fitted: False, the screening left it out, and it counts as gaining nothing. seen: whitened length [sd] of
     what its best seen element changes at the largest size that was tried, nuisances taken off; nan: no replay shows it.
+    strain: what it costs that its nuisances are not where they were known to be [nats]; nan: it was not fitted.
     """
 
     effect: str
@@ -44,6 +45,7 @@ class Ranked:
     parity: float = 0.0
     fitted: bool = True
     seen: float = float("nan")
+    strain: float = float("nan")
     others: tuple[tuple[Element, float], ...] = ()
     """Other elements of the effect that were fitted, with their gains."""
 

@@ -13,6 +13,7 @@ from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.confusable import confusable
 from r2s2r_cli.stages.diagnose.which.doubts import of_first, unwitnessed, warnings_of
+from r2s2r_cli.stages.diagnose.which.fit import strain
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked, Screened, Shift, Which
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.material import Material
@@ -65,7 +66,9 @@ def concluded(m: Material) -> Which:
     ]
     ranking += [replace(one, probability=probability[one.effect]) for one in others]
     ranking += [
-        Ranked(NONE, 0.0, probability[NONE], rmse=m.no_gap.rmse, misfit=_misfit(m.refit)),
+        Ranked(
+            NONE, 0.0, probability[NONE], rmse=m.no_gap.rmse, misfit=_misfit(m.refit), strain=strain(m.arena, m.base)
+        ),
         Ranked(UNKNOWN, m.unexplained, probability[UNKNOWN]),
     ]
     shown = _shown(m.responses)
@@ -173,7 +176,7 @@ def _ranked(
         size=dict(zip(part.names, fit.x.tolist(), strict=True)),
         ci90={n: (float(a), float(b)) for n, a, b in zip(part.names, low, high, strict=True)},
         units=dict(zip(part.names, part.units, strict=True)), moved=fit.moved, on_bound=fit.on_bound,
-        rmse=float(np.sqrt(np.nanmean(score.squared))), misfit=_misfit(score),
+        rmse=float(np.sqrt(np.nanmean(score.squared))), misfit=_misfit(score), strain=strain(m.arena, fit),
         others=tuple((element, g) for element, g in others if element is not None),
     )  # fmt: skip
 

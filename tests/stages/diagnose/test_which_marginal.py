@@ -9,7 +9,7 @@ from scipy.stats import multivariate_normal
 
 from r2s2r_cli.stages.diagnose.which import marginal
 from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH
-from r2s2r_cli.stages.diagnose.which.fit import Fits, strain
+from r2s2r_cli.stages.diagnose.which.fit import PRIOR_SCALES
 
 ROWS, SCALE = 40, 0.7
 
@@ -96,13 +96,3 @@ def test_a_fit_that_breaks_off_gains_nothing(monkeypatch: pytest.MonkeyPatch) ->
     broken = SimpleNamespace(**{**vars(good), "cost": np.inf, "residual": np.r_[np.full(ROWS - 1, 1.0), np.inf]})
     found = marginal.marginal_gains(None, base, [broken, good])  # type: ignore[arg-type, list-item]
     assert found.counted[0] == -np.inf and 0 < found.counted[1] < 4 * ENOUGH + 0.1
-
-
-def test_strain_is_what_the_prior_of_the_shared_nuisances_takes() -> None:
-    """Two sd off in one and one in the other, of which one runs alone is no strain of the robot."""
-    arena = LinearArena(0.0)
-    arena.mean, arena.precision = np.array([1.0, 0.0]), np.diag([4.0, 0.25])
-    (one,) = Fits(arena).begun([(Hypothesis(), np.array([2.0, 2.0]), np.zeros(0))])  # type: ignore[arg-type]
-    assert strain(arena, one) == pytest.approx(0.5 * (2.0**2 + 1.0**2))  # type: ignore[arg-type]
-    arena.shared = 1
-    assert strain(arena, one) == pytest.approx(2.0)  # type: ignore[arg-type]

@@ -97,7 +97,8 @@ class ShrinkageFound(Frozen):
     """Of the refit model's gap above the floor; None: that gap is at the floor."""
     ci90: tuple[float, float] | None
     predicted: float | None
-    """The same from intervals that were left out of the fit, before the judged ones were looked at."""
+    """The same before anything seen there was looked at: from the targets of the judged intervals, and errors of fitted
+    ones by numbers fitted without their gait (until version 19 from these alone)."""
     judged_on: tuple[str, ...]
     set_aside: tuple[str, ...] = ()
     """Of them, those that do not count: the floor was measured without the worst intervals, too."""

@@ -175,11 +175,11 @@ def _next(one: NextGaitFound, where: str) -> str:
     how = f": r2s2r record {one.file}{where} --repeats 2 {ROBOT}" if one.file else ""
     if one.now is not None and one.nats <= one.now:
         return f"nothing separates the candidates better than these runs; the best of the library is {one.name}{how}"
-    beside = "" if one.now is None else f", these runs by {one.now:.1f}"
-    enough = "" if one.nats >= INDISTINCT else " (too few to tell them apart)"
+    beside = "" if one.now is None else f", these runs again {one.now:.1f}"
+    enough = "" if one.nats >= INDISTINCT else " (little)"
     names = [IN_WORDS.get(name, name) for name in one.candidates]
     whom = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "the likeliest candidates"
-    return f"{one.name}: would separate {whom} by {one.nats:.1f} nats{enough}{beside}{how}"
+    return f"{one.name}: likeliest to decide between {whom}, worth {one.nats:.1f} nats{enough}{beside}{how}"
 
 
 def _how(report: DiagnoseReport, *, brief: bool) -> Iterator[list[str]]:

@@ -116,9 +116,13 @@ def test_what_was_named_comes_with_the_command_that_uses_it() -> None:
 @pytest.mark.parametrize(
     ("nats", "now", "words"),
     [
-        (30.0, 2.0, "ramps: would separate the likeliest candidates by 30.0 nats, these runs by 2.0"),
+        (
+            30.0,
+            2.0,
+            "ramps: likeliest to decide between the likeliest candidates, worth 30.0 nats, these runs again 2.0",
+        ),
         (2.0, 3.0, "nothing separates the candidates better than these runs; the best of the library is ramps"),
-        (2.0, None, "ramps: would separate the likeliest candidates by 2.0 nats (too few to tell them apart)"),
+        (2.0, None, "ramps: likeliest to decide between the likeliest candidates, worth 2.0 nats (little)"),
     ],
 )
 def test_what_to_run_next_is_said_beside_what_was_run(nats: float, now: float | None, words: str) -> None:
@@ -136,7 +140,10 @@ def test_what_would_be_told_apart_is_named_nothing_wrong_among_it() -> None:
     one = NextGaitFound(name="ramps", file=None, targets=((1.0,),), nats=9.0, now=None,
                         candidates=("none", "payload", "com_offset"))  # fmt: skip
     rows = [row for table in diagnose_tables(report().model_copy(update={"next_gait": one})) for row in table.rows]
-    assert ["run next", "ramps: would separate nothing wrong, payload and com_offset by 9.0 nats"] in rows
+    assert [
+        "run next",
+        "ramps: likeliest to decide between nothing wrong, payload and com_offset, worth 9.0 nats",
+    ] in rows
 
 
 def test_more_runs_are_asked_for_where_the_bound_of_no_gap_is_what_is_open() -> None:

@@ -24,6 +24,7 @@ from r2s2r_cli.stages.diagnose.which.calibration import Calibration, calibration
 from r2s2r_cli.stages.diagnose.which.numbers import SENSOR_LAG, Model
 from r2s2r_cli.stages.diagnose.which.remembered import Checkpoint, Remembered
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
+from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.which import Compared, compare_effects
 from r2s2r_cli.stages.identify.belief import Filter
 
@@ -66,7 +67,8 @@ def diagnose(
 ) -> Diagnosis:  # fmt: skip
     """Where the gap lies, which effect causes it, how far it shrinks, and what to run next.
 
-    Nothing of the judged intervals is looked at before everything else is decided. checkpoint: with what was
+    Nothing of the judged intervals is looked at before everything else is decided, but that start states of later
+    intervals of the same run go on from them. checkpoint: with what was
     simulated before an interruption the result is that of an uninterrupted run, to the last bit. Raises InputError
     where there is too little to diagnose or a setting contradicts the data, NumericalError where nothing can be
     simulated.
@@ -151,8 +153,8 @@ def _segments(compared: Compared) -> tuple[SegmentSeen, ...]:
             interval=one.interval,
             gait=one.gait,
             t=(one.window.start, float(one.t[-1])),
-            refit=float(np.sqrt(refit.squared[k])),
-            effect=None if best is None else float(np.sqrt(best.squared[k])),
+            refit=_seen(refit, k),
+            effect=None if best is None else _seen(best, k),
             misfit=float(square[k] / size[k]),
             gap=bool(gap[k]),
             key=one.caps[-1],
@@ -160,3 +162,9 @@ def _segments(compared: Compared) -> tuple[SegmentSeen, ...]:
         )
         for k, one in enumerate(arena.whole)
     )
+
+
+def _seen(score: Score, k: int) -> float:
+    """Error of the caps at the end of the interval k [m]; nan where one is lost, which a mean bounds and a picture
+    leaves out."""
+    return float("nan") if np.isnan(score.key[k]).any() else float(np.sqrt(score.squared[k]))

@@ -28,13 +28,14 @@ def targets_of(targets: np.ndarray) -> Targets:
     return tuple(tuple(float(x) for x in row) for row in np.nan_to_num(targets, nan=1.0))
 
 
-def imagined(arena: Arena, targets: Targets) -> list[Stretch]:
-    """The policy as one stretch from where a fitted run began, its targets driven by an ideal controller; nothing for
-    one without a frame. Nobody has seen it: caps and lengths are 0."""
-    like = arena.many[0]
+def imagined(arena: Arena, targets: Targets, *, like: Stretch | None = None, name: str = "") -> list[Stretch]:
+    """The policy as one stretch from where a fitted one begins, its targets driven by an ideal controller; nothing for
+    one without a frame. Nobody has seen it: caps and lengths are 0. like: that stretch, the first if None; name: of the
+    policy, no two alike that begin apart."""
+    like = arena.many[0] if like is None else like
     robot = arena.model.robot
     state: State = like.window.state
-    control, t = commands(targets, robot.pid.range_m, _speed(arena))
+    control, t = commands(targets, robot.pid.range_m, _speed(arena), before=_before(like))
     frames = np.arange(1, int(t[-1] * RATE_HZ) + 1) / RATE_HZ
     if not len(frames):
         return []
@@ -52,12 +53,22 @@ def imagined(arena: Arena, targets: Targets) -> list[Stretch]:
         place=np.zeros(len(frames), dtype=int), state=state,
     )  # fmt: skip
     caps = np.zeros((len(frames), *like.caps[0].shape))
-    return [Stretch("imagined", "imagined", 1, 0, window, caps, noise, length, sd, like.sensors)]
+    run_name = f"imagined {name} from {like.run}"
+    return [Stretch(run_name, run_name, 1, 0, window, caps, noise, length, sd, like.sensors)]
 
 
-def commands(targets: Targets, wide: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
-    """Motor commands (row, actuated) at times (row,): full speed until each cable is there, from all cables long."""
-    before = np.ones(len(targets[0]))
+def _before(like: Stretch) -> np.ndarray | None:
+    """What cables were told before a stretch, as far as its run says; None: it is the first, all are long."""
+    target = like.window.run.intervals.target
+    return np.nan_to_num(target[like.interval - 2], nan=1.0) if 1 < like.interval <= len(target) else None
+
+
+def commands(
+    targets: Targets, wide: float, speed: float, *, before: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Motor commands (row, actuated) at times (row,): full speed until each cable is there. before (actuated,): the
+    target where the cables are to begin with; None: all are long."""
+    before = np.ones(len(targets[0])) if before is None else before
     begin = 0.0
     rows, times = [np.zeros(len(before))], [0.0]
     for target in targets:
@@ -86,10 +97,10 @@ def part(whole: Stretch, a: int, b: int) -> Stretch:
     )  # fmt: skip
 
 
-def ends(arena: Arena, whole: Stretch, targets: Targets) -> list[int]:
-    """Frames of an imagined policy before which its targets end, 0 first."""
-    speed, wide = _speed(arena), arena.model.robot.pid.range_m
-    at = np.array([commands(targets[: k + 1], wide, speed)[1][-1] for k in range(len(targets))])
+def ends(arena: Arena, whole: Stretch, like: Stretch, targets: Targets) -> list[int]:
+    """Frames of a policy that was imagined from where `like` begins, before which its targets end, 0 first."""
+    speed, wide, before = _speed(arena), arena.model.robot.pid.range_m, _before(like)
+    at = np.array([commands(targets[: k + 1], wide, speed, before=before)[1][-1] for k in range(len(targets))])
     return [0, *np.searchsorted(whole.t - whole.window.start, at + 1e-9, side="right").tolist()]
 
 

@@ -92,7 +92,7 @@ def left(difference: Sequence[np.ndarray], columns: Sequence[np.ndarray], prior:
 
 
 def _drawn(arena: Arena) -> np.ndarray:
-    """What nuisances of the engine are off by, (draw, p): SECANT of their prior sd, which the runs so far leave open.
+    """What nuisances of the engine are off by, (draw, p): SECANT of what is known of them before today's runs.
     The same ones for all policies, which are compared."""
     p = len(arena.engine)
     root = np.linalg.cholesky(np.linalg.inv(arena.precision)[:p, :p])

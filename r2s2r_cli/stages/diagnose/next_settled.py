@@ -1,9 +1,10 @@
 """How sure of the right candidate one is expected to be after a policy that nobody has run.
 
 Each candidate may be the truth, as probable as the ranking says. If it is, what the policy tells it from each other one
-by [nats] is added to the scores that the ranking has, and probabilities follow as they do there: over the temperature
-that sets of known truth have taught, and no effect worth less than one that gains nothing. The expected probability of
-the truth after that is what a policy is chosen by (Lindley 1956; with the loss of one decision, not of entropy).
+by [nats] is added to the scores that the ranking has, and probabilities of these candidates follow as they do there:
+over the temperature that sets of known truth have taught, and no effect worth less than one that gains nothing. The
+expected probability of the truth after that is what a policy is chosen by (Lindley 1956; with the loss of one decision,
+not of entropy).
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -104,13 +105,29 @@ def test_one_fall_of_a_healthy_robot_does_not_decide_what_no_gap_is() -> None:
     of three quarters, which the equivalence test looks at, none."""
     squared = np.full(11, 1e-4)
     squared[[3, 7]] = 64e-4, 81e-4
-    caps = SimpleNamespace(noise=np.full((1, 6, 3), 2e-3))
-    healthy = SimpleNamespace(arena=SimpleNamespace(whole=(caps,)), score=SimpleNamespace(squared=squared))
-    floor = healthy_floor(healthy)  # type: ignore[arg-type]
+    floor = healthy_floor(_healthy(squared, np.zeros((11, 6, 3))))
     assert floor.equivalence == (pytest.approx(0.010), USUAL) and floor.kept == KEPT
     assert floor.rmse == pytest.approx(np.sqrt((9 * 1e-4 + 64e-4) / 10)) and floor.sensor == pytest.approx(
         np.sqrt(12e-6)
     )
+
+
+def test_a_healthy_robot_that_is_lost_is_no_floor() -> None:
+    """Three of eleven intervals with 10 mm end with a cap more than 25 cm off: they count so in the share that the
+    equivalence test looks at, where they are among the worst, and not in the floor."""
+    squared, key = np.full(11, 1e-4), np.zeros((11, 6, 3))
+    squared[:3], key[:3] = 0.25**2, np.nan
+    floor = healthy_floor(_healthy(squared, key))
+    assert floor.rmse == pytest.approx(0.010)
+    assert floor.equivalence == (pytest.approx(0.010), USUAL)
+    everywhere = healthy_floor(_healthy(np.full(4, 0.25**2), np.full((4, 6, 3), np.nan)))
+    assert everywhere.rmse == pytest.approx(0.25)  # there is no other
+
+
+def _healthy(squared: np.ndarray, key: np.ndarray) -> Any:
+    """Healthy runs whose intervals end with squared errors (interval,) [m^2]; key (interval, cap, 3) [m]."""
+    caps = SimpleNamespace(noise=np.full((1, 6, 3), 2e-3))
+    return SimpleNamespace(arena=SimpleNamespace(whole=(caps,)), score=SimpleNamespace(squared=squared, key=key))
 
 
 def test_shuffled_commands_belong_to_other_intervals() -> None:

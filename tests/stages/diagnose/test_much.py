@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.stages.diagnose.much.blackbox import corrected
+from r2s2r_cli.stages.diagnose.much.much import _likely
 from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, foretold, share_with_interval, squared_of
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.measures.gap import counting, own_share
@@ -94,6 +95,19 @@ def test_one_fall_that_an_effect_explains_moves_the_forecast_little() -> None:
     assert plain is not None and told is not None and share is not None
     assert share - plain > 0.2
     assert told - plain < 0.1
+
+
+@pytest.mark.parametrize(
+    ("verdict", "own", "p"),
+    [(("payload",), ("payload",), 0.8), (("a", "b"), ("b", "a"), 0.8), ((), ("payload",), 0.3), ((), ("lost",), 0.0)],
+)
+def test_a_forecast_is_as_sure_as_its_effect(verdict: tuple[str, ...], own: tuple[str, ...], p: float) -> None:
+    """Of what is named, one or two, the verdict's probability; where nothing is, that of the effect in the ranking,
+    not that of what is first there."""
+    ranking = (SimpleNamespace(effect="none", probability=0.6), SimpleNamespace(effect="payload", probability=0.3))
+    which = SimpleNamespace(effects=verdict, probability=0.8, ranking=ranking)
+    fit = SimpleNamespace(hypothesis=SimpleNamespace(effects=own))
+    assert _likely(SimpleNamespace(which=which), fit) == p  # type: ignore[arg-type]
 
 
 def test_at_the_floor_nothing_is_foretold() -> None:

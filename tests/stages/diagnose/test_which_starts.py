@@ -104,6 +104,13 @@ def test_a_size_that_is_far_off_is_found_beside_the_nuisances_of_another() -> No
     assert first.cost <= before[0] and found.cost <= before[1]
 
 
+def test_nobody_shows_the_refit_nominal_model_alone_anything() -> None:
+    """Where no effect can be fitted, it stays as it is."""
+    arena = begun_away(truth=0.0, bend=0.0)
+    (one,) = Fits(arena).begun([(Hypothesis(), np.zeros(2), np.zeros(0))])  # type: ignore[arg-type]
+    assert exchanged(Fits(arena), [one], others=(5.0,)) == [one] and exchanged(Fits(arena), []) == []  # type: ignore[arg-type]
+
+
 def test_other_sizes_stay_within_the_bounds() -> None:
     """Five times a size that is half the bound is the bound, where the truth lies beyond it."""
     arena = begun_away(truth=8.0, bend=0.0)

@@ -17,10 +17,10 @@ from r2s2r_cli.stages.diagnose.which.starting import LOST_M
 
 
 def ahead(
-    arena: Arena, targets: np.ndarray, numbers: Sequence[int], truth: np.ndarray, other: np.ndarray
+    arena: Arena, targets: np.ndarray, numbers: Sequence[int], truth: np.ndarray, other: np.ndarray, *, name: str = ""
 ) -> np.ndarray:
     """Caps of `other` minus those of `truth`, values (n,) of the model, at the ends of the target intervals `numbers`
-    (1-based) of a run with targets (interval, actuated): (begin, interval, cap, 3) [m], at most LOST_M by axis.
+    (1-based) of a run `name` with targets (interval, actuated): (begin, interval, cap, 3) [m], at most LOST_M by axis.
 
     The run is driven by an ideal controller, with the truth as the robot, from where each fitted run began: where one
     robot tips hangs on millimetres, and nobody knows yet how this one will be put down. At each interval both models
@@ -28,14 +28,10 @@ def ahead(
     """
     wanted = targets_of(targets[: max(numbers)])
     begins = list({one.run: one for one in reversed(arena.many)}.values())
-    found = imagined(arena, wanted)
-    if not found:
-        return np.zeros((len(begins), len(numbers), *arena.many[0].caps.shape[1:]))
-    edges = ends(arena, found[0], wanted)
     parts, before = [], []
     for like in begins:
-        window = replace(found[0].window, state=like.window.state)
-        whole = replace(found[0], run=f"imagined {like.run}", window=window)
+        (whole,) = imagined(arena, wanted, like=like, name=name)
+        edges = ends(arena, whole, like, wanted)
         for number in numbers:
             before.append(part(whole, 0, max(edges[number - 1], 1)))
             parts.append(replace(part(whole, edges[number - 1], edges[number]), interval=number))
@@ -44,6 +40,8 @@ def ahead(
         if one.window.first:
             parts[k] = replace(one, window=replace(one.window, state=states.select(k)))
     seen = arena.replayer.seen(parts, np.stack([truth, other]))
-    apart = np.array([one.caps[1, -1] - one.caps[0, -1] for one in seen])
-    apart = np.clip(np.nan_to_num(apart, nan=LOST_M), -LOST_M, LOST_M)
+    truly, otherwise = (np.array([one.caps[k, -1] for one in seen]) for k in (0, 1))
+    # Where the truth itself breaks off nothing is foretold: the other one errs by no more than it does.
+    apart = np.where(np.isfinite(truly), np.nan_to_num(otherwise - truly, nan=LOST_M), 0.0)
+    apart = np.clip(apart, -LOST_M, LOST_M)
     return np.asarray(apart.reshape(len(begins), len(numbers), *apart.shape[1:]))

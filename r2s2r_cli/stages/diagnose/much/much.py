@@ -1,4 +1,5 @@
-"""How much: predicted from what was left out, then realised on intervals that nothing has looked at before."""
+"""How much: predicted from the targets of judged intervals and what was left out, then realised on these intervals, which
+nothing has looked at before."""
 
 from __future__ import annotations
 
@@ -143,16 +144,25 @@ def _predicted(
         solver.values(one.hypothesis, one.z[None], one.x[None])[0] for one in (compared.base, fit)
     )  # fmt: skip
     apart = [
-        ahead(arena, evidence.run(one.run).caps.intervals.target, one.intervals, effect, refit)
+        ahead(arena, evidence.run(one.run).caps.intervals.target, one.intervals, effect, refit, name=one.run)
         for one in evidence.judge if one.intervals
     ]  # fmt: skip
     if not apart:
         return None, None
     before, after = (np.concatenate(one) for one in errors)
     return foretold(
-        before, after, np.concatenate(apart, axis=1), floor_m, groups=runs, likely=compared.which.probability,
+        before, after, np.concatenate(apart, axis=1), floor_m, groups=runs, likely=_likely(compared, fit),
         kept=kept, seed=seed,
     )  # fmt: skip
+
+
+def _likely(compared: Compared, fit: Fit) -> float:
+    """How probable it is that the effects of a fit are the cause: what the verdict says where it is of them, else what
+    the ranking has for the one effect."""
+    which, own = compared.which, fit.hypothesis.effects
+    if set(own) == set(which.effects):
+        return which.probability
+    return next((one.probability for one in which.ranking if (one.effect,) == own), 0.0)
 
 
 def _alike(runs: Sequence[Run], healthy: Healthy, floor: FloorGiven, starts: Starts) -> tuple[float, float]:

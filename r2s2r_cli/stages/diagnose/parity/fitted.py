@@ -85,7 +85,10 @@ def _cut(run: Run, first: int, last: int) -> Run:
         sensor_bias=None, sensor_delay=None,  # these are of the whole run
     )  # fmt: skip
     lengths = None if run.lengths is None else _heard(run.lengths, -np.inf if begin == 0 else start, stop)
-    return replace(run, caps=cut, lengths=lengths)
+    found = replace(run, caps=cut, lengths=lengths)
+    # Smoothed states next to a judged interval know of it; what is seen from the block's own frames on does not.
+    seen = found.known
+    return replace(found, caps=replace(cut, p_WE=seen.p_WE, v_WE=seen.v_WE, sd_p=seen.sd_p, sd_v=seen.sd_v))
 
 
 def _stop(caps: RunData, end: int, target: np.ndarray) -> float:

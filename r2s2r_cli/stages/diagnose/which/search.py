@@ -93,17 +93,19 @@ def exchanged(fits: Fits, found: Sequence[Fit], *, others: Sequence[float] = ())
     everything gains against it. others: shares of its size that an effect is tried at as well. Where nuisances have
     made up for most of an effect they hold its fit at what they left of it, and no small step leads out of there; at
     five times the size beside the nuisances of a fit that is not held so, one does."""
-    points, away, of = [], [], []
+    points: list[tuple[Hypothesis, np.ndarray, np.ndarray]] = []
+    away: list[np.ndarray] = []
+    of: dict[int, list[int]] = {}
     for i, one in enumerate(found):
         for other in (*found[:GIVING], *(() if i < GIVING else (one,))):
             for size in (one.x, *_other_sizes(one, others)):
                 if other is not one or size is not one.x:
+                    of.setdefault(i, []).append(len(points))
                     points.append((one.hypothesis, other.z, size))
                     away.append(other.away)
-                    of.append(i)
-    costs, of_fit = fits.costs(points, away), np.array(of)
-    best = [int(rows[costs[rows].argmin()]) for rows in (np.flatnonzero(of_fit == i) for i in range(len(found)))]
-    moved = [i for i, one in enumerate(found) if costs[best[i]] < one.cost - LEAST_GAIN]
+    costs = fits.costs(points, away) if points else np.zeros(0)  # the refit nominal model alone has nobody to show it
+    best = {i: min(rows, key=lambda k: costs[k]) for i, rows in of.items()}
+    moved = [i for i, k in best.items() if costs[k] < found[i].cost - LEAST_GAIN]
     begun = fits.begun([points[best[i]] for i in moved], [away[best[i]] for i in moved])
     new = dict(zip(moved, begun, strict=True))
     for one in (*found, *begun):

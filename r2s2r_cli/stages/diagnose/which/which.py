@@ -76,6 +76,8 @@ def compare_effects(
     if wider > 1.0:
         arena.whiten(floor_m=wider * arena.floor_m)
         base, *fits = _again(arena, [base, *fits])
+        # Directions of the screening were white under the floor of before, and its nuisances began where the base was.
+        responses = screen(arena, base, known)
     told("left out", 0, 1)
     # Where a fit came by a cliff, and went on in small steps, its derivative is still that of the cliff.
     Fits(arena).secants(fits)
@@ -85,9 +87,7 @@ def compare_effects(
     said = marginal_gains(arena, base, fits).less(old)
     # Beside an effect that gains no more than chance does even left out, a second one is no second cause.
     likely = said.counted.max(initial=0.0) > by_chance
-    # Directions of the screening are white under the floor of then, and its nuisances begin where the base was then.
-    now = screen(arena, base, known) if likely and wider > 1.0 else responses
-    pairs = pairs_of(arena, base, fits, said.counted, now, told_by or {}) if likely else []
+    pairs = pairs_of(arena, base, fits, said.counted, responses, told_by or {}) if likely else []
     if pairs:
         first = int(said.counted.argmax())
         alone = led(Fits(arena), fits[first], pairs, iterations=ITERATIONS)

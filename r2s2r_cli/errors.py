@@ -37,6 +37,11 @@ def quoted(path: object) -> str:
     return quote(str(path))
 
 
+def nearest_folder(path: Path) -> Path:
+    """The nearest folder above a path that is there: what a hint can list where the path itself is missing."""
+    return next((folder for folder in path.parents if folder.is_dir()), Path())
+
+
 def install_extra(extra: str) -> str:
     """The command that installs an extra. From the clone that this is: no package index has r2s2r."""
     root = Path(__file__).resolve().parents[1]

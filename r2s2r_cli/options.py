@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -33,28 +34,50 @@ ShowConfigOption = Annotated[bool, typer.Option("--show-config", help="Print the
 def parse_overrides(items: list[str] | None, stage: str) -> dict[str, Any]:
     """`--set stage.key=value` items as dotted keys and TOML values; bare words are text.
 
-    Raises UsageError for an item without a value, or of another stage, which would be ignored in silence.
+    Raises UsageError as `parse_override` does, and for an item of another stage, which would be ignored in silence.
     """
-    import tomllib
-
     overrides: dict[str, Any] = {}
     for item in items or []:
-        name, equals, text = item.partition("=")
-        key = name.strip()
-        if not equals or not key:
-            raise UsageError("an override has no value", where="--set", expected=f"{stage}.KEY=VALUE",
-                             received=item or "nothing", hint=_meant(stage, key, None))  # fmt: skip
+        key, value = parse_override(item, expected=f"{stage}.KEY=VALUE", hint=lambda key: _meant(stage, key, None))
         if key.split(".")[0] != stage or "." not in key:
             raise UsageError(
                 f"this is no setting of {stage}", where="--set", expected=f"{stage}.KEY=VALUE", received=item,
-                hint=_meant(stage, key, text),
+                hint=_meant(stage, key, item.partition("=")[2]),
             )  # fmt: skip
-        try:
-            parsed = tomllib.loads(f"value = {text}")
-        except (ValueError, RecursionError):  # no TOML, a number of too many digits, too deep a list
-            parsed = {"value": text}
-        overrides[key] = parsed["value"] if len(parsed) == 1 else text
+        overrides[key] = value
     return overrides
+
+
+def parse_override(
+    item: str, *, hint: Callable[[str], str], expected: str = "KEY=VALUE", words: bool = True
+) -> tuple[str, Any]:
+    """Key and value of one `--set KEY=VALUE`, the value as TOML.
+
+    words: what is no TOML is taken as text, as typed. hint: what mends it, of the key. Raises UsageError where key or
+    value is missing, for several values in one (of which all but the first would be lost), and for no TOML if not
+    `words`.
+    """
+    import tomllib
+
+    name, equals, text = item.partition("=")
+    key = name.strip()
+    if not equals or not key:
+        raise UsageError("an override has no value", where="--set", expected=expected, received=item or "nothing",
+                         hint=hint(key))  # fmt: skip
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError) as error:  # no TOML, a number of too many digits, too deep a list
+        if not words:
+            raise UsageError("the value is no TOML", where="--set", expected=expected, received=item,
+                             hint=hint(key)) from error  # fmt: skip
+        parsed = {"value": text}
+        several = "\n" in text.strip()  # a word in front of further keys
+    else:
+        several = len(parsed) > 1
+    if several:
+        raise UsageError("an override has more than one value", where="--set",
+                         expected=f"{expected}, an option for each", received=item, hint=hint(key))  # fmt: skip
+    return key, parsed["value"]
 
 
 def _meant(stage: str, key: str, text: str | None) -> str:

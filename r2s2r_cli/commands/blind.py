@@ -13,7 +13,7 @@ from r2s2r_cli.commands.blind_score import calibrate, publish, score
 from r2s2r_cli.commands.blind_worth import worth
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import UsageError
-from r2s2r_cli.options import JsonOption, QuietOption
+from r2s2r_cli.options import JsonOption, QuietOption, parse_override
 
 blind_app = typer.Typer(help="Blind trials of diagnose: make sets, run, score.", no_args_is_help=True)
 
@@ -200,19 +200,9 @@ def _check_first(first: int, count: int, bank: BankName, console: Console) -> No
 
 
 def _settings(items: list[str] | None, without: str | None) -> dict[str, object]:
-    import tomllib
-
-    found: dict[str, object] = {}
-    for item in items or []:
-        name, equals, text = item.partition("=")
-        try:
-            found[name.strip()] = tomllib.loads(f"value = {text}")["value"]
-        except (ValueError, KeyError, RecursionError) as error:
-            raise UsageError("this is no setting", where="--set", expected="KEY=VALUE, the value as TOML",
-                             received=item, hint="--set with_parity=false") from error  # fmt: skip
-        if not equals:
-            raise UsageError("a setting has no value", where="--set", expected="KEY=VALUE", received=item,
-                             hint="--set with_parity=false")  # fmt: skip
+    # No bare words: a word in place of a number would be noticed when the first set is diagnosed, not here.
+    parsed = (parse_override(item, hint=lambda key: "--set with_parity=false", words=False) for item in items or [])
+    found: dict[str, object] = dict(parsed)
     if without is not None:
         from r2s2r_cli.effects.known import known_effects
 

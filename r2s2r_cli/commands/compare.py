@@ -20,7 +20,7 @@ from r2s2r_cli.options import (
 from r2s2r_cli.store.project import Project
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from r2s2r_cli.artifact import ArtifactData
     from r2s2r_cli.commands.compare_inputs import Asked
@@ -86,7 +86,7 @@ def compare(
     )
     show_outcome(result, console)
     if report is not None:
-        _show(report, console)
+        _show(report, (*result.reasons, *result.stale_inputs), console)
 
 
 def _compute(asked: Asked, console: Console) -> tuple[ArtifactData, CompareReport]:
@@ -120,12 +120,13 @@ def _draw(data: ArtifactData, report: CompareReport, robot: Robot) -> Iterator[t
     yield ".html", comparison_page(report, data, robot, pictures, strips, history)
 
 
-def _show(report: CompareReport, console: Console) -> None:
+def _show(report: CompareReport, told: Sequence[str], console: Console) -> None:
+    from r2s2r_cli.commands.compare_models import not_told
     from r2s2r_cli.views.compare_tables import comparison_tables
     from r2s2r_cli.views.compare_verdict import verdict
 
     for table in comparison_tables(report):
         console.table(table.title, table.columns, table.rows)
     console.data(verdict(report))
-    for text in report.warnings:
+    for text in not_told(report.warnings, told):
         console.warn(text)

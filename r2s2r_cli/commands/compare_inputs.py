@@ -96,9 +96,9 @@ class Asked:
             require_model(self.project, path, "compare")
         states = [self.estimate(place) for place in self.places]
         others = [path for path in (*map(self.recording, self.places), self.floor) if path.exists()]
-        return [
-            artifact_ref(self.project, path, whole_header(path)) for path in (*states, *others, *self.files.values())
-        ]
+        # Once each: one file may be two simulators, by two names.
+        paths = {self.project.relative(path): path for path in (*states, *others, *self.files.values())}
+        return [artifact_ref(self.project, path, whole_header(path)) for path in paths.values()]
 
     def runs(self) -> tuple[tuple[RealRun, ...], tuple[str, ...]]:
         """The real runs, those of this iteration first, and why others are left out. Raises ArtifactError, and

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from r2s2r_cli.commands.diagnose_inputs import Asked
     from r2s2r_cli.store.checkpoint_arrays import ArrayCheckpoint
     from schemas.config import DiagnoseSettings
-    from schemas.results_diagnose import DiagnoseReport, DiagnoseResult
+    from schemas.results_diagnose import DiagnoseReport
 
 
 def diagnose(
@@ -81,6 +81,7 @@ def diagnose(
     Example: r2s2r diagnose
     """
     from r2s2r_cli.commands.diagnose_inputs import Asked
+    from r2s2r_cli.commands.diagnose_outcome import answer, pictures, show
     from r2s2r_cli.commands.identify_hints import typed_options, whole_hints
     from r2s2r_cli.commands.outcome import print_config, show_outcome
     from r2s2r_cli.commands.stage import StageRun
@@ -124,12 +125,12 @@ def diagnose(
         checkpoint = ArrayCheckpoint(unfinished, key, resume, command=again)
         with resumable(checkpoint, here.relative(unfinished), again, done="simulated"):
             result, report = run.run(
-                lambda: _compute(asked, settings, checkpoint, console, draw), _draw if draw else None,
+                lambda: _compute(asked, settings, checkpoint, console, draw), pictures if draw else None,
                 lambda said: checkpoint.clear(),
             )  # fmt: skip
-    show_outcome(_answer(result, report), console)
+    show_outcome(answer(result, report), console)
     if report is not None:
-        _show(report, console)
+        show(report, console)
 
 
 def _require_effects(names: tuple[str, ...]) -> None:
@@ -154,6 +155,7 @@ def _require_effects(names: tuple[str, ...]) -> None:
 def _compute(
     asked: Asked, settings: DiagnoseSettings, checkpoint: ArrayCheckpoint, console: Console, draw: bool
 ) -> tuple[ArtifactData, DiagnoseReport]:
+    from r2s2r_cli.commands.diagnose_outcome import NEXT
     from r2s2r_cli.commands.interrupts import loaded
 
     evidence = asked.evidence()
@@ -176,8 +178,6 @@ def _compute(
     return data, report.model_copy(update={**numbers, "wall_s": time.monotonic() - begun, "seconds": seconds})
 
 
-NEXT = "-next.toml"
-"""What is added to the artifact's name for the policy that should be run next."""
 PARTS = ("parity", "healthy runs", "refit", "screening", "fits", "left out", "where", "judged", "next gait")
 """Of the work, in its order."""
 
@@ -205,57 +205,3 @@ def _shown(console: Console, seconds: dict[str, float]) -> Iterator[Callable[[st
         if state["part"] is not None:
             seconds[state["part"]] = seconds.get(state["part"], 0.0) + time.monotonic() - state["since"]
         advance(len(PARTS) - state["at"])
-
-
-def _answer(result: Any, report: DiagnoseReport | None) -> DiagnoseResult:
-    """The document: what every stage says, and what was found at the top."""
-    from schemas.results_diagnose import DiagnoseResult
-
-    shared: dict[str, Any] = result.model_dump(exclude={"schema_"})
-    if report is None:
-        return DiagnoseResult(**shared)
-    names = ("verdict", "effects", "probability", "set90", "ranking", "where", "shrinkage", "not_testable",
-             "confusable", "next_gait")  # fmt: skip
-    return DiagnoseResult(**shared, **{name: getattr(report, name) for name in names})
-
-
-def _draw(data: ArtifactData, report: DiagnoseReport) -> Iterator[tuple[str, bytes]]:
-    from r2s2r_cli.views.diagnose import draw_diagnosis
-    from r2s2r_cli.views.diagnose_page import diagnose_page
-
-    if report.next_gait is not None:
-        yield NEXT, _policy(report)
-    pictures = []
-    for name, title, png in draw_diagnosis(data, report):
-        yield f"-{name}.png", png
-        pictures.append((title, png))
-    yield ".html", diagnose_page(report, pictures)
-
-
-def _policy(report: DiagnoseReport) -> bytes:
-    """The next gait as a policy file."""
-    import tomlkit
-
-    from schemas.results_diagnose import IN_WORDS
-
-    one = report.next_gait
-    assert one is not None  # noqa: S101 - asked by the caller
-    names = ", ".join(IN_WORDS.get(name, name) for name in one.candidates)
-    head = {
-        "schema_version": 1, "robot": report.robot, "name": "next-gait",
-        "description": f"{one.name}: to tell apart what diagnose could not ({names})",
-        "steps": [{"target": list(target)} for target in one.targets],
-    }  # fmt: skip
-    return tomlkit.dumps(head).encode()
-
-
-def _show(report: DiagnoseReport, console: Console) -> None:
-    from r2s2r_cli.views.diagnose_page import diagnose_tables
-    from r2s2r_cli.views.diagnose_words import verdict_words
-
-    for table in diagnose_tables(report, brief=True):
-        console.table(table.title, table.columns, table.rows)
-    console.data(f"verdict {verdict_words(report)}")
-    console.data(report.sentence)
-    for text in report.warnings:
-        console.warn(text)

@@ -6,11 +6,11 @@ import dataclasses
 import difflib
 import math
 import re
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.options import parse_override
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.toml import check_model, read_toml
 from r2s2r_cli.store.toml_hints import in_override, last_name, shown
@@ -61,15 +61,7 @@ def _robot_path(path: Path) -> Path:
 
 
 def _parse(item: str) -> tuple[str, Any]:
-    key, equals, text = item.partition("=")
-    if not equals or not key.strip():
-        raise UsageError("an override has no value", where="--set", expected="KEY=VALUE", received=item,
-                         hint="--set contact.friction=0.5")  # fmt: skip
-    try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except (ValueError, RecursionError):  # no TOML, a number of too many digits, too deep a list
-        value = text
-    return key.strip(), value
+    return parse_override(item, hint=lambda key: "--set contact.friction=0.5")
 
 
 def _set(values: Any, key: str, value: Any) -> None:

@@ -49,7 +49,7 @@ class StageRun(Generic[Report]):
     dry_run: bool = False
     force: bool = False
     guard: Callable[[Header | None], None] | None = None
-    """Raises where the artifact in the way must not be replaced."""
+    """Raises where the artifact in the way must not be replaced; in a dry run as well."""
     executed: bool = False
     """Of the executed plan: 50-execute.h5, 51-estimate.h5."""
     not_applied: Callable[[Report], list[str]] | None = None
@@ -75,10 +75,10 @@ class StageRun(Generic[Report]):
             why = ["--force was given"]
         if present is not None and not why:
             return self._fresh(present, draw)
-        if self.dry_run:
-            return self._result("dry_run", present, why, None), None
         if self.guard is not None and not self.force:
             self.guard(present)
+        if self.dry_run:
+            return self._result("dry_run", present, why, None), None
         with writing(self.project.root, self.stage):
             return self._run_locked(compute, draw, after, why)
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
-from r2s2r_cli.errors import UsageError
+from r2s2r_cli.rig.beginning import options_of, require_parts, start_pose
 from r2s2r_cli.rig.effects.base import Law, Scene, overrides
 from r2s2r_cli.rig.effects.cables import Cords
 from r2s2r_cli.rig.effects.contact import cap_geoms
-from r2s2r_cli.rig.model.frames import Pose, quaternion, rest_pose, rotation, wxyz
+from r2s2r_cli.rig.model.frames import quaternion, rest_pose, rotation, wxyz
 from r2s2r_cli.rig.model.mjcf_text import ground_rotation
-from r2s2r_cli.rig.model.options import STIFF, Options
 from r2s2r_cli.rig.model.sim import MujocoSim, Reading
 from r2s2r_cli.rig.winches import Winches
 from r2s2r_cli.rig.world.faults import CableTorn, MotorDead
@@ -58,16 +57,16 @@ class Plant:
     """
 
     def __init__(self, robot: Robot, world: World) -> None:
-        _check(robot, world)
+        require_parts(robot, world)
         self.robot, self.world = robot, world
-        options = _options(world)
+        options = options_of(world)
         self.sim = MujocoSim(robot, options)
         self.winches = Winches(robot)
         self._n = len(robot.actuated)
         self._ends = np.array([cable.caps for cable in robot.cables])
         self._h = float(self.sim.model.opt.timestep)
         self._zero = rest_pose(robot).rest
-        self._pose = _placed(rest_pose(robot), world, options)
+        self._pose = start_pose(robot, world, options)
         self.sim.reset(self._pose)
         self.laws = self._laws()
         self._force = tuple(law for law in self.laws if overrides(law, "force"))
@@ -208,45 +207,3 @@ def _turn(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The rotation (3, 3) that takes points a (n, 3) nearest to b, both about the origin (Kabsch)."""
     u, _, v = np.linalg.svd(b.T @ a)
     return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v)
-
-
-def _options(world: World) -> Options:
-    options = STIFF if world.stiff else Options(timestep_s=world.timestep_s)
-    options = replace(options, friction=world.floor.friction, restitution=world.floor.restitution)
-    for _, effect in world.effects.present():
-        options = effect.options(options)
-    return options
-
-
-def _placed(pose: Pose, world: World, options: Options) -> Pose:
-    """The pose turned by the heading, moved, and laid on the floor."""
-    a = world.start.heading_rad
-    R_GS = np.array([[np.cos(a), -np.sin(a), 0.0], [np.sin(a), np.cos(a), 0.0], [0.0, 0.0, 1.0]])
-    R_WG = ground_rotation(options.ground_normal)
-    # The floor's own x axis is as near the world's as can be, so a level floor turns nothing.
-    p_GR = pose.p_WR @ R_GS.T + np.array([*world.start.position_m, 0.0])
-    R_WR = R_WG @ R_GS @ rotation(pose.q_WR)
-    return Pose(p_GR @ R_WG.T, np.array([quaternion(R) for R in R_WR]), pose.rest)
-
-
-def _check(robot: Robot, world: World) -> None:
-    """Raises UsageError where the world file names a rod, cable, cap, motor or sensor that the robot does not have."""
-    counts = {
-        "rod": len(robot.rods), "cable": len(robot.cables), "motor": len(robot.motors), "sensor": len(robot.sensors),
-    }  # fmt: skip
-    tables: list[tuple[str, object]] = [("effects." + name, effect) for name, effect in world.effects.present()]
-    tables += [(f"effects.attachment_offset.moved.{i}", one) for i, one in enumerate(_moved(world))]
-    tables += [(f"faults.{i}", fault) for i, fault in enumerate(world.faults)]
-    for where, table in tables:
-        for key, count in counts.items():
-            value = getattr(table, key, None)
-            if isinstance(value, int) and value >= count:
-                raise UsageError(
-                    f"the robot has no {key} {value}", where=f"world file: {where}.{key}",
-                    expected=f"0 to {count - 1}", received=str(value), hint=f"correct {where}.{key} in the world file",
-                )  # fmt: skip
-
-
-def _moved(world: World) -> tuple[object, ...]:
-    offset = world.effects.attachment_offset
-    return () if offset is None else offset.moved

@@ -37,13 +37,9 @@ class CheckpointFile:
             kept = json.loads(self.path.read_text("utf-8"))
             form, key, values = kept["form"], kept["key"], dict(kept["values"])
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise InputError("the checkpoint cannot be read", where=str(self.path), received=type(error).__name__,
-                             expected="what an interrupted command left",
-                             hint=begin_anew(self.command)) from error  # fmt: skip
+            raise unreadable(self.path, self.command, error) from error
         if (form, key) != (_FORM, self.key):
-            raise UsageError("the checkpoint belongs to another request", where=str(self.path),
-                             expected="the inputs, settings and options that it was made with", received="others",
-                             hint=begin_anew(self.command))  # fmt: skip
+            raise of_another(self.path, self.command)
         return values
 
     def kept(self) -> bool:
@@ -62,8 +58,26 @@ class CheckpointFile:
 
     def clear(self) -> None:
         """Remove it, and one that failed: the artifact stands."""
-        self.path.unlink(missing_ok=True)
-        failed_of(self.path).unlink(missing_ok=True)
+        discard(self.path)
+
+
+def discard(checkpoint: Path) -> None:
+    """Remove a checkpoint of either kind, and one that failed."""
+    checkpoint.unlink(missing_ok=True)
+    failed_of(checkpoint).unlink(missing_ok=True)
+
+
+def unreadable(checkpoint: Path, command: Sequence[str], error: Exception) -> InputError:
+    """For a checkpoint of either kind that is no checkpoint, or of another form."""
+    return InputError("the checkpoint cannot be read", where=str(checkpoint), received=type(error).__name__,
+                      expected="what an interrupted command left", hint=begin_anew(command))  # fmt: skip
+
+
+def of_another(checkpoint: Path, command: Sequence[str]) -> UsageError:
+    """For a checkpoint of either kind whose key is not that of this request."""
+    return UsageError("the checkpoint belongs to another request", where=str(checkpoint),
+                      expected="the inputs, settings and options that it was made with", received="others",
+                      hint=begin_anew(command))  # fmt: skip
 
 
 def begin_anew(command: Sequence[str]) -> str:

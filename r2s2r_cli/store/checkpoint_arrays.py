@@ -14,9 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.atomic import disk_error
-from r2s2r_cli.store.checkpoint import begin_anew, failed_of
+from r2s2r_cli.store.checkpoint import discard, of_another, unreadable
 
 _FORM = "arrays-1"
 MOST_BYTES = 48_000_000
@@ -65,7 +64,7 @@ class ArrayCheckpoint:
                 body = b"" if found is None else file.read(min(found[1], left))
                 after = file.tell()
         except OSError as error:
-            raise self._unreadable(error) from error
+            raise unreadable(self.path, self.command, error) from error
         if found is None or found[0] != digest or len(body) != found[1] or zlib.crc32(body) != found[2]:
             os.truncate(self.path, self._place)
             self._place = None
@@ -105,8 +104,7 @@ class ArrayCheckpoint:
 
     def clear(self) -> None:
         """Remove it, and one that failed: the artifact stands."""
-        self.path.unlink(missing_ok=True)
-        failed_of(self.path).unlink(missing_ok=True)
+        discard(self.path)
 
     def _opened(self) -> int:
         """Where the first result begins."""
@@ -116,19 +114,11 @@ class ArrayCheckpoint:
                 form, key = head["form"], head["key"]
                 place = file.tell()
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise self._unreadable(error) from error
+            raise unreadable(self.path, self.command, error) from error
         if (form, key) != (_FORM, self.key):
-            raise UsageError("the checkpoint belongs to another request", where=str(self.path),
-                             expected="the inputs, settings and options that it was made with", received="others",
-                             hint=begin_anew(self.command))  # fmt: skip
+            raise of_another(self.path, self.command)
         self._mine = True
         return place
-
-    def _unreadable(self, error: Exception) -> InputError:
-        return InputError(
-            "the checkpoint cannot be read", where=str(self.path), expected="what an interrupted command left",
-            received=type(error).__name__, hint=begin_anew(self.command),
-        )  # fmt: skip
 
 
 def _arrays(body: bytes) -> list[np.ndarray]:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from r2s2r_cli.errors import ArtifactError, InputError, quoted
+from r2s2r_cli.errors import ArtifactError, InputError, nearest_folder, quoted
 from r2s2r_cli.store.canonical import canonical_json
 from schemas.header import Header
 
@@ -166,9 +166,8 @@ def mends(path: Path, or_else: str = "recover") -> str:
 def unreadable(path: Path, error: OSError) -> ArtifactError:
     """Say in words why `path` cannot be read."""
     if isinstance(error, FileNotFoundError):
-        there = next((folder for folder in path.parents if folder.is_dir()), Path())
         return ArtifactError("there is no such file", where=str(path), expected="an artifact", received="nothing",
-                             hint=f"ls -la {quoted(there)}")  # fmt: skip
+                             hint=f"ls -la {quoted(nearest_folder(path))}")  # fmt: skip
     if isinstance(error, IsADirectoryError):
         return ArtifactError("this is a directory, not an artifact", where=str(path), expected="a file",
                              received="a directory", hint=f"ls -la {quoted(path)}")  # fmt: skip

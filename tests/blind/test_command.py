@@ -42,9 +42,12 @@ def test_the_key_may_not_lie_in_the_bank(bank: Path) -> None:
     assert code == 2 and not (bank / "a.key").exists()
 
 
-@pytest.mark.parametrize("extra", [("--set", "with_parity"), ("--set", "x=]"), ("--without", "ghosts")])
+@pytest.mark.parametrize(
+    "extra",
+    [("--set", "with_parity"), ("--set", "=3"), ("--set", "x=]"), ("--set", "x=1\ny=2"), ("--without", "ghosts")],
+)
 def test_settings_that_are_none_are_refused(bank: Path, extra: tuple[str, str]) -> None:
-    """No value, no TOML, no such effect: exit code 2."""
+    """No value, no name, no TOML, two values, no such effect: exit code 2."""
     assert refusal("run", bank, "--out", bank / "v", *extra)[0] == 2
     assert not (bank / "v").exists()
 

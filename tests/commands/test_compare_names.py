@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
 
-from r2s2r_cli.commands.compare_models import learned_names, require_current
+from r2s2r_cli.commands.compare_models import learned_names, not_told, require_current
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
 from schemas.header import Header, InputRef
 from schemas.versions import STAGE_VERSIONS
+from tests.commands.conftest import document
+from tests.guards.listing import ROOT
 
 SHA = "0" * 64
 
@@ -90,3 +93,23 @@ def test_changed_inputs_are_told_and_do_not_stop_it(looped: Project) -> None:
     (said,) = require_current(looped, "refined", looped.root / "iterations" / "001" / "30-identify.h5", one)
     assert "iterations/001/20-estimate.h5 changed" in said
     assert require_current(looped, "refined", looped.root.parent / "elsewhere.h5", one) == []
+
+
+def test_what_a_simulator_is_stale_by_is_told_once() -> None:
+    """Of its file among the inputs, or of itself; what else the report warns of stays."""
+    cause = "input iterations/001/20-estimate.h5 changed: its content hash is another"
+    other, rest = "simulator a: input iterations/002/20-estimate.h5 changed: its content hash is another", "no floor"
+    told = [f"its input iterations/001/30-identify.h5 is stale itself: {cause}, and 1 more"]
+    assert not_told([f"simulator a: {cause}", other, rest], told) == [other, rest]
+    assert not_told([f"simulator a: {cause}", rest], []) == [f"simulator a: {cause}", rest]
+
+
+def test_a_file_of_two_names_is_one_input(tmp_path: Path) -> None:
+    """What it is stale by is told once."""
+    root = Path(shutil.copytree(ROOT / "examples" / "sample-project" / "project", tmp_path / "project"))
+    first = root / "iterations" / "001"
+    shutil.copy(first / "51-estimate.h5", first / "20-estimate.h5")  # what 30-identify.h5 was made of is another now
+    models = [word for name in "ab" for word in ("--model", f"{name}={first / '30-identify.h5'}")]
+    answer = document("compare", "--project", str(root), "--iteration", "1", *models, "--dry-run")
+    assert answer["inputs"].count("iterations/001/30-identify.h5") == 1
+    assert sum("30-identify.h5 is stale itself" in text for text in answer["stale_inputs"]) == 1

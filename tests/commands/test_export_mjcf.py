@@ -58,6 +58,7 @@ def test_values_can_be_set() -> None:
         (("--set", "name.x.y=1"), 2, "robot.toml has no name.x.y"),
         (("--set", "rods.0.parts.0.mass_kg=0"), 2, "rods.0.parts.0.mass_kg"),
         (("--set", "contact.friction"), 2, "an override has no value"),
+        (("--set", "contact.friction=0.5\nname=1"), 2, "an override has more than one value"),
         (("--set", "options.timestep=1"), 2, "--set options.timestep_s=0.001"),
         (("--set", "options.timestep_s=0"), 2, "timestep_s cannot be 0"),
         (("--set", "options.timestep_s=fast"), 2, "options.timestep_s cannot be that"),

@@ -110,6 +110,20 @@ def test_another_log_does_not_replace_a_recording(estimated: Path) -> None:
     assert invoke("import", "second.csv", "--iteration", "2", "--no-draw").exit_code == 0
 
 
+def test_a_dry_run_says_that_a_recording_is_in_the_way(estimated: Path) -> None:
+    """In the words of the real run; with --force and into another iteration the log would go."""
+    for ending in ("csv", "toml"):
+        shutil.copy(f"sample.{ending}", f"other.{ending}")
+    before = sorted(estimated.rglob("*"))
+    real, dry = invoke("import", "other.csv"), invoke("import", "other.csv", "--dry-run")
+    assert (real.exit_code, dry.exit_code) == (2, 2)
+    assert "import loses none" in dry.stderr
+    assert [line for line in dry.stderr.splitlines() if "hint" not in line] == real.stderr.splitlines()[:-1]
+    assert document("import", "other.csv", "--dry-run", "--force")["state"] == "dry_run"
+    assert document("import", "other.csv", "--dry-run", "--iteration", "2")["state"] == "dry_run"
+    assert sorted(estimated.rglob("*")) == before
+
+
 def test_a_recording_never_loses_a_run(project: Path) -> None:
     """Of two imported runs none can be dropped by importing one again; a third can be added."""
     for name in ("second", "third"):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import gzip
 import json
 import re
-import shlex
 from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
@@ -17,7 +16,7 @@ from r2s2r_cli.blind import labels
 from r2s2r_cli.blind.index import index_of
 from r2s2r_cli.blind.score.lines import text_of
 from r2s2r_cli.blind.score.shard import Judged, Shard
-from r2s2r_cli.errors import InputError
+from r2s2r_cli.errors import InputError, nearest_folder, quoted
 from schemas.blind import BlindPublished, PublishedDiagnosis, PublishedFollow, PublishedRank, PublishedShrinkage
 
 FORMAT = "r2s2r blind published 1"
@@ -100,14 +99,9 @@ def _read(path: Path) -> dict[str, Any]:
             words = "neither JSON nor compressed JSON"
         raise InputError(
             "a published file cannot be read", where=str(path), expected=f"a file of `blind publish` ({FORMAT})",
-            received=words, hint=f"ls {shlex.quote(str(_folder(path)))}/*.json*   # what there is",
+            received=words, hint=f"ls {quoted(nearest_folder(path))}/*.json*   # what there is",
         ) from error  # fmt: skip
     return content
-
-
-def _folder(path: Path) -> Path:
-    """The nearest folder that is there."""
-    return next((one for one in path.parents if one.is_dir()), Path())
 
 
 def _sum(content: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from r2s2r_cli.errors import InputError, quoted
+from r2s2r_cli.errors import InputError, nearest_folder, quoted
 
 MIB = 1024 * 1024
 MAX_CSV_BYTES = 256 * MIB
@@ -166,15 +166,10 @@ def _status(path: Path, what: str) -> os.stat_result:
             where=str(path),
             expected="a file or folder that is there",
             received="nothing",
-            hint=f"ls {quoted(_there(path))}",
+            hint=f"ls {quoted(nearest_folder(path))}",
         ) from error
     except (OSError, ValueError) as error:
         raise _unreadable(path, what, error) from error
-
-
-def _there(path: Path) -> Path:
-    """The nearest folder above that is there."""
-    return next((folder for folder in path.parents if folder.is_dir()), Path())
 
 
 def _sibling(path: Path) -> str:

@@ -1,0 +1,71 @@
+"""What `diagnose` gives once it has an answer: the document, the files beside the artifact, what the terminal says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from r2s2r_cli.console import Console
+
+if TYPE_CHECKING:
+    from r2s2r_cli.artifact import ArtifactData
+    from schemas.results_diagnose import DiagnoseReport, DiagnoseResult
+
+NEXT = "-next.toml"
+"""What is added to the artifact's name for the policy that should be run next."""
+
+
+def answer(result: Any, report: DiagnoseReport | None) -> DiagnoseResult:
+    """The document: what every stage says, and what was found at the top."""
+    from schemas.results_diagnose import DiagnoseResult
+
+    shared: dict[str, Any] = result.model_dump(exclude={"schema_"})
+    if report is None:
+        return DiagnoseResult(**shared)
+    names = ("verdict", "effects", "probability", "set90", "ranking", "where", "shrinkage", "not_testable",
+             "confusable", "next_gait")  # fmt: skip
+    return DiagnoseResult(**shared, **{name: getattr(report, name) for name in names})
+
+
+def pictures(data: ArtifactData, report: DiagnoseReport) -> Iterator[tuple[str, bytes]]:
+    """What lies beside the artifact: the policy to run next, pictures and the page."""
+    from r2s2r_cli.views.diagnose import draw_diagnosis
+    from r2s2r_cli.views.diagnose_page import diagnose_page
+
+    if report.next_gait is not None:
+        yield NEXT, _policy(report)
+    drawn = []
+    for name, title, png in draw_diagnosis(data, report):
+        yield f"-{name}.png", png
+        drawn.append((title, png))
+    yield ".html", diagnose_page(report, drawn)
+
+
+def _policy(report: DiagnoseReport) -> bytes:
+    """The next gait as a policy file."""
+    import tomlkit
+
+    from schemas.results_diagnose import IN_WORDS
+
+    one = report.next_gait
+    assert one is not None  # noqa: S101 - asked by the caller
+    names = ", ".join(IN_WORDS.get(name, name) for name in one.candidates)
+    head = {
+        "schema_version": 1, "robot": report.robot, "name": "next-gait",
+        "description": f"{one.name}: to tell apart what diagnose could not ({names})",
+        "steps": [{"target": list(target)} for target in one.targets],
+    }  # fmt: skip
+    return tomlkit.dumps(head).encode()
+
+
+def show(report: DiagnoseReport, console: Console) -> None:
+    """The tables, the verdict and what is warned of."""
+    from r2s2r_cli.views.diagnose_page import diagnose_tables
+    from r2s2r_cli.views.diagnose_words import verdict_words
+
+    for table in diagnose_tables(report, brief=True):
+        console.table(table.title, table.columns, table.rows)
+    console.data(f"verdict {verdict_words(report)}")
+    console.data(report.sentence)
+    for text in report.warnings:
+        console.warn(text)

@@ -1,5 +1,5 @@
-"""How much: predicted from the targets of judged intervals and what was left out, then realised on these intervals, which
-nothing has looked at before."""
+"""How much: predicted from the targets of judged intervals and what was left out, then realised on these intervals,
+which nothing has looked at before."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from r2s2r_cli.stages.diagnose.imagined import SETTLE_S, commands, imagined
+from r2s2r_cli.stages.diagnose.imagined import SETTLE_S, _before, commands, imagined
 from r2s2r_cli.stages.diagnose.next_apart import apart, left
 from r2s2r_cli.stages.diagnose.next_gait import _name, _remaining
 from r2s2r_cli.stages.diagnose.sample import _at_rest, planted
@@ -21,7 +21,7 @@ from r2s2r_cli.stages.diagnose.which.candidates import candidates
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
-from r2s2r_cli.stages.diagnose.which.stretches import stretch_of
+from r2s2r_cli.stages.diagnose.which.stretches import Stretch, stretch_of
 from r2s2r_cli.stages.diagnose.which.which import Compared
 from r2s2r_cli.stages.identified import nominal
 from r2s2r_cli.stages.identify.windows import window
@@ -36,6 +36,18 @@ def test_commands_wind_each_cable_as_far_as_its_target_asks() -> None:
     assert wound == pytest.approx([0.1 * 0.5, 0.1 * 0.75])
     assert control[1].tolist() == [1.0, 0.0]
     assert t[-1] == pytest.approx(2.0 + 1.5 + 2 * SETTLE_S)
+
+
+def test_commands_begin_where_the_cables_are() -> None:
+    """A cable that the interval before had left short is let out, one that it had left where it should be stays."""
+    control, t = commands(((0.5, 1.0),), 0.1, 0.05, before=np.array([0.0, 1.0]))
+    wound = 0.05 * np.sum(control[:-1] * np.diff(t)[:, None], axis=0)
+    assert wound == pytest.approx([-0.1 * 0.5, 0.0])
+    assert t[-1] == pytest.approx(1.0 + SETTLE_S)
+    run = SimpleNamespace(intervals=SimpleNamespace(target=np.array([[0.2, np.nan], [1.0, 0.3]])))
+    first, second = (SimpleNamespace(interval=k, window=SimpleNamespace(run=run)) for k in (1, 2))
+    assert _before(cast("Stretch", first)) is None  # robots are put down with all cables long
+    assert _before(cast("Stretch", second)) == pytest.approx([0.2, 1.0])
 
 
 def test_the_library_has_the_excitations_and_what_was_planned() -> None:

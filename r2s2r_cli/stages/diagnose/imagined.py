@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
+from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.identify.windows import Window
 
@@ -28,17 +29,15 @@ def targets_of(targets: np.ndarray) -> Targets:
     return tuple(tuple(float(x) for x in row) for row in np.nan_to_num(targets, nan=1.0))
 
 
-def imagined(arena: Arena, targets: Targets, *, like: Stretch | None = None, name: str = "") -> list[Stretch]:
-    """The policy as one stretch from where a fitted one begins, its targets driven by an ideal controller; nothing for
-    one without a frame. Nobody has seen it: caps and lengths are 0. like: that stretch, the first if None; name: of the
-    policy, no two alike that begin apart."""
+def imagined(arena: Arena, targets: Targets, *, like: Stretch | None = None, name: str = "") -> Stretch:
+    """The policy as one stretch from where a fitted one begins, its targets driven by an ideal controller. Nobody has
+    seen it: caps and lengths are 0. like: that stretch, the first if None; name: of the policy, no two alike that begin
+    apart."""
     like = arena.many[0] if like is None else like
     robot = arena.model.robot
     state: State = like.window.state
-    control, t = commands(targets, robot.pid.range_m, _speed(arena), before=_before(like))
+    control, t = commands(targets, robot.pid.range_m, speed_of(arena.model), before=_before(like))
     frames = np.arange(1, int(t[-1] * RATE_HZ) + 1) / RATE_HZ
-    if not len(frames):
-        return []
     noise = np.broadcast_to(like.noise.mean(axis=0), (len(frames), *like.noise.shape[1:]))
     length = sd = None
     if like.length is not None and like.length_sd is not None:
@@ -54,7 +53,7 @@ def imagined(arena: Arena, targets: Targets, *, like: Stretch | None = None, nam
     )  # fmt: skip
     caps = np.zeros((len(frames), *like.caps[0].shape))
     run_name = f"imagined {name} from {like.run}"
-    return [Stretch(run_name, run_name, 1, 0, window, caps, noise, length, sd, like.sensors)]
+    return Stretch(run_name, run_name, 1, 0, window, caps, noise, length, sd, like.sensors)
 
 
 def _before(like: Stretch) -> np.ndarray | None:
@@ -68,19 +67,34 @@ def commands(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Motor commands (row, actuated) at times (row,): full speed until each cable is there. before (actuated,): the
     target where the cables are to begin with; None: all are long."""
-    before = np.ones(len(targets[0])) if before is None else before
-    begin = 0.0
-    rows, times = [np.zeros(len(before))], [0.0]
-    for target in targets:
-        goal = np.array(target)
-        need = np.abs(goal - before) * wide / max(speed, 1e-6)
-        sign = np.sign(before - goal)  # shorter: reel in, +1
+    longer, needs = _ways(targets, wide, speed, before)
+    edges = [0.0, *_ends(needs).tolist()]
+    rows, times = [np.zeros(needs.shape[1])], [0.0]
+    for begin, need, sign in zip(edges, needs, -np.sign(longer), strict=False):  # shorter: reel in, +1
         for at in (0.0, *sorted(set(need[need > 0].tolist()))):
             rows.append(np.where(need > at + 1e-9, sign, 0.0))
             times.append(begin + at)
-        begin += float(need.max(initial=0.0)) + SETTLE_S
-        before = goal
-    return np.array([*rows, np.zeros(len(before))]), np.array([*times, begin])
+    return np.array([*rows, np.zeros(needs.shape[1])]), np.array([*times, edges[-1]])
+
+
+def target_ends(targets: Targets, wide: float, speed: float, *, before: np.ndarray | None = None) -> np.ndarray:
+    """When each target is over [s], (target,), as `commands` drives them."""
+    return _ends(_ways(targets, wide, speed, before)[1])
+
+
+def _ways(
+    targets: Targets, wide: float, speed: float, before: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """By how much each cable gets longer for each target, over the range, and how long that takes [s], (target,
+    actuated) each."""
+    goals = np.array(targets)
+    first = np.ones(goals.shape[1]) if before is None else before
+    longer = np.diff(np.vstack([first, goals]), axis=0)
+    return longer, np.abs(longer) * wide / max(speed, 1e-6)
+
+
+def _ends(needs: np.ndarray) -> np.ndarray:
+    return np.asarray(np.cumsum(needs.max(axis=1) + SETTLE_S))
 
 
 def part(whole: Stretch, a: int, b: int) -> Stretch:
@@ -99,11 +113,10 @@ def part(whole: Stretch, a: int, b: int) -> Stretch:
 
 def ends(arena: Arena, whole: Stretch, like: Stretch, targets: Targets) -> list[int]:
     """Frames of a policy that was imagined from where `like` begins, before which its targets end, 0 first."""
-    speed, wide, before = _speed(arena), arena.model.robot.pid.range_m, _before(like)
-    at = np.array([commands(targets[: k + 1], wide, speed, before=before)[1][-1] for k in range(len(targets))])
+    at = target_ends(targets, arena.model.robot.pid.range_m, speed_of(arena.model), before=_before(like))
     return [0, *np.searchsorted(whole.t - whole.window.start, at + 1e-9, side="right").tolist()]
 
 
-def _speed(arena: Arena) -> float:
+def speed_of(model: Model) -> float:
     """Of the winches at full drive, as robot.toml has it [m/s]."""
-    return float(arena.model.theta(arena.model.values0).speed_in.mean())
+    return float(model.theta(model.values0).speed_in.mean())

@@ -65,10 +65,10 @@ def next_gait(
         return None
     told("next gait", 0, 1)
     own = {f"as run: {run.name}": targets_of(run.caps.intervals.target) for run in evidence.only(evidence.fit)}
-    nats: dict[str, np.ndarray] = {}
-    for name, targets in {**library.gaits, **own}.items():
-        for whole in imagined(compared.arena, targets[:LONGEST], name=name):
-            nats[name] = apart(compared.arena, whole, fits)
+    nats = {
+        name: apart(compared.arena, imagined(compared.arena, targets[:LONGEST], name=name), fits)
+        for name, targets in {**library.gaits, **own}.items()
+    }
     told("next gait", 1, 1)
     names = [_name(fit) for fit in fits]
     sure = {

@@ -77,7 +77,7 @@ def _ranked(one: Ranked) -> RankedName:
         ci90=dict(one.ci90), units=dict(one.units), channel=one.channel,
         element=None if one.element is None else _element(one.element),
         rmse_m=None if one.rmse is None or not math.isfinite(one.rmse) else one.rmse, moved=one.moved,
-        on_bound=one.on_bound, seen_sd=one.seen if math.isfinite(one.seen) else None,
+        on_bound=one.on_bound, seen_sd=_known(one.seen),
         strain_nats=_known(one.strain),
     )  # fmt: skip
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run
-from r2s2r_cli.stages.diagnose.imagined import commands
+from r2s2r_cli.stages.diagnose.imagined import commands, speed_of, target_ends
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
@@ -59,7 +59,7 @@ def _run(
     """One gait: commands of an ideal controller, what camera and sensors see of them."""
     robot = replayer.model.robot
     shapes = rng.integers(0, 2, (targets, len(robot.actuated))).astype(float)
-    speed = float(replayer.model.theta(replayer.model.values0).speed_in.mean())
+    speed = speed_of(replayer.model)
     control, t_command = commands(tuple(map(tuple, shapes.tolist())), robot.pid.range_m, speed)
     begins = _begins(shapes, robot.pid.range_m, speed)
     t = np.arange(0.0, t_command[-1], tick_s or FRAME_S)
@@ -106,5 +106,4 @@ def _at_rest(replayer: Replayer) -> State:
 
 def _begins(shapes: np.ndarray, wide: float, speed: float) -> np.ndarray:
     """Times at which the targets begin [s]."""
-    rows = tuple(map(tuple, shapes.tolist()))
-    return np.array([0.0, *(float(commands(rows[: k + 1], wide, speed)[1][-1]) for k in range(len(rows) - 1))])
+    return np.concatenate([[0.0], target_ends(tuple(map(tuple, shapes.tolist())), wide, speed)[:-1]])

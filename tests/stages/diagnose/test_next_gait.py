@@ -158,7 +158,7 @@ def test_motors_that_run_tell_a_late_one_from_a_slow_one(tmp_path: Path) -> None
     still = ((1.0,) * 6,) * 6
     nats = {}
     for name, targets in {"six": six, "two": six[:2], "still": still}.items():
-        found = apart(arena, imagined(arena, targets)[0], [late, slow])
+        found = apart(arena, imagined(arena, targets), [late, slow])
         assert np.diag(found).tolist() == [0.0, 0.0]
         nats[name] = float(found[0, 1])
     assert nats["six"] > nats["two"] > 1.0

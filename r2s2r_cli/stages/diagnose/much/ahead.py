@@ -30,7 +30,7 @@ def ahead(
     begins = list({one.run: one for one in reversed(arena.many)}.values())
     parts, before = [], []
     for like in begins:
-        (whole,) = imagined(arena, wanted, like=like, name=name)
+        whole = imagined(arena, wanted, like=like, name=name)
         edges = ends(arena, whole, like, wanted)
         for number in numbers:
             before.append(part(whole, 0, max(edges[number - 1], 1)))

@@ -97,8 +97,9 @@ def exchanged(fits: Fits, found: Sequence[Fit], *, others: Sequence[float] = ())
     away: list[np.ndarray] = []
     of: dict[int, list[int]] = {}
     for i, one in enumerate(found):
+        sizes = (one.x, *_other_sizes(one, others))
         for other in (*found[:GIVING], *(() if i < GIVING else (one,))):
-            for size in (one.x, *_other_sizes(one, others)):
+            for size in sizes:
                 if other is not one or size is not one.x:
                     of.setdefault(i, []).append(len(points))
                     points.append((one.hypothesis, other.z, size))

@@ -93,7 +93,7 @@ class Builder:
             start = perf_counter()
             codes = [machine.compiled(texts.kernel)]
             if texts.called is not None:
-                codes.append(machine.compiled(texts.called, level=0))
+                codes.append(machine.compiled(texts.called))
             times["compile_s"] = perf_counter() - start
             if path:
                 cache.write(path, {"operations": operations}, codes)

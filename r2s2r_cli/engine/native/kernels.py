@@ -24,7 +24,8 @@ STEPS = "i64 %begin, i64 %end, i64 %hold, i64 %every"
 
 @dataclass(frozen=True)
 class Texts:
-    """LLVM text of a kernel. called: module of its subroutines, which run rarely: it need only be compiled quickly."""
+    """LLVM text of a kernel. called: module of its subroutines: rare for one environment, not for eight side by side, where
+    any of them may need one."""
 
     kernel: str
     called: str | None

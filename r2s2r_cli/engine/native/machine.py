@@ -58,18 +58,18 @@ def vector_bytes() -> int:
     return 64 if "+avx512f" in features else 32 if "+avx2" in features else 16
 
 
-def _machine(level: int = 2) -> Any:
+def _machine() -> Any:
     """A new target machine: an execution engine takes the one that it is given, and frees it."""
     llvm = binding()
     name, features = host()
-    return llvm.Target.from_default_triple().create_target_machine(cpu=name, features=features, opt=level, jit=True)
+    return llvm.Target.from_default_triple().create_target_machine(cpu=name, features=features, opt=2, jit=True)
 
 
-def compiled(text: str, *, level: int = 2) -> bytes:
+def compiled(text: str) -> bytes:
     """Object code of a module. The text is already in good form: no pass of LLVM's optimiser runs, only its code
-    generator. level: 2 for code that is fast, 0 for code that is there at once."""
+    generator."""
     llvm = binding()
-    machine = _machine(level)
+    machine = _machine()
     module = llvm.parse_assembly(text)
     module.triple = machine.triple
     module.data_layout = str(machine.target_data)

@@ -86,11 +86,12 @@ def _meant(stage: str, key: str, text: str | None) -> str:
     by the command."""
     import difflib
 
-    from r2s2r_cli.store.toml_hints import override
+    from r2s2r_cli.store.toml_hints import override, override_text
     from schemas.config import RunConfig
 
     settings = RunConfig().model_dump(mode="json", by_alias=True).get(stage, {})
     near = difflib.get_close_matches(key.rpartition(".")[2], settings, n=1)
     if not near:
         return f"r2s2r {stage} --show-config"
-    return override(f"{stage}.{near[0]}", settings[near[0]] if text is None else text)
+    meant = f"{stage}.{near[0]}"
+    return override(meant, settings[near[0]]) if text is None else override_text(meant, text)

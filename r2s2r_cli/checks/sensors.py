@@ -18,6 +18,8 @@ CAPACITANCE_F = (0.1e-12, 1e-9)
 """Stretch sensors have 10-40 pF; outside this the numbers are not farads (pF and nF stored as they came)."""
 FROZEN_SAMPLES = 20
 """At 10 Hz two seconds: a live sensor's last digit has moved by then."""
+FROZEN_TIMES = 10
+"""So many times as long as ever before: a sensor of few digits says the same now and then, too."""
 LOST_SHARE = 0.5
 GRAVITY_M_PER_S2 = (8.0, 12.0)
 """Median size of the specific force of a robot that mostly lies still: 9.81 within 20 %, so that g and mg stand out."""
@@ -62,22 +64,29 @@ def capacitance_in_farads(run: Run) -> Iterator[Found]:
     "warning",
     Run,
     kinds=_KINDS,
-    what="no sensor says exactly the same for 20 samples or more while another one moves",
+    what="no sensor says exactly the same throughout the run, or for its last 20 samples and ten times as long as ever "
+    "before, while another one moves",
     why="a sensor that stands still is torn off, shorted or its board hangs",
     fix="check the wires of the named sensor; calibrate it again before trusting its lengths",
 )
 def sensors_move(run: Run) -> Iterator[Found]:
-    """Sensors that stand still throughout the run."""
+    """Sensors that stand still throughout the run, or from some sample on."""
     for name in ("capacitance", "length"):
         columns = dict(_columns(run, name))
         still = [n for n, values in columns.items() if len(values) >= FROZEN_SAMPLES and np.ptp(values) == 0]
         if len(still) == len(columns):
             continue  # nothing moved: the robot stood still
-        for sensor in still:
-            if name == "capacitance" and abs(columns[sensor][0] - UNINITIALISED_F) < _EXACT_F:
+        for sensor, values in columns.items():
+            if name == "capacitance" and abs(values[-1] - UNINITIALISED_F) < _EXACT_F:
                 continue  # sensor_chip_initialised says it better
-            yield Found(run.at("sensors", name), f"sensor {sensor} is frozen", "values that move as others do",
-                        f"the same value in all {len(columns[sensor])} samples")  # fmt: skip
+            count, before = _held(values)
+            if sensor in still:
+                said = f"the same value in all {len(values)} samples"
+            elif count >= max(FROZEN_SAMPLES, FROZEN_TIMES * before) and _moved(columns, sensor, count):
+                said = f"the same value in the last {count} of {len(values)} samples"
+            else:
+                continue
+            yield Found(run.at("sensors", name), f"sensor {sensor} is frozen", "values that move as others do", said)
 
 
 @check(
@@ -167,6 +176,22 @@ def gravity_is_seen(run: Run) -> Iterator[Found]:
         if len(own) and beyond(np.array(np.median(own)), *GRAVITY_M_PER_S2) > 0:
             yield Found(run.at("imu", "a_B"), f"board {index} does not feel gravity", "a median of 8 .. 12 m/s^2",
                         f"{number(float(np.median(own)))} m/s^2")  # fmt: skip
+
+
+def _held(values: np.ndarray) -> tuple[int, int]:
+    """For how many samples the last value has been said at the end, and what is the longest that any was before."""
+    ends = np.append(np.flatnonzero(np.diff(values)) + 1, len(values))
+    held = np.diff(ends, prepend=0)
+    return int(held[-1]), int(held[:-1].max(initial=0))
+
+
+def _moved(columns: dict[int, np.ndarray], sensor: int, count: int) -> bool:
+    """Whether another sensor moved in the share of the run that is a sensor's last `count` samples."""
+    share = count / len(columns[sensor])
+    return any(
+        np.ptp(values[len(values) - max(1, int(share * len(values))) :]) > 0
+        for other, values in columns.items() if other != sensor
+    )  # fmt: skip
 
 
 def _lost(missing: np.ndarray, board: np.ndarray | None) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -77,9 +78,22 @@ def default_at(model: type[BaseModel], loc: Loc) -> Any:
 
 
 def override(key: str, value: Any) -> str:
-    """`--set KEY=VALUE` of a setting, quoted: an option alone, which the command completes."""
-    text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+    """`--set KEY=VALUE` of a setting, like `override_text`; text that would be read as another type keeps quotes."""
+    bare = isinstance(value, str) and "\n" not in value and _read(value) in (None, value)
+    return override_text(key, value if bare else json.dumps(value, ensure_ascii=False))
+
+
+def override_text(key: str, text: str) -> str:
+    """`--set KEY=TEXT`, quoted for the shell: an option alone, which the command completes; text as typed."""
     return f"--set {shlex.quote(f'{key}={text}')}"
+
+
+def _read(text: str) -> Any:
+    """What `--set KEY=TEXT` would make of one line; None where it is no TOML, and so is taken as it stands."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
+        return None
 
 
 def _renaming(path: str, key: str, near: str) -> str:

@@ -62,6 +62,18 @@ FAILS: tuple[Case, ...] = (
         ),
     ),
     Case(
+        "sensors_move",
+        lambda: edited(recording(), "sensors/length", put((slice(3, None), 6), 0.15)),
+        (
+            (
+                "runs/a/sensors/length",
+                "sensor 6 is frozen",
+                "values that move as others do",
+                "the same value in the last 22 of 25 samples",
+            ),
+        ),
+    ),
+    Case(
         "sensors_received",
         lambda: edited(recording(), "sensors/capacitance", put((slice(0, 20), 7), np.nan)),
         (("runs/a/sensors/capacitance", "sensor 7 was mostly not received", "at least 50 % of the samples", "20 %"),),
@@ -165,6 +177,15 @@ EDGES: tuple[Edge, ...] = (
         "sensors_move",
         "the chip is off: another check says so",
         lambda: edited(recording(), "sensors/capacitance", put((slice(None), 4), 0.2e-12)),
+    ),
+    Edge(
+        "sensors_move",
+        "a sensor of few digits, which had said the same for three samples before",
+        lambda: edited(
+            edited(recording(), "sensors/length", put((slice(0, 3), 6), 0.14)),
+            "sensors/length",
+            put((slice(3, None), 6), 0.15),
+        ),
     ),
     Edge(
         "sensors_received",

@@ -37,8 +37,9 @@ help:  ## this list
 	@printf 'usage: make TARGET\n\n'
 	@sed -n 's/^\([a-z -]*\):.*##  *\(.*\)/  \1\t\2/p' Makefile | expand -t 14
 
-demo: $(VENV)/.demo-stamp  ## a sample project, then two iterations of the whole loop on the virtual robot (in ./demo)
+demo: $(VENV)/.demo-stamp  ## a sample project, a diagnosis, then two iterations of the loop on the virtual robot (in ./demo)
 	@PATH="$(ROOT)/$(VENV)/bin:$$PATH" bash examples/01_first_project/run.sh "$(DEMO)"
+	@PATH="$(ROOT)/$(VENV)/bin:$$PATH" bash examples/14_diagnose/run.sh --out "$(DEMO)/diagnosis"
 	@PATH="$(ROOT)/$(VENV)/bin:$$PATH" bash examples/13_two_iterations/run.sh "$(DEMO)/two-iterations"
 
 test: $(VENV)/.dev-stamp  ## the test suite, without the slow tests

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import shlex
 import stat
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from r2s2r_cli.commands.mend import Mending, mending, sighted
+from r2s2r_cli.commands.mend import Mending, mending
+from r2s2r_cli.commands.next_command import explained, forward
 from r2s2r_cli.commands.unfinished import UNDER_WAY, checkpoints, interrupted, unsealed
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError, GateError
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from r2s2r_cli.store.brief import brief
-from r2s2r_cli.store.header import NotAnArtifact, read_header, sealed_header, whole_header
+from r2s2r_cli.store.header import NotAnArtifact, sealed_header, whole_header
 from r2s2r_cli.store.lock import writer
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import Header, Provenance
@@ -103,7 +103,7 @@ def survey(project: Project, *, thorough: bool = False) -> StatusResult:
         iterations=len(iterations),
         artifacts=tuple(states),
         bytes=sum(_bytes_of(path) for path in project.root.rglob("*")),
-        next=again[0] if again else _forward(project) or next(iter(runs), ""),
+        next=again[0] if again else forward(project) or next(iter(runs), explained(project)),
         history=gap.history if (gap := _gap(project)) else (),
     )  # fmt: skip
 
@@ -193,49 +193,6 @@ def _notes(made: Provenance | None) -> tuple[str, ...]:
         f"{run['run']} ended at target {run['targets_done'] + 1} of {run['targets']}: {run['ended']}"
         for run in runs if run.get("ended", "complete") != "complete"
     )  # fmt: skip
-
-
-def _forward(project: Project) -> str:
-    """The next command where nothing is to be mended."""
-    every = project.iterations()
-    earlier = any(
-        one.artifact("estimate", executed=executed).exists() for one in every[:-1] for executed in (False, True)
-    )
-    if not every or not (every[-1].artifact("recording").exists() or earlier):
-        return "r2s2r import run.csv"
-    place = every[-1]
-    if not place.artifact("recording").exists():  # it learns from the iteration before
-        return _planned(project, place, ("identification", "plan"))
-    held = list(read_header(place.artifact("recording")).datasets)
-    if not sighted(held):
-        # Nothing to estimate states from yet; sensors alone tell how far the robot repeats itself.
-        repeats = len({name.split("/")[1] for name in held if name.startswith("runs/")}) > 1
-        return "r2s2r floor" if repeats and not project.artifact("floor", None).exists() else ""
-    return _planned(project, place, ("estimate", "identification", "plan"))
-
-
-def _planned(project: Project, place: Iteration, kinds: Sequence[str]) -> str:
-    """The next command of an iteration whose robot has done what it can without a plan."""
-    for kind in kinds:
-        if not place.artifact(kind).exists():
-            return f"r2s2r {'identify' if kind == 'identification' else kind} --iteration {place.number}"
-    if place.artifact("recording", executed=True).exists():
-        if not place.artifact("estimate", executed=True).exists():
-            return f"r2s2r estimate --of execute --iteration {place.number}"
-        if not place.artifact("comparison").exists():
-            return f"r2s2r compare --iteration {place.number}"
-    elif place.artifact("plan").exists() and _moved_by_us(project):
-        return f"r2s2r execute --iteration {place.number} --dry-run"
-    return ""
-
-
-def _moved_by_us(project: Project) -> bool:
-    """Whether any run of the project was recorded here: a robot can be asked for more, a log cannot."""
-    from r2s2r_cli.commands.wanted import MEASURED
-
-    places = project.iterations()
-    found = [place.artifact("recording", executed=executed) for place in places for executed in (False, True)]
-    return any(path.exists() and read_header(path).provenance.stage in MEASURED for path in found)
 
 
 def _size(count: int) -> str:

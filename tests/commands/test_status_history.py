@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from r2s2r_cli.commands.status import _forward
+from r2s2r_cli.commands.next_command import explained, forward
 from r2s2r_cli.store.project import Iteration
 from r2s2r_cli.store.write import write_artifact
 from schemas.results_compare import CompareFloor, CompareHistory, CompareMeasure, CompareReport
@@ -65,11 +65,28 @@ def test_without_a_report_nothing_is_told(project: Path, broken: bool) -> None:
 @pytest.mark.parametrize(("stage", "hint"), [("record", "r2s2r execute --iteration 1 --dry-run"), ("import", "")])
 def test_a_plan_is_executed_where_there_is_a_robot(tmp_path: Path, stage: str, hint: str) -> None:
     """After the plan its execution is proposed, in a project whose runs came from a robot and not from a log."""
-    place = Iteration(1, tmp_path / "iterations" / "001")
+    project = _planned(tmp_path, stage)
+    assert forward(project) == hint  # type: ignore[arg-type]
+
+
+def test_what_is_left_to_do_is_a_diagnosis(tmp_path: Path) -> None:
+    """Of an iteration that has a simulator, until it is made."""
+    project = _planned(tmp_path, "import")
+    assert explained(project) == "r2s2r diagnose --iteration 1"  # type: ignore[arg-type]
+    project.iterations()[0].artifact("diagnosis").write_bytes(b"made")
+    assert explained(project) == ""  # type: ignore[arg-type]
+    project.iterations()[0].artifact("diagnosis").unlink()
+    project.iterations()[0].artifact("identification").unlink()
+    assert explained(project) == ""  # type: ignore[arg-type]
+
+
+def _planned(folder: Path, stage: str) -> SimpleNamespace:
+    """A project of one iteration that is done up to its plan, its runs made by a stage."""
+    place = Iteration(1, folder / "iterations" / "001")
     place.path.mkdir(parents=True)
-    (tmp_path / "project.toml").write_text("")
+    (folder / "project.toml").write_text("")
     write_artifact(place.artifact("recording"), builders.recording(), builders.provenance(stage=stage, inputs=()))
     for kind, data in (("estimate", builders.estimate()), ("identification", builders.identification()),
                        ("plan", builders.plan())):  # fmt: skip
         write_artifact(place.artifact(kind), data, builders.provenance(stage="x", inputs=()))
-    assert _forward(SimpleNamespace(iterations=lambda: [place], artifact=None)) == hint  # type: ignore[arg-type]
+    return SimpleNamespace(iterations=lambda: [place], artifact=None)

@@ -125,12 +125,13 @@ def diagnose(
         checkpoint = ArrayCheckpoint(unfinished, key, resume, command=again)
         with resumable(checkpoint, here.relative(unfinished), again, done="simulated"):
             result, report = run.run(
-                lambda: _compute(asked, settings, checkpoint, console, draw), pictures if draw else None,
+                lambda: _compute(asked, settings, checkpoint, console, draw),
+                (lambda data, said: pictures(data, said, asked.effects)) if draw else None,
                 lambda said: checkpoint.clear(),
             )  # fmt: skip
     show_outcome(answer(result, report), console)
     if report is not None:
-        show(report, console)
+        show(report, console, asked.effects)
 
 
 def _require_effects(names: tuple[str, ...]) -> None:

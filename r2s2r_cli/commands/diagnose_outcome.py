@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.console import Console
@@ -27,15 +27,15 @@ def answer(result: Any, report: DiagnoseReport | None) -> DiagnoseResult:
     return DiagnoseResult(**shared, **{name: getattr(report, name) for name in names})
 
 
-def pictures(data: ArtifactData, report: DiagnoseReport) -> Iterator[tuple[str, bytes]]:
-    """What lies beside the artifact: the policy to run next, pictures and the page."""
+def pictures(data: ArtifactData, report: DiagnoseReport, asked: Sequence[str] = ()) -> Iterator[tuple[str, bytes]]:
+    """What lies beside the artifact: the policy to run next, pictures and the page. asked: of `--effect`."""
     from r2s2r_cli.views.diagnose import draw_diagnosis
     from r2s2r_cli.views.diagnose_page import diagnose_page
 
     if report.next_gait is not None:
         yield NEXT, _policy(report)
     drawn = []
-    for name, title, png in draw_diagnosis(data, report):
+    for name, title, png in draw_diagnosis(data, report, asked):
         yield f"-{name}.png", png
         drawn.append((title, png))
     yield ".html", diagnose_page(report, drawn)
@@ -58,14 +58,19 @@ def _policy(report: DiagnoseReport) -> bytes:
     return tomlkit.dumps(head).encode()
 
 
-def show(report: DiagnoseReport, console: Console) -> None:
-    """The tables, the verdict and what is warned of."""
+def show(report: DiagnoseReport, console: Console, asked: Sequence[str] = ()) -> None:
+    """The tables, the verdict, what to type next and what is warned of. asked: of `--effect`."""
+    from r2s2r_cli.views.diagnose_commands import diagnose_commands
     from r2s2r_cli.views.diagnose_page import diagnose_tables
-    from r2s2r_cli.views.diagnose_words import verdict_words
+    from r2s2r_cli.views.diagnose_words import loud_words, verdict_words
 
-    for table in diagnose_tables(report, brief=True):
+    for table in diagnose_tables(report, brief=True, asked=asked):
         console.table(table.title, table.columns, table.rows)
     console.data(f"verdict {verdict_words(report)}")
     console.data(report.sentence)
+    if loud := loud_words(report):
+        console.data(loud)
+    for what, command in diagnose_commands(report):
+        console.data(f"{what}: {command}")
     for text in report.warnings:
         console.warn(text)

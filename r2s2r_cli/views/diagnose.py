@@ -1,9 +1,9 @@
-"""Pictures of a diagnosis: gap over time, the robot with what is guilty, the floor, the ranking, before and after."""
+"""Pictures of a diagnosis: gap over time, the robot with what is named, the floor, the ranking, before and after."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,20 +11,27 @@ from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.views.diagnose_floor import floor_picture
 from r2s2r_cli.views.diagnose_gains import ranking_picture
 from r2s2r_cli.views.diagnose_robot import robot_picture
-from r2s2r_cli.views.diagnose_words import GUILTY, HELD_OUT, LEFT_OUT, PLAIN, accused, drawn_effects
-from r2s2r_cli.views.figure import BLUE, GREEN, PURPLE, new_figure, png_bytes
+from r2s2r_cli.views.diagnose_words import HELD_OUT, LEFT_OUT, MARKED, PLAIN, accused, drawn_effects
+from r2s2r_cli.views.figure import BLUE, GREEN, PURPLE, legend_columns, new_figure, png_bytes
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from schemas.results_diagnose import DiagnoseReport
 
+BAND = 0.14
+"""How much of its colour an interval's band has."""
+FLOOR = "floor of held-out intervals"
 LABELS = 60
 """Letters that fit below an axis side by side."""
 _SHORT = {"nominal": "identified", "refit": "refit", "effect": "+ effect", "ceiling": "black box"}
 BEFORE, AFTER, STALE, BLACK_BOX = BLUE, GREEN, "#b8bec8", PURPLE
 
 
-def draw_diagnosis(data: ArtifactData, report: DiagnoseReport) -> Iterator[tuple[str, str, bytes]]:
-    """(name, title, PNG)."""
+def draw_diagnosis(
+    data: ArtifactData, report: DiagnoseReport, asked: Sequence[str] = ()
+) -> Iterator[tuple[str, str, bytes]]:
+    """(name, title, PNG). asked: effects that the ranking shows whatever is known of them."""
     yield (
         "gap",
         f"{LEFT_OUT} over time: fitted target intervals, each predicted by a fit without it",
@@ -32,17 +39,21 @@ def draw_diagnosis(data: ArtifactData, report: DiagnoseReport) -> Iterator[tuple
     )
     yield (
         "robot",
-        "the robot" if accused(report) is None else "the robot, and what is guilty",
+        "the robot" if accused(report) is None else "the robot, and the part that the verdict names",
         robot_picture(data, report),
     )
     yield "floor", "where on the floor the gap arises", floor_picture(data, report)
     yield (
         "ranking",
         "how much better each effect explains all data, predicts what was left out, and what the logs alone say for it",
-        ranking_picture(report),
+        ranking_picture(report, asked),
     )
     if "judged" in data.groups:
-        yield "judged", f"before and after: {HELD_OUT}, of intervals that nothing was fitted to", _judged(data, report)
+        yield (
+            "judged",
+            f"before and after: {HELD_OUT}, of intervals that nothing was fitted to",
+            judged_picture(data, report),
+        )
 
 
 def _gap(data: ArtifactData, report: DiagnoseReport) -> bytes:
@@ -57,7 +68,7 @@ def _gap(data: ArtifactData, report: DiagnoseReport) -> bytes:
         for row in at:
             t0, t1 = rows["t"][row]
             stands_out = bool(rows["gap"][row])
-            own.axvspan(t0, t1, color=GUILTY if stands_out else PLAIN, alpha=0.14, lw=0)
+            own.axvspan(t0, t1, color=MARKED if stands_out else PLAIN, alpha=BAND, lw=0)
             own.annotate(str(rows["interval"][row]), ((t0 + t1) / 2, 1.0), xycoords=("data", "axes fraction"),
                          ha="center", va="bottom", fontsize=7, color=PLAIN)  # fmt: skip
         middle = rows["t"][at].mean(axis=1)
@@ -72,19 +83,34 @@ def _gap(data: ArtifactData, report: DiagnoseReport) -> bytes:
             own.set_ylabel(f"{LEFT_OUT} of the caps\nat the end of an interval [mm]")
     from matplotlib.patches import Patch
 
+    axes[0].annotate("target interval", (0.0, 1.0), xycoords="axes fraction", xytext=(-4, 0),
+                     textcoords="offset points", ha="right", va="bottom", fontsize=7, color=PLAIN)  # fmt: skip
     axes[0].set_ylim(bottom=0.0)  # of all panels, once every one of them is drawn
     handles, labels = axes[0].get_legend_handles_labels()
+    if not rows["gap"].all():
+        handles.append(Patch(color=PLAIN, alpha=BAND))
+        labels.append("grey: a target interval that does not stand out")
     if rows["gap"].any():
-        handles.append(Patch(color=GUILTY, alpha=0.14))
-        labels.append("stands out over the whole interval")
+        handles.append(Patch(color=MARKED, alpha=BAND))
+        # Points are of an interval's end alone, so the highest one need not be on orange.
+        labels.append("orange: stands out over the whole interval, not at its end alone")
     if not np.isfinite(np.concatenate([rows["refit"], rows["effect"]])).all() and np.isfinite(rows["effect"]).any():
         handles.append(Patch(color="none"))
         labels.append("no point: a cap ended more than 25 cm off")
-    figure.legend(handles, labels, loc="outside lower center", ncol=5, fontsize=8, frameon=False)
+    _legend(figure, handles, labels)
     return png_bytes(figure)
 
 
-def _judged(data: ArtifactData, report: DiagnoseReport) -> bytes:
+def _legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:
+    columns = legend_columns(figure.get_figwidth(), labels)
+    figure.legend(handles, labels, loc="outside lower center", ncol=columns, fontsize=8, frameon=False)
+
+
+def judged_picture(data: ArtifactData, report: DiagnoseReport) -> bytes:
+    """PNG: errors of judged intervals, each and together; those that are set aside are pale."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
     group = data.groups["judged"]
     names = [name.decode() for name in group["name"].tolist()]
     figure = new_figure(min(13.0, 5.0 + 0.6 * len(names)), 3.8)
@@ -97,10 +123,10 @@ def _judged(data: ArtifactData, report: DiagnoseReport) -> bytes:
     aside = () if report.shrinkage is None else report.shrinkage.set_aside
     counts = np.array([name not in aside for name in names], dtype=bool)
     floor = report.floor_m if report.shrinkage is None else report.shrinkage.floor
-    for k, (name, color, label) in enumerate(series):
+    for k, (name, color, _) in enumerate(series):
         x = np.arange(len(names)) - 0.4 + (k + 0.5) * width
         values = 1e3 * group[name]
-        bars = each.bar(x, np.nan_to_num(values), width, color=color, label=label)
+        bars = each.bar(x, np.nan_to_num(values), width, color=color)
         for bar in np.array(bars.patches)[~counts]:
             bar.set(alpha=0.25)
         values = values[counts]
@@ -109,7 +135,7 @@ def _judged(data: ArtifactData, report: DiagnoseReport) -> bytes:
             # A fall or two decide the root mean square.
             all_.plot(k, float(np.nanmedian(values)), "_", color="#111111", ms=12, mew=2)
     for axes in (each, all_):
-        axes.axhline(1e3 * floor, color="#111111", lw=1, ls=":", label="floor of held-out intervals")
+        axes.axhline(1e3 * floor, color="#111111", lw=1, ls=":")
     if aside:
         each.set_title("pale: set aside, as in the floor", fontsize=9)
     turned = sum(map(len, names)) > LABELS
@@ -118,7 +144,13 @@ def _judged(data: ArtifactData, report: DiagnoseReport) -> bytes:
     )
     each.set_ylabel(f"{HELD_OUT} of the caps\nat the key frame [mm]")
     all_.set_xticks(range(len(series)), [_SHORT[name] for name, _, _ in series], rotation=45, ha="right", fontsize=8)
-    all_.set_title("all together: root\nmean square, median", fontsize=9)
-    handles, labels = each.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncol=5, fontsize=8, frameon=False)
+    all_.set_title("all together:\nroot mean square", fontsize=9)
+    # Not the bars' own marks: those of a first interval that is set aside are pale.
+    handles: list[Any] = [Patch(color=color) for _, color, _ in series]
+    handles += [
+        Line2D([], [], color="#111111", lw=1, ls=":"),
+        Line2D([], [], color="#111111", ls="", marker="_", ms=12, mew=2),
+    ]
+    labels = [*(label for _, _, label in series), FLOOR, "median of all together"]
+    _legend(figure, handles, labels)
     return png_bytes(figure)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData
-from r2s2r_cli.views.diagnose_words import GUILTY, accused
+from r2s2r_cli.views.diagnose_words import MARKED, accused
 from r2s2r_cli.views.figure import legend_below, new_figure, png_bytes, rod_color
 
 if TYPE_CHECKING:
@@ -45,8 +45,8 @@ def floor_picture(data: ArtifactData, report: DiagnoseReport) -> bytes:
         axes.plot([], [], ".-", color=rod_color(2 * rod), label=f"rod {rod}, caps {2 * rod} and {2 * rod + 1}")
     element = accused(report)
     if element is not None and element.xy_m is not None:
-        axes.plot(*element.xy_m, "x", ms=16, mew=3, color=GUILTY)
-        axes.annotate("guilty place", element.xy_m, xytext=(10, 10), textcoords="offset points", color=GUILTY,
+        axes.plot(*element.xy_m, "x", ms=16, mew=3, color=MARKED)
+        axes.annotate("named place", element.xy_m, xytext=(10, 10), textcoords="offset points", color=MARKED,
                       bbox={"boxstyle": "round", "fc": "white", "ec": "none", "alpha": 0.8}, zorder=6)  # fmt: skip
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="x [m]", ylabel="y [m]",

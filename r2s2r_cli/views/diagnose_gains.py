@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from r2s2r_cli.views.diagnose_ranking import NOWHERE, element_words, said
+from r2s2r_cli.views.diagnose_ranking import NOWHERE, element_words, worth_a_row
 from r2s2r_cli.views.diagnose_words import RIVALS
 from r2s2r_cli.views.figure import BLUE, PURPLE, RED, legend_below, new_figure, png_bytes
 
@@ -18,15 +19,15 @@ NINETY = 1.645
 NAMED, GAIN, LOGS, RIVAL = RED, BLUE, PURPLE, "#444f5e"
 
 
-def drawn_rows(report: DiagnoseReport) -> list[RankedName]:
-    """Effects of which something is known, most probable first, then `none` and `unknown`."""
-    known = [one for one in report.ranking if one.effect not in RIVALS and said(one, report)]
+def drawn_rows(report: DiagnoseReport, asked: Sequence[str] = ()) -> list[RankedName]:
+    """Effects of which something is known or that were asked for, most probable first, then `none` and `unknown`."""
+    known = [one for one in worth_a_row(report, asked) if one.effect not in RIVALS]
     return [*known, *(one for one in report.ranking if one.effect in RIVALS)]
 
 
-def ranking_picture(report: DiagnoseReport) -> bytes:
+def ranking_picture(report: DiagnoseReport, asked: Sequence[str] = ()) -> bytes:
     """PNG: nats on the left, probabilities on the right."""
-    rows = drawn_rows(report)
+    rows = drawn_rows(report, asked)
     figure = new_figure(10.5, 1.8 + 0.4 * len(rows))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=[1.6, 1])
     for y, one in enumerate(rows):

@@ -6,10 +6,19 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from r2s2r_cli.views.diagnose_commands import diagnose_commands, healthy_help
 from r2s2r_cli.views.diagnose_ranking import element_words, ranking_table
-from r2s2r_cli.views.diagnose_words import HELD_OUT, LEFT_OUT, TWO_ERRORS, WHY_NONE, verdict_words
+from r2s2r_cli.views.diagnose_words import (
+    HELD_OUT,
+    LEFT_OUT,
+    TWO_ERRORS,
+    WHY_NONE,
+    loud_words,
+    undecided,
+    verdict_words,
+)
 from r2s2r_cli.views.page import Page, PageTable, Picture, counted, render
-from schemas.people import plain_name, quantity, share_of_gap
+from schemas.people import plain_name, quantity
 from schemas.results_diagnose import IN_WORDS, INDISTINCT
 
 if TYPE_CHECKING:
@@ -17,14 +26,13 @@ if TYPE_CHECKING:
 
 AT_FLOOR = "at the floor"
 """Instead of a share, where there is no gap to close."""
-ROBOT = "--port /dev/ttyUSB0 --protocol legacy --camera realsense"
-"""How the robot of the paper is reached, in commands that are shown."""
+BELOW = " (command: below)"
 
 
-def diagnose_tables(report: DiagnoseReport, *, brief: bool = False) -> Iterator[PageTable]:
+def diagnose_tables(report: DiagnoseReport, *, brief: bool = False, asked: Sequence[str] = ()) -> Iterator[PageTable]:
     """What people read first comes first. brief: for a terminal, without effects of which nothing is said and without
-    the refitted numbers."""
-    yield ranking_table(report, brief=brief)
+    the refitted numbers. asked: effects that stand in it all the same."""
+    yield ranking_table(report, brief=brief, asked=asked)
     if report.pairs:
         alone = {one.effect: one for one in report.ranking}
         yield PageTable(
@@ -58,8 +66,9 @@ def diagnose_page(report: DiagnoseReport, pictures: Sequence[tuple[str, bytes]])
     return render(
         Page(
             title=f"Diagnosis of {report.robot}: {report.verdict}", sentence=report.sentence,
-            notes=[f"Verdict {verdict_words(report)}"], labels=labels,
-            tables=list(diagnose_tables(report)), pictures=[Picture(title, png) for title, png in pictures],
+            notes=[*filter(None, [loud_words(report)]), f"Verdict {verdict_words(report)}"], labels=labels,
+            tables=list(diagnose_tables(report)), commands=diagnose_commands(report),
+            pictures=[Picture(title, png) for title, png in pictures],
         )
     )  # fmt: skip
 
@@ -90,7 +99,7 @@ def _shrinkage(report: DiagnoseReport) -> PageTable:
         [
             "predicted before it was looked at",
             "",
-            AT_FLOOR if s.predicted is None else share_of_gap(s.predicted),
+            AT_FLOOR if s.predicted is None else _predicted(s.predicted),
         ],
     ]
     where = "; within the run that was fitted" if s.within_run else ""
@@ -98,8 +107,18 @@ def _shrinkage(report: DiagnoseReport) -> PageTable:
         where += f"; without {', '.join(s.set_aside)}, as the floor was measured without the worst intervals"
     return PageTable(
         f"how far the gap shrinks, {counted(len(s.judged_on), 'held-out interval')}{where}",
-        ["model", f"{HELD_OUT} at the key frame [mm]", "own share of the refit gap above the floor"], rows,
+        ["model", f"{HELD_OUT} at the key frame [mm]", "own share of the refit gap above the floor (90 % interval)"],
+        rows,
     )  # fmt: skip
+
+
+def _seat(found: str, report: DiagnoseReport) -> str:
+    """Where the cause sits; of a verdict that names none it is no more than a suspicion, and says so."""
+    if report.verdict != "ambiguous":
+        return found or "-"
+    if not found:
+        return "undecided"
+    return f"undecided; {'most suspect so far' if undecided(report) else 'were something wrong, likeliest'}: {found}"
 
 
 def _where(report: DiagnoseReport) -> Iterator[list[str]]:
@@ -109,8 +128,8 @@ def _where(report: DiagnoseReport) -> Iterator[list[str]]:
         "begins with",
         "no beginning stands out" if where.onset_segment is None else where.onset or f"interval {where.onset_segment}",
     ]
-    yield ["channel", where.channel or "-"]
-    yield ["element", element_words(where.element) or "-"]
+    yield ["channel", _seat(where.channel or "", report)]
+    yield ["element", _seat(element_words(where.element), report)]
     for text in report.parity:
         yield ["logs against each other", text]
     for text in report.hidden:
@@ -122,45 +141,14 @@ def _limits(report: DiagnoseReport) -> Iterator[list[str]]:
     yield ["not testable with these runs", ", ".join(report.not_testable) or "none"]
     for text in report.missing:
         yield ["missing", text]
-    command = use(report)
-    if command:
-        yield ["use it", command]
     if report.next_gait is None:
         yield ["run next", f"no gait of the library is likely to decide more{_healthy(report)}{_any(report)}"]
     else:
-        yield ["run next", _next(report.next_gait, _free(report))]
-
-
-def use(report: DiagnoseReport) -> str:
-    """The command that puts what was named into the simulator, empty where nothing with a number was: in an iteration
-    that has nothing yet, from the runs of the diagnosed one. The fit begins at the sizes that were found: where an
-    effect is off, a patch of the floor has no place."""
-    words: list[str] = []
-    for one in (one for one in report.ranking if one.effect in report.effects and one.size):
-        seats = {name.split(".")[2] for name in one.size if name.count(".") == 2}
-        words.append(f"--with-effect {one.effect}" + (f":{seats.pop()}" if len(seats) == 1 else ""))
-        words += [f"--free +{name}={value:.4g}" for name, value in one.size.items()]
-    also = "" if report.iteration is None else f" --also {report.iteration}"
-    return " ".join([f"r2s2r identify{_free(report)}{also}", *words]) if words else ""
-
-
-def _free(report: DiagnoseReport) -> str:
-    """The option that names an iteration that has nothing yet, after a space."""
-    return "" if report.free_iteration is None else f" --iteration {report.free_iteration}"
+        yield ["run next", _next(report.next_gait)]
 
 
 def _healthy(report: DiagnoseReport) -> str:
-    """What is left to do where no gait helps: runs from when nothing was wrong, if there are none."""
-    if report.verdict != "ambiguous" or not any(text.startswith("healthy runs") for text in report.missing):
-        return ""
-    again = "" if report.iteration is None else f" --iteration {report.iteration}"
-    also = "" if report.free_iteration is None else f" --also {report.free_iteration}"
-    commands = (
-        f"r2s2r record --random 15 --repeats 2{_free(report)} {ROBOT}",
-        f"r2s2r estimate{_free(report)}",
-        f"r2s2r diagnose{again}{also} --healthy RUN",  # once for each run
-    )
-    return f"; healthy runs would, of the robot as it was when nothing was wrong: {', then '.join(commands)}"
+    return f"; healthy runs would, of the robot as it was when nothing was wrong{BELOW}" if healthy_help(report) else ""
 
 
 def _any(report: DiagnoseReport) -> str:
@@ -170,9 +158,9 @@ def _any(report: DiagnoseReport) -> str:
     return "; more runs of any gait narrow the bound that `no_gap` is judged by" if open_ else ""
 
 
-def _next(one: NextGaitFound, where: str) -> str:
-    """What to run (where: the option that says in which iteration), and what it is worth beside the runs so far."""
-    how = f": r2s2r record {one.file}{where} --repeats 2 {ROBOT}" if one.file else ""
+def _next(one: NextGaitFound) -> str:
+    """What to run, and what it is worth beside the runs so far."""
+    how = BELOW if one.file else ""
     if one.now is not None and one.nats <= one.now:
         return f"nothing separates the candidates better than these runs; the best of the library is {one.name}{how}"
     beside = "" if one.now is None else f", these runs again {one.now:.1f}"
@@ -218,6 +206,11 @@ def _number(value: float, sd: float, unit: str) -> str:
 
 def _mm(value: float | None) -> str:
     return "-" if value is None else f"{1e3 * value:.1f}"
+
+
+def _predicted(share: float) -> str:
+    """`65 %`; below nothing it is a prediction, too: that the gap grows."""
+    return f"{round(100 * share)} %{'' if share >= 0.0 else ' (the gap would grow)'}"
 
 
 def _share(value: float | None, ends: tuple[float, float] | None) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.views.diagnose_words import LEFT_OUT, RIVALS
@@ -26,10 +27,9 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def ranking_table(report: DiagnoseReport, *, brief: bool = False) -> PageTable:
-    """Every name, most probable first. brief: those that were fitted, are in the 90 % set or have something said for
-    them by the logs alone; the others in one row."""
-    shown = [one for one in report.ranking if not brief or said(one, report)]
+def ranking_table(report: DiagnoseReport, *, brief: bool = False, asked: Sequence[str] = ()) -> PageTable:
+    """Every name, most probable first. brief: those that are worth a row; the others in one."""
+    shown = worth_a_row(report, asked) if brief else list(report.ranking)
     rows = [_ranked(one, report) for one in shown]
     others = [one for one in report.ranking if one not in shown]
     if others:
@@ -51,6 +51,13 @@ def element_words(element: ElementFound | None) -> str:
     if element.kind in ("world", "camera", "place"):
         return f"the {element.kind}"
     return f"all {element.kind}s" if element.index is None else f"{element.kind} {element.index}"
+
+
+def worth_a_row(report: DiagnoseReport, asked: Sequence[str] = ()) -> list[RankedName]:
+    """Names that were fitted, asked for, are in the 90 % set or have something said for them by the logs alone, in
+    their order; a single other takes no more room than a row of others would."""
+    others = [one for one in report.ranking if one.effect not in asked and not said(one, report)]
+    return [one for one in report.ranking if len(others) < 2 or one not in others]
 
 
 def said(one: RankedName, report: DiagnoseReport) -> bool:

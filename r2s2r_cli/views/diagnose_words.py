@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.views.figure import RED
@@ -9,8 +10,8 @@ from r2s2r_cli.views.figure import RED
 if TYPE_CHECKING:
     from schemas.results_diagnose import DiagnoseReport, ElementFound
 
-GUILTY, PLAIN = RED, "#8792a2"
-"""Colours of what is accused, and of what is not."""
+MARKED, PLAIN = RED, "#8792a2"
+"""Colours of what stands out or is named, and of what is not."""
 RIVALS = ("none", "unknown")
 """Names of a ranking that are no effects."""
 GUIDE = "docs/guides/diagnose.md"
@@ -25,6 +26,10 @@ _MEANS = {
     "no_gap": ("the refit simulator is at the floor; what is smaller may still be there", "Verdicts"),
     "unknown": ("something is wrong that no effect of the catalogue explains", "Verdicts"),
 }
+LOUD_SD = 4.0
+"""Beyond which a finding of the logs is said beside a verdict that does not name it."""
+_SD = re.compile(r"\(([+-]\d+(?:\.\d+)?) sd\)$")
+"""How findings of the logs end."""
 LEFT_OUT = "left-out error"
 """Of fitted intervals, each predicted by a fit without it."""
 HELD_OUT = "held-out error"
@@ -46,6 +51,14 @@ def verdict_words(report: DiagnoseReport) -> str:
     """`ambiguous: no name is likely enough to be given (...)`: the word, its meaning, where to read on."""
     means, chapter = _MEANS[report.verdict]
     return f"{report.verdict}: {means} ({GUIDE}, chapter {chapter})"
+
+
+def loud_words(report: DiagnoseReport) -> str:
+    """What the logs say beyond LOUD_SD where the verdict names no cause and so does not speak of it; else empty."""
+    loud = [text for text in report.parity if (sd := _SD.search(text)) and abs(float(sd[1])) > LOUD_SD]
+    if report.verdict not in ("ambiguous", "no_gap") or not loud:
+        return ""
+    return f"Yet the logs by themselves stand out by more than {LOUD_SD:g} sd: {'; '.join(loud)}."
 
 
 def commits(report: DiagnoseReport) -> bool:

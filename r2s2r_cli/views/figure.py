@@ -23,6 +23,8 @@ BLUE, ORANGE, GREEN, PURPLE, RED = "#0072b2", "#e69f00", "#009e73", "#cc79a7", "
 GREY, PALE = "#555555", "#bbbbbb"
 _BAND = ("#eef2f7", "#dbe3ee")
 _NUMBER = "#5a6675"
+_KEY_IN, _LETTER_IN = 0.55, 0.068
+"""A legend's mark with the gaps around it, and one of its letters at 8 pt [inches]."""
 _MIN_BAND_SHARE = 0.02
 """A band narrower than this share of the axis has no room for its number."""
 
@@ -84,6 +86,16 @@ def spread_out(points: np.ndarray, distance: float) -> list[int]:
         if all(np.hypot(*(point - points[j])) >= distance for j in taken):
             taken.append(i)
     return taken
+
+
+def legend_columns(width: float, labels: Sequence[str]) -> int:
+    """Most columns of a legend of small letters that is not cut off by a figure so wide [inches]. Columns share the
+    labels evenly, each is as wide as its longest one."""
+    for columns in range(len(labels), 1, -1):
+        longest = [max(map(len, part)) for part in np.array_split(np.array(labels, dtype=object), columns)]
+        if _KEY_IN * columns + _LETTER_IN * sum(longest) <= width:
+            return columns
+    return 1
 
 
 def legend_beside(axes: Axes, **options: Any) -> None:

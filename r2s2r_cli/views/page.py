@@ -21,6 +21,7 @@ _TEMPLATE = """\
   p.label { background: #fff3cd; border-left: 4px solid #b58900; padding: .4rem .8rem; }
   table { border-collapse: collapse; } th, td { padding: .2rem .8rem .2rem 0; text-align: left; vertical-align: top; }
   th { border-bottom: 1px solid #8792a2; }
+  code { background: #eef2f7; padding: .1rem .3rem; }
   img { max-width: 100%; height: auto; }
 </style>
 </head>
@@ -40,6 +41,11 @@ _TEMPLATE = """\
 {% endfor %}</tbody>
 </table>
 {% endfor %}
+{% if page.commands %}
+<h2>commands</h2>
+{% for what, line in page.commands %}<p>{{ what }}: <code>{{ line }}</code></p>
+{% endfor %}
+{% endif %}
 {% for picture in page.pictures %}
 <h2>{{ picture.title }}</h2>
 <img alt="{{ picture.title }}" src="data:image/png;base64,{{ encoded(picture.png) }}">
@@ -77,6 +83,8 @@ class Page:
     labels: Sequence[str] = ()
     """What a reader must not overlook: a sample without physics, a warning."""
     tables: Sequence[PageTable] = ()
+    commands: Sequence[tuple[str, str]] = ()
+    """What for, and a command line, which is copied as one line however it is broken on the page."""
     pictures: Sequence[Picture] = ()
 
 

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
-from r2s2r_cli.artifact import ArtifactData, Group
-from r2s2r_cli.views.diagnose import draw_diagnosis
-from r2s2r_cli.views.diagnose_page import ROBOT, diagnose_page, diagnose_tables, use
-from schemas.results_diagnose import DiagnoseReport, NextGaitFound, PairFound
+from r2s2r_cli.views.diagnose_page import diagnose_page, diagnose_tables
+from r2s2r_cli.views.diagnose_words import loud_words
+from schemas.results_diagnose import NextGaitFound, PairFound
 from tests.support.diagnosed import report
 
 
@@ -97,44 +94,6 @@ def test_two_effects_at_once_say_what_the_second_one_adds() -> None:
     assert len(list(diagnose_tables(made))) == len(list(diagnose_tables(report()))) + 1
 
 
-def test_what_was_named_comes_with_the_command_that_uses_it() -> None:
-    """At the element and sizes that were found; what has no number, and what is not committed to, has none."""
-    plain = "--with-effect payload:1 --free +payload.mass_kg.1=0.04"
-    assert use(report()) == f"r2s2r identify {plain}"
-    placed = report().model_copy(update={"iteration": 1, "free_iteration": 3})
-    assert use(placed) == f"r2s2r identify --iteration 3 --also 1 {plain}"
-    place = {"friction_field.patch_factor": 0.262, "friction_field.patch_x_m": 0.2034}
-    row = report().ranking[0].model_copy(update={"effect": "friction_field", "size": place})
-    floor = report().model_copy(update={"effects": ("friction_field",), "ranking": (row,)})
-    assert use(floor).endswith("--with-effect friction_field --free +friction_field.patch_factor=0.262 "
-                               "--free +friction_field.patch_x_m=0.2034")  # fmt: skip
-    assert not use(report().model_copy(update={"verdict": "ambiguous", "effects": ()}))
-    lost = report().ranking[0].model_copy(update={"effect": "dropout", "size": {}})
-    assert not use(report().model_copy(update={"effects": ("dropout",), "ranking": (lost,)}))
-
-
-@pytest.mark.parametrize(
-    ("nats", "now", "words"),
-    [
-        (
-            30.0,
-            2.0,
-            "ramps: likeliest to decide between the likeliest candidates, worth 30.0 nats, these runs again 2.0",
-        ),
-        (2.0, 3.0, "nothing separates the candidates better than these runs; the best of the library is ramps"),
-        (2.0, None, "ramps: likeliest to decide between the likeliest candidates, worth 2.0 nats (little)"),
-    ],
-)
-def test_what_to_run_next_is_said_beside_what_was_run(nats: float, now: float | None, words: str) -> None:
-    """With the command; a gait that is worth less than the runs so far is not praised."""
-    file = "iterations/001/70-diagnose-next.toml"
-    one = NextGaitFound(name="ramps", file=file, targets=((1.0,),), nats=nats, now=now)
-    made = report().model_copy(update={"next_gait": one, "free_iteration": 2})
-    rows = [row for table in diagnose_tables(made) for row in table.rows if row[0] == "run next"]
-    command = f"r2s2r record {file} --iteration 2 --repeats 2 {ROBOT}"
-    assert rows == [["run next", f"{words}: {command}"]]
-
-
 def test_what_would_be_told_apart_is_named_nothing_wrong_among_it() -> None:
     """The refit nominal model is a candidate too, in words."""
     one = NextGaitFound(name="ramps", file=None, targets=((1.0,),), nats=9.0, now=None,
@@ -154,45 +113,47 @@ def test_more_runs_are_asked_for_where_the_bound_of_no_gap_is_what_is_open() -> 
     assert advice.endswith("; more runs of any gait narrow the bound that `no_gap` is judged by")
 
 
-def test_no_error_lies_outside_of_its_picture(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Panels share an axis of errors: the largest of the last run is seen as well, and 0 is its lower end."""
-    figures: list[Figure] = []
-
-    def kept(figure: Figure) -> bytes:
-        figures.append(figure)
-        return b""
-
-    monkeypatch.setattr("r2s2r_cli.views.diagnose.png_bytes", kept)
-    refit = np.array([0.002, 0.003, 0.1, 0.004])
-    segments = Group({
-        "run": np.array([b"a", b"a", b"b", b"b"]), "interval": np.array([1, 2, 1, 2]), "gap": refit > 0.05,
-        "t": np.array([[0.0, 1.0], [1.0, 2.0], [0.0, 1.0], [1.0, 2.0]]), "refit": refit, "effect": refit / 2,
-    })  # fmt: skip
-    name, _, _ = next(draw_diagnosis(ArtifactData("diagnosis", {"segments": segments}), report()))
-    assert name == "gap"
-    for axes in figures[0].axes:
-        low, high = axes.get_ylim()
-        assert low == 0.0 and high > 100.0
-
-
-def test_a_gap_that_is_to_grow_is_no_share() -> None:
-    """What was predicted of it is none, not a percentage below nothing."""
+def test_a_gap_that_is_to_grow_was_predicted_all_the_same() -> None:
+    """Its share is below nothing: a number, which `none` would hide, and what it means."""
     made = report()
     assert made.shrinkage is not None
-    made = made.model_copy(update={"shrinkage": made.shrinkage.model_copy(update={"predicted": -10.2})})
-    (row,) = (row for table in diagnose_tables(made) for row in table.rows if row[0].startswith("predicted"))
-    assert row[-1] == "none"
+    made = made.model_copy(update={"shrinkage": made.shrinkage.model_copy(update={"predicted": -0.148})})
+    table = next(one for one in diagnose_tables(made) if one.title.startswith("how far"))
+    assert table.rows[-1] == ["predicted before it was looked at", "", "-15 % (the gap would grow)"]
+    assert table.columns[-1].endswith("(90 % interval)")
 
 
-def test_where_no_gait_helps_healthy_runs_would() -> None:
-    """With the commands; not where there are some, nor where a cause is named."""
-    lacking = {"missing": ("healthy runs: findings are against robot.toml",), "iteration": 1, "free_iteration": 2}
-    undecided = report().model_copy(update={"verdict": "ambiguous", **lacking})
+@pytest.mark.parametrize(
+    ("verdict", "first", "channel", "element"),
+    [
+        ("effect", "payload", "mass", "rod 1"),
+        ("ambiguous", "payload", "undecided; most suspect so far: mass", "undecided; most suspect so far: rod 1"),
+        ("ambiguous", "none", "undecided; were something wrong, likeliest: mass",
+         "undecided; were something wrong, likeliest: rod 1"),
+    ],
+)  # fmt: skip
+def test_where_a_cause_sits_is_said_as_surely_as_the_verdict(
+    verdict: str, first: str, channel: str, element: str
+) -> None:
+    """A part or channel without a verdict is a suspicion; nothing known is undecided, too."""
+    ranking = (report().ranking[0].model_copy(update={"effect": first}),)
+    made = report().model_copy(update={"verdict": verdict, "ranking": ranking})
+    rows = [row for table in diagnose_tables(made) for row in table.rows]
+    assert ["channel", channel] in rows and ["element", element] in rows
+    nowhere = made.where.model_copy(update={"channel": None, "element": None})
+    rows = [row for table in diagnose_tables(made.model_copy(update={"where": nowhere})) for row in table.rows]
+    assert ["element", "-" if verdict == "effect" else "undecided"] in rows
 
-    def advice(made: DiagnoseReport) -> str:
-        return next(row[1] for table in diagnose_tables(made) for row in table.rows if row[0] == "run next")
 
-    assert f"r2s2r record --random 15 --repeats 2 --iteration 2 {ROBOT}" in advice(undecided)
-    assert "r2s2r diagnose --iteration 1 --also 2 --healthy RUN" in advice(undecided)
-    plain = "no gait of the library is likely to decide more"
-    assert advice(undecided.model_copy(update={"missing": ()})) == plain == advice(report().model_copy(update=lacking))
+@pytest.mark.parametrize(
+    ("verdict", "sd", "said"),
+    [("ambiguous", "+6.0", True), ("no_gap", "-6.0", True), ("ambiguous", "+3.8", False), ("effect", "+6.0", False)],
+)
+def test_what_the_logs_shout_is_beneath_a_sentence_that_names_nothing(verdict: str, sd: str, said: bool) -> None:
+    """Beyond 4 sd, either way; a verdict with a name speaks for itself."""
+    parity = (f"sensor 0 reads 13 mm too long, 0 mm as built ({sd} sd)", "something else (+2.9 sd)")
+    made = report().model_copy(update={"verdict": verdict, "parity": parity})
+    page = diagnose_page(made, []).decode()
+    assert ("<p>Yet the logs by themselves" in page) == said
+    loud = loud_words(made)
+    assert loud == (f"Yet the logs by themselves stand out by more than 4 sd: {parity[0]}." if said else "")

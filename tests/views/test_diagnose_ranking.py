@@ -36,9 +36,21 @@ def test_what_no_replay_shows_was_not_fitted_for_that_reason() -> None:
     brief = ranking_table(ranked(NONE, DROPOUT, POSE, PLAY), brief=True).rows
     assert brief[-1][0] == "2 others"
     assert "too little, or change nothing that is simulated (camera_pose)" in brief[-1][-1]
-    assert ranking_table(ranked(NONE, PLAY), brief=True).rows[-1][-1] == (
+    lag = PLAY.model_copy(update={"effect": "motor_lag"})
+    assert ranking_table(ranked(NONE, PLAY, lag), brief=True).rows[-1][-1] == (
         "not fitted: they promised too little; all with --json"
     )
+
+
+def test_a_single_other_and_what_was_asked_for_have_rows_of_their_own() -> None:
+    """`1 others` takes as much room as the name does; an effect of `--effect` is what somebody wants to know of."""
+    assert [row[0] for row in ranking_table(ranked(NONE, PLAY), brief=True).rows] == ["none", "backlash"]
+    assert [one.effect for one in drawn_rows(ranked(NONE, PLAY))] == ["backlash", "none"]
+    made, asked = ranked(NONE, POSE, PLAY), ("camera_pose", "backlash")
+    assert [row[0] for row in ranking_table(made, brief=True).rows] == ["none", "2 others"]
+    assert [row[0] for row in ranking_table(made, brief=True, asked=asked).rows] == ["none", *asked]
+    assert [one.effect for one in drawn_rows(made, asked)] == [*asked, "none"]
+    assert next(iter(diagnose_tables(made, brief=True, asked=asked))).rows[1][0] == "camera_pose"
 
 
 def test_a_fit_that_never_left_its_start_has_no_size() -> None:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.diagnose import draw_diagnosis
 from r2s2r_cli.views.diagnose_floor import floor_picture
-from r2s2r_cli.views.diagnose_robot import GUILTY, guilt, robot_picture, together
+from r2s2r_cli.views.diagnose_robot import CAP, MARKED, PLAIN, ROD, named, robot_picture, together
 from r2s2r_cli.views.diagnose_words import GUIDE, drawn_effects, verdict_words
 from schemas.diagnosis import VERDICTS
 from schemas.results_diagnose import DiagnoseReport, ElementFound, RankedName, WhereFound
@@ -51,8 +51,8 @@ def robot() -> ArtifactData:
 @pytest.mark.parametrize(
     ("verdict", "element", "channel", "words"),
     [
-        ("effect", ElementFound(kind="rod", index=1), "mass", "guilty: rod 1"),
-        ("effect", ElementFound(kind="camera"), "observation", "guilty: the camera, nothing on the robot"),
+        ("effect", ElementFound(kind="rod", index=1), "mass", "named: rod 1"),
+        ("effect", ElementFound(kind="camera"), "observation", "named: the camera, nothing on the robot"),
         ("ambiguous", ElementFound(kind="cap", index=3), "contact",
          "undecided, no part is accused; most suspect so far: cap 3 (verdict: ambiguous)"),
         ("effect", None, "motor", "no single part: it acts in channel motor"),
@@ -66,25 +66,27 @@ def robot() -> ArtifactData:
 def test_the_robot_is_blamed_as_surely_as_the_verdict(
     verdict: str, element: ElementFound | None, channel: str | None, words: str
 ) -> None:
-    """A part is guilty only where the verdict commits to it; without one, what is known is said."""
-    assert guilt(said(verdict, element, channel)) == words
+    """A part is named only where the verdict commits to it; without one, what is known is said."""
+    assert named(said(verdict, element, channel)) == words
 
 
 @pytest.mark.parametrize("channel", ["motor", None])
 def test_nothing_is_suspect_where_nothing_wrong_is_likeliest(channel: str | None) -> None:
     """Neither a part nor a channel."""
     words = "undecided, no part is accused (verdict: ambiguous)"
-    assert guilt(said("ambiguous", MOTOR, channel, ranking=FIRST)) == words
+    assert named(said("ambiguous", MOTOR, channel, ranking=FIRST)) == words
 
 
 @pytest.mark.parametrize(("verdict", "lines"), [("effect", 2), ("ambiguous", 0), ("no_gap", 0), ("unknown", 0)])
 def test_only_a_verdict_colours_a_part(figures: list[Figure], verdict: str, lines: int) -> None:
-    """The motor's cable in both panels, or nothing; the title is no accusation either."""
+    """The motor's cable in both panels, or nothing: rods and caps are grey; the title is no accusation either."""
     robot_picture(robot(), said(verdict, MOTOR))
-    drawn = [line for axes in figures[0].axes for line in axes.lines if to_hex(line.get_color()) == GUILTY]
+    drawn = [line for axes in figures[0].axes for line in axes.lines if to_hex(line.get_color()) == MARKED]
     assert len(drawn) == lines
-    title = next(text for text in figures[0].texts if "verdict" in text.get_text() or "guilty" in text.get_text())
-    assert (to_hex(title.get_color()) == GUILTY) == bool(lines)
+    title = next(text for text in figures[0].texts if "verdict" in text.get_text() or "named" in text.get_text())
+    assert (to_hex(title.get_color()) == MARKED) == bool(lines)
+    colours = {to_hex(line.get_color()) for axes in figures[0].axes for line in axes.lines}
+    assert colours - {MARKED} == {PLAIN, ROD, CAP}
 
 
 def test_parts_that_lie_on_each_other_have_one_label(figures: list[Figure]) -> None:
@@ -93,7 +95,7 @@ def test_parts_that_lie_on_each_other_have_one_label(figures: list[Figure]) -> N
     above, side = (sorted(text.get_text() for text in axes.texts) for axes in figures[0].axes)
     assert above == ["0", "0", "1", "1", "2", "3"] and side == ["0, 1", "0, 2", "1", "3"]
     shared = next(text for text in figures[0].axes[1].texts if text.get_text() == "0, 1")
-    assert to_hex(str(shared.get_color())) != GUILTY  # one of the two alone is accused
+    assert to_hex(str(shared.get_color())) != MARKED  # one of the two alone is accused
     assert together(np.array([[0.0, 0.0], [1.0, 0.0], [0.01, 0.0]]), 0.05) == [(0, 2), (1,)]
 
 
@@ -104,7 +106,7 @@ def test_a_place_on_the_floor_is_marked_where_it_is_named(figures: list[Figure],
     place = ElementFound(kind="place", xy_m=(0.1, 0.2))
     floor_picture(ArtifactData("diagnosis", {"segments": rows}), said(verdict, place))
     texts = [text.get_text() for text in figures[0].axes[0].texts]
-    assert ("guilty place" in texts) == (verdict == "effect")
+    assert ("named place" in texts) == (verdict == "effect")
     assert [text.get_text() for text in figures[0].legends[0].texts] == ["rod 0, caps 0 and 1", "rod 1, caps 2 and 3"]
 
 

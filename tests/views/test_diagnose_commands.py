@@ -1,0 +1,108 @@
+"""Commands that a diagnosis ends with: what was found put to use, the gait to run next, healthy runs."""
+
+from __future__ import annotations
+
+import pytest
+
+from r2s2r_cli.commands.diagnose_outcome import show
+from r2s2r_cli.console import Console
+from r2s2r_cli.stages.record.plan import plans
+from r2s2r_cli.stages.record.policies import random_targets
+from r2s2r_cli.views.diagnose_commands import REPEATS, ROBOT, diagnose_commands, use
+from r2s2r_cli.views.diagnose_page import diagnose_page, diagnose_tables
+from schemas.results_diagnose import DiagnoseReport, NextGaitFound
+from tests.support.diagnosed import report
+from tests.support.rig_robots import known
+
+
+def test_what_was_named_comes_with_the_command_that_uses_it() -> None:
+    """At the element and sizes that were found; what has no number, and what is not committed to, has none."""
+    plain = "--with-effect payload:1 --free +payload.mass_kg.1=0.04"
+    assert use(report()) == f"r2s2r identify {plain}"
+    placed = report().model_copy(update={"iteration": 1, "free_iteration": 3})
+    assert use(placed) == f"r2s2r identify --iteration 3 --also 1 {plain}"
+    place = {"friction_field.patch_factor": 0.262, "friction_field.patch_x_m": 0.2034}
+    row = report().ranking[0].model_copy(update={"effect": "friction_field", "size": place})
+    floor = report().model_copy(update={"effects": ("friction_field",), "ranking": (row,)})
+    assert use(floor).endswith("--with-effect friction_field --free +friction_field.patch_factor=0.262 "
+                               "--free +friction_field.patch_x_m=0.2034")  # fmt: skip
+    assert not use(report().model_copy(update={"verdict": "ambiguous", "effects": ()}))
+    lost = report().ranking[0].model_copy(update={"effect": "dropout", "size": {}})
+    assert not use(report().model_copy(update={"effects": ("dropout",), "ranking": (lost,)}))
+
+
+@pytest.mark.parametrize(
+    ("nats", "now", "words"),
+    [
+        (
+            30.0,
+            2.0,
+            "ramps: likeliest to decide between the likeliest candidates, worth 30.0 nats, these runs again 2.0",
+        ),
+        (2.0, 3.0, "nothing separates the candidates better than these runs; the best of the library is ramps"),
+        (2.0, None, "ramps: likeliest to decide between the likeliest candidates, worth 2.0 nats (little)"),
+    ],
+)
+def test_what_to_run_next_is_said_beside_what_was_run(nats: float, now: float | None, words: str) -> None:
+    """Its command is below; a gait that is worth less than the runs so far is not praised."""
+    file = "iterations/001/70-diagnose-next.toml"
+    one = NextGaitFound(name="ramps", file=file, targets=((1.0,),), nats=nats, now=now)
+    made = report().model_copy(update={"next_gait": one, "free_iteration": 2})
+    rows = [row for table in diagnose_tables(made) for row in table.rows if row[0] == "run next"]
+    assert rows == [["run next", f"{words} (command: below)"]]
+    payload, *others = diagnose_commands(made)
+    assert payload[0] == "use it" and others == [("next", f"r2s2r record {file} --iteration 2 --repeats 2 {ROBOT}")]
+    unwritten = made.model_copy(update={"next_gait": one.model_copy(update={"file": None})})
+    assert [what for what, _ in diagnose_commands(unwritten)] == ["use it"]
+
+
+def test_where_no_gait_helps_healthy_runs_would() -> None:
+    """With the commands, of runs as they will be called; not where there are some, nor where a cause is named."""
+    lacking = {"missing": ("healthy runs: findings are against robot.toml",), "iteration": 1, "free_iteration": 2}
+    undecided = report().model_copy(update={"verdict": "ambiguous", "effects": (), **lacking})
+
+    def advice(made: DiagnoseReport) -> str:
+        return next(row[1] for table in diagnose_tables(made) for row in table.rows if row[0] == "run next")
+
+    assert advice(undecided).endswith("of the robot as it was when nothing was wrong (command: below)")
+    assert diagnose_commands(undecided) == [
+        ("next", f"r2s2r record --random 15 --repeats 2 --iteration 2 {ROBOT}"),
+        ("next", "r2s2r estimate --iteration 2"),
+        ("next", "r2s2r diagnose --iteration 1 --also 2 --healthy 002-random-0-1 --healthy 002-random-0-2"),
+    ]
+    plain = "no gait of the library is likely to decide more"
+    assert advice(undecided.model_copy(update={"missing": ()})) == plain == advice(report().model_copy(update=lacking))
+    assert diagnose_commands(undecided.model_copy(update={"missing": ()})) == []
+
+
+def test_a_command_is_a_line_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+    """Whole, in the terminal however narrow it is and on the page: no table breaks it."""
+    one = NextGaitFound(name="ramps", file="70-diagnose-next.toml", targets=((1.0,),), nats=9.0, now=None)
+    made = report().model_copy(update={"next_gait": one, "free_iteration": 2})
+    show(made, Console())
+    lines = capsys.readouterr().out.splitlines()
+    page = diagnose_page(made, []).decode()
+    assert len(diagnose_commands(made)) == 2
+    for what, command in diagnose_commands(made):
+        assert f"{what}: {command}" in lines and f"<p>{what}: <code>{command}</code></p>" in page
+    assert "r2s2r" not in "".join(cell for table in diagnose_tables(made) for row in table.rows for cell in row)
+
+
+def test_healthy_runs_have_the_names_that_record_gives_them() -> None:
+    """Of the command that is shown, in an iteration beside the diagnosed one."""
+    made = plans([random_targets(known(), 15, 0)], repeats=REPEATS, rest=1.0)
+    asked = {"missing": ("healthy runs: none",), "iteration": 1, "free_iteration": 12}
+    undecided = report().model_copy(update={"verdict": "ambiguous", "effects": (), **asked})
+    *_, (_, command) = diagnose_commands(undecided)
+    assert command.endswith(" ".join(f"--healthy 012-{one.name}" for one in made))
+
+
+def test_what_was_asked_for_is_told_on_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    """Though nothing is known of it."""
+    none = report().ranking[-1]
+    others = tuple(none.model_copy(update={"effect": name, "fitted": False}) for name in ("backlash", "motor_lag"))
+    made = report().model_copy(update={"ranking": (*report().ranking, *others)})
+    show(made, Console())
+    assert "\n backlash " not in capsys.readouterr().out
+    show(made, Console(), ("backlash",))
+    assert "\n backlash " in capsys.readouterr().out

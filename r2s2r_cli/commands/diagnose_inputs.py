@@ -200,7 +200,7 @@ class Asked:
         others = [one for one in self.project.iterations() if one.number not in used and estimated(one)]
         free = 1 + max((one.number for one in self.project.iterations()), default=0)
         names = ", ".join(run.name for run in healthy)
-        hint = f"r2s2r record --random 15 --repeats 3 --iteration {free} {ROBOT}   # then estimate, diagnose --also"
+        hint = f"r2s2r record --random 15 --repeats 3 --iteration {free} {ROBOT}   # then estimate it, name it here"
         return InputError(
             "there is no run to diagnose: all of them are given as healthy", where="--healthy",
             expected="a run that is not, beside them", received=f"{names} and no other",

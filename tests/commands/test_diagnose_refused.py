@@ -183,7 +183,7 @@ def test_where_all_runs_are_healthy_others_are_named(estimated: Path) -> None:
     asked(estimated)
     assert hint("--healthy", "sample") == (
         "r2s2r record --random 15 --repeats 3 --iteration 2 --port /dev/ttyUSB0 --protocol legacy --camera realsense"
-        "   # then estimate, diagnose --also"
+        "   # then estimate it, name it here"
     )
     second(estimated, "10-record.h5", "20-estimate.h5")
     beside = hint("--iteration", "1", "--healthy", "sample")

@@ -86,9 +86,10 @@ class Asked:
         return found
 
     def _without_file(self, text: str) -> UsageError:
-        """For a name, or nothing, where a simulator has to be: the latest of the project under that name."""
-        places = [place.artifact("identification") for place in self.project.iterations()]
-        there = [os.path.relpath(one) for one in places if one.exists()]
+        """For a name, or nothing, where a simulator has to be: the latest up to this iteration, else of the project,
+        under that name."""
+        places = sorted(self.project.iterations(), key=lambda one: (one.number <= self.iteration.number, one.number))
+        there = [os.path.relpath(path) for one in places if (path := one.artifact("identification")).exists()]
         return UsageError(
             "a simulator has no file", where="--model", expected="FILE or NAME=FILE", received=text or "nothing",
             hint=f"--model {quoted(text + there[-1])}" if there else "r2s2r identify",

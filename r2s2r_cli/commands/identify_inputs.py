@@ -102,7 +102,7 @@ class Asked:
         """The command that takes the executed runs of an iteration as well: from a later one, as it does."""
         later = next((one for one in self.project.iterations() if one.number > main.number), None)
         number = main.number + 1 if later is None else later.number
-        also = f" --also {main.number}" * (later is not None and bool(estimated(later)))
+        also = f" --also {main.number}" * (later is not None and Source(later).estimate.exists())
         if self.command == "r2s2r identify":
             return f"r2s2r identify --iteration {number}{also}"
         if later is None:  # only `identify` begins an iteration

@@ -65,7 +65,7 @@ def _option(error: Any, message: str, command: Any, words: list[str]) -> Said:
 def _as_argument(name: str, command: Any, words: list[str]) -> tuple[list[str] | None, str]:
     """Of an option that is spelt like an argument (`--policy straight`): the command line with its value as that, where
     it is known to be one, and what is expected then."""
-    arguments = {param.name: param for param in command.params if param.param_type_name == "argument"}
+    arguments = [param.name for param in command.params if param.param_type_name == "argument"]
     near = difflib.get_close_matches(name.lstrip("-"), arguments, 1)
     at = next((i for i, word in enumerate(words) if word.partition("=")[0] == name), None)
     if not near or at is None:
@@ -74,7 +74,7 @@ def _as_argument(name: str, command: Any, words: list[str]) -> tuple[list[str] |
     value = given.value
     if near[0] == "policies" and command.name != "execute":  # which knows those of its plan by their names alone
         value = value if Path(value).is_file() else _planned(value, words)
-    expected = f"{near[0]} without an option before them: {arguments[near[0]].help or ''}".rstrip(": ")
+    expected = f"{near[0]} without an option before them"
     if not value or value.startswith("-"):
         return None, expected
     return [*words[:at], value, *words[at + (1 if given.equals else 2) :]], expected

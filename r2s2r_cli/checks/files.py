@@ -61,7 +61,7 @@ def version_known(reading: Reading) -> Iterator[Found]:
 def content_intact(reading: Reading) -> Iterator[Found]:
     """Damage behind an intact head, or together with a damaged one."""
     for place in reading.damage:
-        yield Found(place.where.lstrip("/"), place.what, place.expected, in_words(place.received))
+        yield Found(place.where.lstrip("/"), place.what, place.expected, in_words(place.received), place.hint)
 
 
 @check(

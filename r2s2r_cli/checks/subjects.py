@@ -29,6 +29,8 @@ class Difference:
     what: str
     expected: str
     received: str
+    hint: str = ""
+    """Where it needs another remedy than the check that found it."""
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.commands.compare_models import learned_names, require_current
 from r2s2r_cli.commands.outcome import require_input, require_model
-from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.errors import InputError, UsageError, quoted
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
 
@@ -74,6 +75,8 @@ class Asked:
         found: dict[str, Path] = {}
         for text in self.models:
             name, equals, typed = text.rpartition("=")
+            if not typed:
+                raise self._without_file(text)
             path = Path(typed)
             name = name if equals else f"iteration {int(path.parent.name)}" if path.parent.name.isdigit() else path.stem
             if name in found or name == INITIAL:
@@ -81,6 +84,16 @@ class Asked:
                                  received=name, hint="--model first=a.h5 --model second=b.h5")  # fmt: skip
             found[name] = path
         return found
+
+    def _without_file(self, text: str) -> UsageError:
+        """For a name, or nothing, where a simulator has to be: the latest up to this iteration, else of the project,
+        under that name."""
+        places = sorted(self.project.iterations(), key=lambda one: (one.number <= self.iteration.number, one.number))
+        there = [os.path.relpath(path) for one in places if (path := one.artifact("identification")).exists()]
+        return UsageError(
+            "a simulator has no file", where="--model", expected="FILE or NAME=FILE", received=text or "nothing",
+            hint=f"--model {quoted(text + there[-1])}" if there else "r2s2r identify",
+        )  # fmt: skip
 
     def refs(self) -> list[InputRef]:
         """The inputs. Raises ArtifactError where one cannot be read."""

@@ -118,7 +118,7 @@ def diagnose(
             force=force or (resume and unfinished.exists()),
         )  # fmt: skip
         if dry_run:
-            asked.evidence()
+            asked.evidence(console.say)
         digests = [ref.sha256 for ref in run.inputs]
         key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
         again = [word for word in typed_words("diagnose") if word != "--resume"]
@@ -159,7 +159,7 @@ def _compute(
     from r2s2r_cli.commands.diagnose_outcome import NEXT
     from r2s2r_cli.commands.interrupts import loaded
 
-    evidence = asked.evidence()
+    evidence = asked.evidence(console.say)
     stage = loaded("r2s2r_cli.stages.diagnose.stage")
     seconds: dict[str, float] = {}
     begun = time.monotonic()

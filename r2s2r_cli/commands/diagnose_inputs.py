@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+import shlex
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.commands.identify_inputs import Asked as IdentifyAsked
-from r2s2r_cli.commands.named_runs import Source, named_runs, require_robot
+from r2s2r_cli.commands.named_runs import Source, estimated, named_runs, nearest_run, require_robot
 from r2s2r_cli.commands.outcome import require_input, require_model
-from r2s2r_cli.errors import UsageError
+from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
 
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
 
 TRAIN, TEST = 1, 2
 """Codes of `schemas.identification.ROLES`."""
+TRAIN_SHARE = 0.65
+"""Of the intervals of a run, where no identification says which are fitted."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,7 @@ class Asked:
 
         if self.model is not None:
             require_model(self.project, self.model, "diagnose")
-        require_input(self.identification, f"r2s2r identify --iteration {self.iteration.number}")
+        require_input(self.identification, self._identified_first())
         paths = [*self.artifacts(), self.identification]
         paths += [path for path in (self.floor_file, self.plan_file) if path.exists()]
         return [artifact_ref(self.project, path, whole_header(path)) for path in paths]
@@ -82,8 +86,21 @@ class Asked:
         """Recordings and estimates that are read, those of the main iteration first."""
         return [path for source in self.sources for path in (source.recording, source.estimate)]
 
-    def evidence(self) -> Evidence:
-        """What the diagnosis is made from. Raises ArtifactError, InputError, UsageError."""
+    def _identified_first(self) -> str:
+        """The command where the iteration has no identification: with that of an earlier one, made of other runs than
+        those that are suspected; an identification of the suspected runs alone may take up what is wrong with them."""
+        number = self.iteration.number
+        earlier = [one for one in self.project.iterations() if one.number < number]
+        found = next((one for one in reversed(earlier) if one.artifact("identification").exists()), None)
+        if found is None:
+            return f"r2s2r identify --iteration {number}"
+        if found.number in self.also:
+            return f"r2s2r diagnose --model {shlex.quote(os.path.relpath(found.artifact('identification')))}"
+        return f"r2s2r diagnose --iteration {found.number}" + f" --also {number}" * bool(estimated(self.iteration))
+
+    def evidence(self, say: Callable[[str], None] | None = None) -> Evidence:
+        """What the diagnosis is made from. say: is told where the split is not what it usually is. Raises
+        ArtifactError, InputError, UsageError."""
         from r2s2r_cli.stages.diagnose.evidence import Evidence, require_enough
         from r2s2r_cli.stages.identified import identified
         from r2s2r_cli.store.read import read_artifact
@@ -97,9 +114,14 @@ class Asked:
         if missing:
             known = [run.name for run in runs]
             raise UsageError("there is no such run", where="--healthy", received=missing[0],
-                             expected=", ".join(known), hint=f"--healthy {known[0]}")  # fmt: skip
+                             expected=", ".join(known),
+                             hint=f"--healthy {nearest_run(missing[0], known)}")  # fmt: skip
         diagnosed = tuple(run for run in runs if run.name not in self.healthy)
+        if not diagnosed and healthy:
+            raise self._nothing_else(healthy)
         fit, judge = self._split(diagnosed, found)
+        if not fit and not self.train and not self.test:
+            fit, judge = self._split_anew(diagnosed, found, say)
         made = Evidence(
             robot, model, diagnosed, fit, judge, self._floor(), healthy, _unsaid(model, self.identification)
         )
@@ -140,7 +162,7 @@ class Asked:
 
         caps = [run.caps for run in runs]
         if self.train or self.test:
-            return split(caps, self.train, self.test, 0.65)
+            return split(caps, self.train, self.test, TRAIN_SHARE)
         table = found.groups["segments"]
         fit, judge = (_selected(table, role, {run.name for run in runs}) for role in (TRAIN, TEST))
         known = {name.decode() for name in table["run"].tolist()}
@@ -151,6 +173,39 @@ class Asked:
         elif added:
             fit, judge = [*fit, *added[:-1]], [added[-1]]
         return tuple(fit), tuple(judge)
+
+    def _split_anew(
+        self, runs: Sequence[Run], found: ArtifactData, say: Callable[[str], None] | None
+    ) -> tuple[tuple[Selection, ...], tuple[Selection, ...]]:
+        """The usual split, where that of the identification leaves nothing of the diagnosed runs to fit: it was made
+        for other runs."""
+        from r2s2r_cli.stages.identify.selection import in_words, split
+
+        if not runs:
+            return (), ()
+        fit, judge = split([run.caps for run in runs], (), (), TRAIN_SHARE)
+        if say is not None:
+            words = (", ".join(f"{one.run}:{in_words(one.intervals)}" for one in part) for part in (fit, judge))
+            trained = {one.run for one in _selected(found.groups["segments"], TRAIN, None)}
+            whom = "healthy runs alone" if trained <= {*self.healthy} else "none of these runs"
+            said = "the identification was fitted to {}: here {} is fitted, {} judged; else say --train and --test"
+            say(said.format(whom, *words))
+        return fit, judge
+
+    def _nothing_else(self, healthy: Sequence[Run]) -> InputError:
+        """For runs that are all given as healthy: those of other iterations, or what to record."""
+        from r2s2r_cli.views.diagnose_commands import ROBOT
+
+        used = {source.place.number for source in self.sources}
+        others = [one for one in self.project.iterations() if one.number not in used and estimated(one)]
+        free = 1 + max((one.number for one in self.project.iterations()), default=0)
+        names = ", ".join(run.name for run in healthy)
+        hint = f"r2s2r record --random 15 --repeats 3 --iteration {free} {ROBOT}   # then estimate it, name it here"
+        return InputError(
+            "there is no run to diagnose: all of them are given as healthy", where="--healthy",
+            expected="a run that is not, beside them", received=f"{names} and no other",
+            hint=f"r2s2r diagnose --also {others[-1].number}" if others else hint,
+        )  # fmt: skip
 
     def _floor(self) -> FloorGiven | None:
         from r2s2r_cli.stages.diagnose.evidence import FloorGiven
@@ -176,13 +231,14 @@ def _unsaid(model: Identified, path: Path) -> tuple[str, ...]:
     return (f"uncertainty of {', '.join(names)}: {path.name} has none, so the refit takes its usual priors",)
 
 
-def _selected(table: Group, role: int, names: set[str]) -> list[Selection]:
+def _selected(table: Group, role: int, names: set[str] | None) -> list[Selection]:
+    """The intervals of a role, of the runs of these names or of all."""
     from r2s2r_cli.stages.identify.data import Selection
 
     found: dict[str, list[int]] = {}
     for run, interval, own in zip(
         table["run"].tolist(), table["interval"].tolist(), table["role"].tolist(), strict=True
     ):
-        if own == role and run.decode() in names:
+        if own == role and (names is None or run.decode() in names):
             found.setdefault(run.decode(), []).append(int(interval))
     return [Selection(run, tuple(sorted(set(numbers)))) for run, numbers in found.items()]

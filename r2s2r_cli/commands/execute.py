@@ -74,7 +74,7 @@ def execute(
     The same recorder, guard and emergency stop (the space bar) as `record`; put the robot to another place between
     repeats. --dry-run ends after the simulated outcome, whatever was executed before.
 
-    Example: r2s2r execute straight --repeats 3 --port /dev/ttyUSB0 --camera realsense
+    Example: r2s2r execute straight --port /dev/ttyUSB0 --protocol legacy --camera realsense
     """  # fmt: skip
     from r2s2r_cli.commands.asking import answered, require_answer
     from r2s2r_cli.commands.cameras import stored_camera

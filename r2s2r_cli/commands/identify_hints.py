@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.errors import R2S2RError, UsageError
 from r2s2r_cli.store.atomic import PARTIAL
-from r2s2r_cli.store.header import NotAnArtifact
+from r2s2r_cli.store.checkpoint import OtherRequest
+from r2s2r_cli.store.header import CutOff, NotAnArtifact
 
 if TYPE_CHECKING:
     from r2s2r_cli.commands.identify_inputs import Asked
@@ -75,7 +76,7 @@ def completed(error: R2S2RError, typed: Sequence[str], command: str = _COMMAND) 
     value that was received and has nothing in its place goes.
     """
     said, gap, remark = error.hint.partition("   #")
-    if isinstance(error, NotAnArtifact) or said.endswith(" --show-config"):
+    if isinstance(error, NotAnArtifact | CutOff | OtherRequest) or said.endswith(" --show-config"):
         return error.hint  # about another artifact, maybe of the same stage, or about none
     if said.startswith(command):
         said = said[len(command) :]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -78,14 +80,36 @@ class Asked:
         return tuple(found)
 
     def _require_another(self, main: Iteration) -> None:
-        """Raises UsageError where --also names the iteration itself and its runs are those that are used anyway."""
+        """Raises UsageError where --also names the iteration itself: its recorded runs are used anyway, and what ran
+        its plan later is for a later iteration to learn from."""
         if main.number in self.also and main.number == self.iteration.number:
+            executed = Source(main, executed=True).estimate
+            if executed.exists():
+                raise UsageError(
+                    f"the recorded runs of iteration {main.number} are used without --also, its executed ones "
+                    f"({executed.name}) from the next iteration on", where="--also",
+                    expected="another iteration, or a later one as the main one", received=str(main.number),
+                    hint=self._with_executed(main),
+                )  # fmt: skip
             others = [str(one.number) for one in self.project.iterations() if one.number != main.number]
             raise UsageError(
                 f"the runs of iteration {main.number} are used without --also", where="--also",
                 expected="another iteration" + (f": {', '.join(others)}" if others else ", and there is none"),
                 received=str(main.number), hint=self.command,
             )  # fmt: skip
+
+    def _with_executed(self, main: Iteration) -> str:
+        """The command that takes the executed runs of an iteration as well: from a later one, as it does."""
+        later = next((one for one in self.project.iterations() if one.number > main.number), None)
+        number = main.number + 1 if later is None else later.number
+        also = f" --also {main.number}" * (later is not None and Source(later).estimate.exists())
+        if self.command == "r2s2r identify":
+            return f"r2s2r identify --iteration {number}{also}"
+        if later is None:  # only `identify` begins an iteration
+            return f"r2s2r identify --iteration {number}   # of both; then: {self.command} --iteration {number}"
+        model = main.artifact("identification")
+        own = f" --model {shlex.quote(os.path.relpath(model))}" * model.exists()
+        return f"{self.command} --iteration {number}{also}{own}"
 
     def _also(self, number: int) -> Iteration:
         """An iteration of --also. Raises UsageError where there is none."""

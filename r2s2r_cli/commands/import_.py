@@ -105,6 +105,8 @@ def import_(
         lambda: _compute(here, logs, format_, depth_scale, settings, console),
         (lambda data, said: _draw(here, data, said)) if draw else None,
     )
+    if result.state == "dry_run":  # read and checked as the command would, and forgotten
+        _compute(here, logs, format_, depth_scale, settings, console)
     show_outcome(result, console)
     for said in report.runs if report is not None else ():
         _show(said, console)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -73,3 +74,10 @@ def require_robot(recording: ArtifactData | None, run: str, name: str) -> None:
             f"run {run} is of another robot", where=f"runs/{run}, robot", expected=f"{name}, as robot.toml says",
             received=told, hint="r2s2r status   # another iteration may have runs of this robot alone",
         )  # fmt: skip
+
+
+def nearest_run(name: str, known: Sequence[str]) -> str:
+    """The run that was meant by a name that none has: one that has it in its own (`after` of 002-after), else the one
+    that is spelt like it."""
+    holding = [one for one in known if name and name.lower() in one.lower()]
+    return get_close_matches(name, holding or known, 1, 0.0)[0]

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
+import os
 import re
 import shlex
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
-from r2s2r_cli.errors import UsageError
+from r2s2r_cli.errors import R2S2RError, UsageError
 
 _EXTRA = re.compile(r"Got unexpected extra arguments?\(?s?\)? \((?P<words>.*)\)")
 _COMMAND = re.compile(r"No such command '(?P<name>.*?)'")
@@ -52,10 +55,43 @@ def _option(error: Any, message: str, command: Any, words: list[str]) -> Said:
              if one.startswith("--")}  # fmt: skip
     near = difflib.get_close_matches(name.lstrip("-"), known, 1)
     if not near:
-        return "there is no such option", " | ".join(known.values()), name, None
+        mended, expected = _as_argument(name, command, words)
+        return "there is no such option", expected or " | ".join(known.values()), name, mended
     right = known[near[0]]
     mended = [right + word[len(name) :] if word.partition("=")[0] == name else word for word in words]
     return "there is no such option", right, name, mended if mended != words else None
+
+
+def _as_argument(name: str, command: Any, words: list[str]) -> tuple[list[str] | None, str]:
+    """Of an option that is spelt like an argument (`--policy straight`): the command line with its value as that, where
+    it is known to be one, and what is expected then."""
+    arguments = [param.name for param in command.params if param.param_type_name == "argument"]
+    near = difflib.get_close_matches(name.lstrip("-"), arguments, 1)
+    at = next((i for i, word in enumerate(words) if word.partition("=")[0] == name), None)
+    if not near or at is None:
+        return None, ""
+    given = _Given(at, words)
+    value = given.value
+    if near[0] == "policies" and command.name != "execute":  # which knows those of its plan by their names alone
+        value = value if Path(value).is_file() else _planned(value, words)
+    expected = f"{near[0]} without an option before them"
+    if not value or value.startswith("-"):
+        return None, expected
+    return [*words[:at], value, *words[at + (1 if given.equals else 2) :]], expected
+
+
+def _planned(name: str, words: Sequence[str]) -> str:
+    """A policy of the latest plan that has one of this name, as it is typed; empty where there is none."""
+    from r2s2r_cli.store.header import read_header
+    from r2s2r_cli.store.project import Project
+
+    typed = next((_Given(i, words).value for i, word in enumerate(words) if word.partition("=")[0] == "--project"), "")
+    with contextlib.suppress(R2S2RError, OSError):
+        for place in reversed(Project.find(Path(typed) if typed else None).iterations()):
+            path = place.artifact("plan")
+            if path.exists() and any(one.startswith(f"policies/{name}/") for one in read_header(path).datasets):
+                return f"{os.path.relpath(path)}:{name}"
+    return ""
 
 
 def _command(error: Any, message: str, command: Any, words: list[str]) -> Said:

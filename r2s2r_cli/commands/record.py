@@ -83,7 +83,7 @@ def record(
     Each run begins and ends in the rest shape. While the robot moves the space bar is the emergency stop. Whatever ends
     a recording, what there is of it is sealed. --dry-run moves nothing: it looks at the sensors and says the plan.
 
-    Example: r2s2r record --random 15 --repeats 3 --port /dev/ttyUSB0 --camera realsense
+    Example: r2s2r record --random 15 --port /dev/ttyUSB0 --protocol legacy --camera realsense
     """
     from r2s2r_cli.commands.cameras import stored_camera
     from r2s2r_cli.commands.outcome import print_config
@@ -140,7 +140,8 @@ def _policies(
     if not found:
         raise UsageError("there is nothing to record", where="r2s2r record",
                          expected="a policy file, --random N or --excite NAME", received="none of them",
-                         hint="r2s2r record --random 15 --port /dev/ttyUSB0")  # fmt: skip
+                         hint="r2s2r record --random 15 --port /dev/ttyUSB0 --protocol legacy --camera realsense",
+                         )  # fmt: skip
     for policy in found:
         sequence(policy, robot)  # for this robot, before anything moves
     return found

@@ -72,7 +72,7 @@ def run(
     yet, is done again; what it holds is kept. The first stage that fails ends the run, with its code, and so does what
     `validate` finds wrong with runs and their states (3): nothing is learned from them.
 
-    Example: r2s2r run --port /dev/ttyUSB0 --camera realsense
+    Example: r2s2r run --port /dev/ttyUSB0 --protocol legacy --camera realsense
     """  # fmt: skip
     from schemas.results import RunResult, RunStep
 

@@ -16,7 +16,7 @@ from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError, GateError
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from r2s2r_cli.store.brief import brief
-from r2s2r_cli.store.header import NotAnArtifact, sealed_header, whole_header
+from r2s2r_cli.store.header import CutOff, NotAnArtifact, sealed_header, whole_header
 from r2s2r_cli.store.lock import writer
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import Header, Provenance
@@ -161,10 +161,12 @@ def _state(
 
 
 def _mends(error: ArtifactError, path: Path, name: str) -> str:
-    """What brings a damaged artifact back, or, where there is nothing in it, makes it again."""
+    """What brings a damaged artifact back, or, where there is nothing in it or its end is gone, makes it again."""
     from r2s2r_cli.store.again import command_at
     from r2s2r_cli.store.verify import find_body
 
+    if isinstance(error, CutOff) and command_at(path):
+        return error.hint
     nothing = isinstance(error, NotAnArtifact) and find_body(path) is None
     return (command_at(path) if nothing else "") or f"r2s2r recover {shlex.quote(name)}"
 

@@ -137,7 +137,7 @@ def _gather_artifact(path: Path, found: Examined, place: Place | None) -> Gather
 
 
 def _differences(places: tuple[Mismatch, ...]) -> tuple[Difference, ...]:
-    return tuple(Difference(p.where, p.what, p.expected, p.received) for p in places)
+    return tuple(Difference(p.where, p.what, p.expected, p.received, p.hint) for p in places)
 
 
 def _roots(groups: Mapping[str, object]) -> set[str]:

@@ -11,7 +11,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from r2s2r_cli.errors import ArtifactError, quoted
+from r2s2r_cli.errors import ArtifactError, nearest_folder, quoted
 
 PARTIAL = ".partial"
 """Ending of unfinished files; nothing that bears it is ever read as an artifact."""
@@ -125,6 +125,7 @@ def write_text(target: Path, content: str) -> None:
 
 def disk_error(error: OSError, target: Path) -> ArtifactError:
     """Say in words what the operating system refused while writing `target`."""
+    folder = nearest_folder(target)  # the one that it goes into may be what could not be made
     if error.errno == errno.EFBIG:
         return ArtifactError(
             "the file would be larger than files may be here",
@@ -138,8 +139,8 @@ def disk_error(error: OSError, target: Path) -> ArtifactError:
             "the disk is full",
             where=str(target),
             expected="free space for the whole file",
-            received=f"{_free(target.parent)} free",
-            hint=f"df -h {quoted(target.parent)}",
+            received=f"{_free(folder)} free",
+            hint=f"df -h {quoted(folder)}",
         )
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
         return ArtifactError(
@@ -147,13 +148,13 @@ def disk_error(error: OSError, target: Path) -> ArtifactError:
             where=str(target),
             expected="write permission",
             received=os.strerror(error.errno),
-            hint=f"ls -ld {quoted(target.parent)}",
+            hint=f"ls -ld {quoted(folder)}",
         )
     return ArtifactError(
         "the file could not be written",
         where=str(target),
         received=error.strerror or str(error),
-        hint=f"ls -la {quoted(target.parent)}",
+        hint=f"ls -la {quoted(folder)}",
     )
 
 

@@ -73,11 +73,48 @@ def unreadable(checkpoint: Path, command: Sequence[str], error: Exception) -> In
                       expected="what an interrupted command left", hint=begin_anew(command))  # fmt: skip
 
 
+class OtherRequest(UsageError):
+    """A checkpoint of another command line, whose hint is that line: options of this one have no place in it."""
+
+
 def of_another(checkpoint: Path, command: Sequence[str]) -> UsageError:
-    """For a checkpoint of either kind whose key is not that of this request."""
-    return UsageError("the checkpoint belongs to another request", where=str(checkpoint),
-                      expected="the inputs, settings and options that it was made with", received="others",
-                      hint=begin_anew(command))  # fmt: skip
+    """For a checkpoint of either kind whose key is not that of this request: with the command that it belongs to, or,
+    where that is this one, because inputs or settings changed since, with the command that begins anew."""
+    what, where = "the checkpoint belongs to another request", str(checkpoint)
+    typed = command_of(checkpoint)
+    if typed is None or typed[:1] != tuple(command[:1]) or _request(typed) == _request(command):
+        return UsageError(what, where=where, expected="the inputs, settings and options that it was made with",
+                          received="others" if typed is None else "the same command, with other inputs or settings",
+                          hint=begin_anew(command))  # fmt: skip
+    folder = checkpoint.resolve().parent.name
+    place = ["--iteration", str(int(folder))] if folder.isdigit() else []
+    project = [word for option in _options(command) if option[0] == "--project" for word in option]
+    words = [word for option in _options(typed) if option[0] not in _MANNER for word in option]
+    return OtherRequest(
+        what, where=where, expected=begin_anew(typed), received=begin_anew(command),
+        hint=shlex.join(["r2s2r", *words, *place, *project, "--resume"]),
+    )  # fmt: skip
+
+
+_MANNER = ("--resume", "--json", "--quiet", "--force", "--dry-run", "--iteration", "--project")
+"""Options that do not decide what is computed, or that the place of the checkpoint decides."""
+
+
+def _request(words: Sequence[str]) -> list[tuple[str, ...]]:
+    """What of a command line decides what is computed."""
+    return sorted(option for option in _options(words) if option[0] not in (*_MANNER, "--draw", "--no-draw"))
+
+
+def _options(words: Sequence[str]) -> list[tuple[str, ...]]:
+    """The words of each option, its value with it, `--name=value` as two; other words each by itself."""
+    split = [part for word in words for part in (word.split("=", 1) if word.startswith("--") else [word])]
+    found: list[tuple[str, ...]] = []
+    for word in split:
+        if found and not word.startswith("--") and found[-1][0].startswith("--") and len(found[-1]) == 1:
+            found[-1] = (*found[-1], word)
+        else:
+            found.append((word,))
+    return found
 
 
 def begin_anew(command: Sequence[str]) -> str:

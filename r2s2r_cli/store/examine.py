@@ -14,7 +14,14 @@ from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.errors import ArtifactError, quoted
 from r2s2r_cli.store.hashing import PROVENANCE, attributes
 from r2s2r_cli.store.hdf5_errors import translate
-from r2s2r_cli.store.header import HDF5_SIGNATURE, NotAnArtifact, body_sha256, read_header, unreadable
+from r2s2r_cli.store.header import (
+    HDF5_SIGNATURE,
+    NotAnArtifact,
+    body_sha256,
+    mends_cut_off,
+    read_header,
+    unreadable,
+)
 from r2s2r_cli.store.isolated import IsolatedReader
 from r2s2r_cli.store.layout import Mismatch, check_layout
 from r2s2r_cli.store.read import check_kind_and_version, load
@@ -83,7 +90,8 @@ def _examine_changed(path: Path, header: Header, length: int, reader: IsolatedRe
     if report["content_ok"] and report["seal_ok"]:
         return _read(path, header, unread_bytes=True)
     if length < header.body_bytes:
-        cut = Mismatch("", "the file was cut off", f"{header.body_bytes} bytes of data", f"{length} bytes")
+        cut = Mismatch("", "the file was cut off", f"{header.body_bytes} bytes of data", f"{length} bytes",
+                       mends_cut_off(path, header))  # fmt: skip
         problems = [cut, *(p for p in problems if p.where.strip("/"))]
     return Examined(header, damage=tuple(problems))
 

@@ -29,6 +29,10 @@ class NotAnArtifact(ArtifactError):
     """The file does not begin with an r2s2r header: another program's file, or a damaged head."""
 
 
+class CutOff(ArtifactError):
+    """An artifact whose last bytes are gone."""
+
+
 def block_size(header: Header) -> int:
     """Size of the user block for this header: a power of two of at least 4096 bytes.
 
@@ -97,8 +101,8 @@ def whole_header(path: Path) -> Header:
     header = read_header(path)
     expected, received = header.body_offset + header.body_bytes, path.stat().st_size
     if received < expected:
-        raise ArtifactError("the file was cut off", where=str(path), expected=f"{expected} bytes",
-                            received=f"{received} bytes", hint=f"r2s2r recover {quoted(path)}")  # fmt: skip
+        raise CutOff("the file was cut off", where=str(path), expected=f"{expected} bytes",
+                     received=f"{received} bytes", hint=mends_cut_off(path, header))  # fmt: skip
     return header
 
 
@@ -161,6 +165,19 @@ def mends(path: Path, or_else: str = "recover") -> str:
         if find_body(path) is not None:
             return f"r2s2r recover {quoted(path)}"
     return command_at(path) or f"r2s2r {or_else} {quoted(path)}"
+
+
+def mends_cut_off(path: Path, header: Header) -> str:
+    """The command for a file that lost its end, and with it numbers: what makes it again, of the options that its head
+    still has where they mean the same here; of a measurement, and outside a project, what rescues the rest."""
+    from r2s2r_cli.store.again import command_again, command_at
+    from r2s2r_cli.store.project import root_of
+    from schemas.versions import STAGE_VERSIONS
+
+    anew = command_at(path)
+    if anew and root_of(path.absolute()) == Path.cwd() and header.provenance.stage in STAGE_VERSIONS:
+        return command_again(header.provenance, path)
+    return anew or f"r2s2r recover {quoted(path)}"
 
 
 def unreadable(path: Path, error: OSError) -> ArtifactError:

@@ -28,6 +28,8 @@ class Mismatch:
     what: str
     expected: str
     received: str
+    hint: str = ""
+    """Where it needs another remedy than the check that found it."""
 
 
 def check_layout(file: h5py.File, spec: ArtifactSpec) -> list[Mismatch]:

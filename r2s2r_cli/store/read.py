@@ -17,7 +17,7 @@ from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Value
 from r2s2r_cli.errors import ArtifactError, DamageWarning, quoted
 from r2s2r_cli.store.hashing import PROVENANCE, attributes, walk
 from r2s2r_cli.store.hdf5_errors import translate
-from r2s2r_cli.store.header import body_sha256, read_header
+from r2s2r_cli.store.header import CutOff, body_sha256, mends_cut_off, read_header
 from r2s2r_cli.store.isolated import IsolatedReader
 from r2s2r_cli.store.layout import BLOB_BYTES, BLOB_OFFSET
 from schemas.header import Header
@@ -108,12 +108,12 @@ def check_body(path: Path, header: Header, *, reader: IsolatedReader | None = No
     if digest == header.body_sha256:
         return
     if length < header.body_bytes:
-        raise ArtifactError(
+        raise CutOff(
             "the file was cut off",
             where=str(path),
             expected=f"{header.body_bytes} bytes of data",
             received=f"{length} bytes",
-            hint=f"r2s2r recover {quoted(path)}",
+            hint=mends_cut_off(path, header),
         )
     with contextlib.nullcontext(reader) if reader else IsolatedReader() as child:
         report = child.verify(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,9 +12,11 @@ import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.stages.compare.runs import real_runs
+from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.write import write_artifact
 from tests.commands.conftest import invoke
 from tests.support import builders
+from tests.support.identified import identification
 
 Groups = dict[str, Group]
 Spoil = Callable[[Groups], None]
@@ -104,3 +107,22 @@ def test_beside_good_runs_it_is_left_out_with_the_reason(spoil: Spoil, what: str
     assert [run.name for run in runs] == ["003-good"]
     assert [run.iteration for run in runs] == [3]
     assert len(said) == 1 and what in said[0] and received.removeprefix("received: ") in said[0]
+
+
+def test_a_simulator_without_a_file_is_named_with_one(estimated: Path) -> None:
+    """The name stays and the file follows it, in the command as typed; without any identification, what makes one."""
+    nothing = invoke("compare", "--of", "record", "--model", "before=", "--dry-run")
+    assert nothing.exit_code == 2 and nothing.stderr.endswith("hint: r2s2r identify\n")
+    write_artifact(
+        estimated / "iterations/001/30-identify.h5",
+        identification(Project.find(estimated).robot()),
+        builders.provenance(),
+    )
+    for typed in (("--model", "before="), ("--model=before=",), ("--model", "")):
+        refused = invoke("compare", "--of", "record", *typed, "--dry-run")
+        assert refused.exit_code == 2 and "a simulator has no file\n  where: --model" in refused.stderr
+        mended = shlex.split(refused.stderr.splitlines()[-1])[2:]
+        value = "iterations/001/30-identify.h5" if typed[-1] == "" else "before=iterations/001/30-identify.h5"
+        option = [f"--model={value}"] if len(typed) == 1 else ["--model", value]
+        assert mended == ["compare", "--of", "record", *option, "--dry-run"]
+        assert invoke(*mended).exit_code == 0

@@ -11,6 +11,7 @@ from r2s2r_cli.store.again import command_at
 from tests.commands.conftest import document, invoke
 
 ESTIMATE = "iterations/001/20-estimate.h5"
+RECORDING = "iterations/001/10-record.h5"
 
 
 @pytest.mark.parametrize("content", [b"", b"not of ours", b"\x89HDF\r\n\x1a\n" + bytes(100)])
@@ -26,6 +27,30 @@ def test_the_hint_makes_it_again(estimated: Path, content: bytes, command: str) 
     assert last == "hint: r2s2r estimate --iteration 1"
     assert invoke(*shlex.split(last)[2:], "--no-draw").exit_code == 0
     assert document("status")["artifacts"][1]["state"] == "fresh"
+
+
+@pytest.mark.parametrize("command", ["status", f"inspect {ESTIMATE}", f"validate {ESTIMATE}", "identify"])
+def test_what_was_cut_off_is_made_again(estimated: Path, command: str) -> None:
+    """Its numbers are gone: at once by its stage, not first by `recover`, which is for a recording."""
+    for name, mended in ((ESTIMATE, "r2s2r estimate --iteration 1"), (RECORDING, f"r2s2r recover {RECORDING}")):
+        whole = (estimated / name).read_bytes()
+        (estimated / name).write_bytes(whole[:-2000])
+        typed = command.replace(ESTIMATE, name)
+        last = invoke(*typed.split()).stderr.splitlines()[-1]
+        assert last.replace(f"{estimated}/", "") == f"hint: {mended}"
+        if name == ESTIMATE:
+            assert invoke(*shlex.split(last)[2:], "--no-draw").exit_code == 0
+
+
+def test_what_was_cut_off_is_made_as_it_was(estimated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the options that its head has, in the project's directory; elsewhere by its place alone."""
+    assert invoke("estimate", "--set", "estimate.sensor_gap_s=0.2", "--no-draw").exit_code == 0
+    path = estimated / ESTIMATE
+    path.write_bytes(path.read_bytes()[:-2000])
+    assert document("status")["next"] == "r2s2r estimate --set estimate.sensor_gap_s=0.2 --iteration 1"
+    monkeypatch.chdir(estimated.parent)
+    last = invoke("inspect", f"robot/{ESTIMATE}").stderr.splitlines()[-1]
+    assert last == "hint: r2s2r estimate --iteration 1 --project robot"
 
 
 def test_what_may_be_brought_back_is_recovered(estimated: Path) -> None:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shlex
+import shutil
 from pathlib import Path
 
 import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.commands.diagnose_inputs import Asked
-from r2s2r_cli.commands.named_runs import require_robot
+from r2s2r_cli.commands.named_runs import nearest_run, require_robot
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.store.project import Project
+from r2s2r_cli.store.read import read_artifact
 from r2s2r_cli.store.write import write_artifact
 from tests.commands.conftest import invoke
 from tests.support.builders import provenance
@@ -113,6 +116,106 @@ def test_a_wrong_request_has_a_command_as_its_hint(estimated: Path, typed: str, 
     assert refused.exit_code in (2, 4) and error["where"] == where
     assert error["hint"].startswith(hint)
     assert not artifacts(estimated)
+
+
+def second(root: Path, *names: str) -> Path:
+    """A second iteration with the run of the first under these names of artifacts."""
+    folder = root / "iterations/002"
+    folder.mkdir()
+    for name in names:
+        source = {"10": "10-record.h5", "50": "10-record.h5"}.get(name[:2], "20-estimate.h5")
+        shutil.copy(root / "iterations/001" / source, folder / name)
+    return folder
+
+
+def hint(*typed: str) -> str:
+    """The hint of a diagnosis that is refused."""
+    refused = invoke("diagnose", *typed, "--dry-run")
+    assert refused.exit_code in (2, 4), refused.stderr
+    found: str = refused.stderr.splitlines()[-1].removeprefix("hint: ")
+    return found
+
+
+def accepted(command: str) -> str:
+    """What a dry run says that was pasted from a hint."""
+    done = invoke(*shlex.split(command, comments=True)[1:])
+    assert done.exit_code == 0, done.stderr
+    said: str = done.stderr
+    return said
+
+
+def test_runs_without_an_identification_are_diagnosed_with_that_of_an_earlier_iteration(estimated: Path) -> None:
+    """Not with one of their own, which may take up what is wrong with them; pasted, the hint is accepted."""
+    asked(estimated)
+    folder = second(estimated, "10-record.h5", "20-estimate.h5")
+    assert hint("--seed", "4") == "r2s2r diagnose --seed 4 --iteration 1 --also 2 --dry-run"
+    accepted(hint())
+    with_model = hint("--also", "1")
+    assert with_model == "r2s2r diagnose --also 1 --model iterations/001/30-identify.h5 --dry-run"
+    accepted(with_model)
+    for path in folder.iterdir():
+        path.unlink()
+    assert hint() == "r2s2r diagnose --iteration 1 --dry-run"  # which it has no runs beside
+
+
+def test_what_an_identification_of_healthy_runs_leaves_is_split_as_usual(estimated: Path) -> None:
+    """One run that it does not know, beside healthy ones alone: fitted and judged are its own intervals, and said."""
+    one = asked(estimated)
+    assert [part.run for part in one.evidence().fit] == ["sample"]  # as typed
+    made = identification(one.project.robot())
+    table = made.groups["segments"]
+    table["run"][:] = b"samp"  # the field is as wide as `walk`
+    estimate = read_artifact(estimated / "iterations/001/20-estimate.h5", "estimate")[1]
+    recording = read_artifact(estimated / "iterations/001/10-record.h5", "recording")[1]
+    for data, name in ((estimate, "20-estimate.h5"), (recording, "10-record.h5")):
+        own = {path.replace("runs/sample", "runs/samp"): group for path, group in data.groups.items()}
+        write_artifact(estimated / "iterations/001" / name, ArtifactData(data.kind, own), provenance())
+    write_artifact(estimated / "iterations/001/30-identify.h5", made, provenance())
+    folder = second(estimated)
+    for data, name in ((estimate, "20-estimate.h5"), (recording, "10-record.h5")):
+        write_artifact(folder / name, data, provenance())
+    said = accepted("r2s2r diagnose --iteration 1 --healthy samp --also 2 --dry-run")
+    assert "the identification was fitted to healthy runs alone: here 002-sample:1-" in said
+
+
+def test_where_all_runs_are_healthy_others_are_named(estimated: Path) -> None:
+    """Of an iteration that has some, else how to record them: where there are none yet, with what reaches a robot."""
+    asked(estimated)
+    assert hint("--healthy", "sample") == (
+        "r2s2r record --random 15 --repeats 3 --iteration 2 --port /dev/ttyUSB0 --protocol legacy --camera realsense"
+        "   # then estimate it, name it here"
+    )
+    second(estimated, "10-record.h5", "20-estimate.h5")
+    beside = hint("--iteration", "1", "--healthy", "sample")
+    assert beside == "r2s2r diagnose --healthy sample --iteration 1 --also 2 --dry-run"
+    accepted(beside)
+
+
+def test_a_healthy_run_is_meant_by_a_part_of_its_name() -> None:
+    """`after` is 002-after, though crawl is there as well; a slip of the finger is what it is spelt like."""
+    known = ["crawl", "straight", "002-after"]
+    assert nearest_run("after", known) == "002-after"
+    assert nearest_run("craw", known) == "crawl" and nearest_run("strait", known) == "straight"
+
+
+def test_executed_runs_of_the_iteration_are_not_said_to_be_used(estimated: Path) -> None:
+    """They are from a later iteration on, and the hint is of one that is there, or that `identify` begins."""
+    asked(estimated)
+    for name, of in (("50-execute.h5", "10-record.h5"), ("51-estimate.h5", "20-estimate.h5")):
+        shutil.copy(estimated / "iterations/001" / of, estimated / "iterations/001" / name)
+    refused = invoke("diagnose", "--also", "1")
+    assert "its executed ones (51-estimate.h5) from the next iteration on" in refused.stderr
+    first = hint("--also", "1")
+    assert first == "r2s2r identify --iteration 2   # of both; then: r2s2r diagnose --iteration 2"
+    accepted(f"{first.partition('   #')[0]} --dry-run")
+    second(estimated)
+    later = hint("--iteration", "1", "--also", "1")
+    assert later == "r2s2r diagnose --iteration 2 --model iterations/001/30-identify.h5 --dry-run"
+    accepted(later)
+    of_both = [run.name for run in dataclasses.replace(
+        asked(estimated), iteration=Project.find(estimated).iteration(2), model=Path("iterations/001/30-identify.h5"),
+    ).evidence().runs]  # fmt: skip
+    assert of_both == ["sample", "executed-sample"]
 
 
 def test_another_robot_is_refused(estimated: Path) -> None:

@@ -40,6 +40,28 @@ def test_what_was_wrong_is_mended_where_it_stood(
     assert result.stderr.endswith(f"hint: r2s2r {hint}\n")
 
 
+@pytest.mark.parametrize(
+    ("typed", "hint"),
+    [
+        ("record --policy straight --port p --dry-run", "record iterations/002/40-plan.h5:straight --port p --dry-run"),
+        ("record --policy=policies/walk.toml --dry-run", "record policies/walk.toml --dry-run"),
+        ("simulate --policy straight --dry-run", "simulate iterations/002/40-plan.h5:straight --dry-run"),
+        ("execute --policies straight --dry-run", "execute straight --dry-run"),
+        ("record --policy nosuch --dry-run", "record --help"),
+    ],
+)
+def test_an_argument_typed_as_an_option_becomes_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, typed: str, hint: str
+) -> None:
+    """A policy of a plan with the plan where the command asks for it; of no policy nobody knows what was meant."""
+    monkeypatch.chdir(shutil.copytree(SAMPLE, tmp_path / "project"))
+    result = invoke(*typed.split())
+    assert result.exit_code == 2 and "policies without an option" in result.stderr
+    assert result.stderr.endswith(f"hint: r2s2r {hint}\n")
+    if hint.startswith("simulate"):
+        assert invoke(*hint.split()).exit_code == 0
+
+
 def test_of_several_the_one_that_is_named_as_the_place() -> None:
     """`--to 5,5,0` as where: not the first of that name."""
     error = NumericalError("no way", where="--to 5,5,0", received="nearest (1.00, 2.00) m", hint="--to 1.00,2.00,3")

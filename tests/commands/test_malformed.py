@@ -85,6 +85,28 @@ def test_a_malformed_log_is_refused(here: Path, put: Any, case: Malformed) -> No
     check_refused(invoke("import", source, "--no-draw"), here)
 
 
+@pytest.mark.parametrize(("put", "case"), CASES[::30])
+def test_a_dry_run_reads_the_log(here: Path, put: Any, case: Malformed) -> None:
+    """What `import` refuses is not said to be written: the same words."""
+    source = put(here, case.data)
+    refused = invoke("import", source, "--no-draw", "--dry-run")
+    check_refused(refused, here)
+    assert refused.stderr == invoke("import", source, "--no-draw").stderr
+
+
+def test_a_dry_run_of_a_log_without_a_sidecar_or_rows(here: Path) -> None:
+    """Refused as the import is; the good log would be written, and is not."""
+    before = sorted(here.rglob("*"))
+    accepted = invoke("import", "log.csv", "--dry-run")
+    assert accepted.exit_code == 0 and "would write iterations/001/10-record.h5" in accepted.stderr
+    assert sorted(here.rglob("*")) == before
+    (here / "log.toml").unlink()
+    assert invoke("import", "log.csv", "--dry-run").exit_code == invoke("import", "log.csv").exit_code == 4
+    (here / "log.toml").write_text(SIDECAR)
+    (here / "log.csv").write_text("")
+    assert invoke("import", "log.csv", "--dry-run").exit_code == 4
+
+
 def test_the_good_log_is_accepted(here: Path) -> None:
     """What the malformed inputs were made from is imported: the refusals above are not for another reason."""
     assert invoke("import", "log.csv", "--no-draw").exit_code == 0

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from r2s2r_cli.commands import COMMANDS
 from r2s2r_cli.commands.robot_link import Protocol, RobotLink, link_of
 from r2s2r_cli.errors import ExitCode, InputError
 from r2s2r_cli.rig.world import World
@@ -62,3 +63,11 @@ def test_an_imported_log_moves_no_robot(project: Path) -> None:
     assert "r2s2r import" in said and "record" not in said and "execute" not in said.replace("--of execute", "")
     said = invoke("run", "--dry-run").stderr
     assert "--port /dev/ttyUSB7 --protocol legacy" in said and "r2s2r execute" in said
+
+
+def test_examples_of_a_robot_say_how_it_talks() -> None:
+    """A real one does not talk as the rig does: without --protocol the example would end in silence."""
+    examples = [line for command in COMMANDS.values() for line in (command.__doc__ or "").splitlines()
+                if "Example:" in line and "/dev/ttyUSB" in line and " rig " not in line]  # fmt: skip
+    assert any(" record " in line for line in examples) and any(" execute " in line for line in examples)
+    assert all("--protocol legacy" in line for line in examples)

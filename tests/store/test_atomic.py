@@ -87,5 +87,12 @@ def test_the_system_s_refusals_are_said_in_words(tmp_path: Path, number: int, wh
     assert error.where and error.received and error.hint
 
 
+@pytest.mark.parametrize("number", [28, 13, 5])
+def test_a_refusal_is_looked_at_where_something_is(tmp_path: Path, number: int) -> None:
+    """The folder of the file may be what could not be made."""
+    error = disk_error(OSError(number, os.strerror(number)), tmp_path / "robot" / "exported" / "x.csv")
+    assert error.hint.endswith(f" {tmp_path}")
+
+
 def _no_links(*_: object) -> None:
     raise OSError(1, "Operation not permitted")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from r2s2r_cli.commands.identify_hints import completed
 from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_key, checkpoint_of
 
@@ -38,6 +39,27 @@ def test_another_request_is_refused(tmp_path: Path) -> None:
         CheckpointFile(path, checkpoint_key({"starts": 4}, ["sha"]), resume=True).load()
     assert another.value.hint == "r2s2r status"
     assert CheckpointFile(path, checkpoint_key({"starts": 3}, ["sha"]), resume=True).load() == VALUES
+
+
+def test_the_command_of_another_request_is_named(tmp_path: Path) -> None:
+    """Its own line goes on with it, in its iteration and from this directory; of the same line inputs or settings have
+    changed, and only a new beginning is left."""
+    path = tmp_path / "001" / "x.partial"
+    path.parent.mkdir()
+    CheckpointFile(path, "a", command=["diagnose", "--also", "2", "--json", "--force"]).save(VALUES)
+
+    def refused(*words: str) -> UsageError:
+        with pytest.raises(UsageError, match="another request") as caught:
+            CheckpointFile(path, "b", True, words).load()
+        return caught.value
+
+    other = refused("diagnose", "--project", "here", "--seed=9", "--resume")
+    assert other.hint == "r2s2r diagnose --also 2 --iteration 1 --project here --resume"
+    assert other.expected == "r2s2r diagnose --also 2 --json --force"
+    assert other.received == "r2s2r diagnose --project here --seed=9"
+    assert completed(other, ["--seed", "9", "--resume"], "r2s2r diagnose") == other.hint
+    same = refused("diagnose", "--iteration", "1", "--also=2", "--no-draw", "--resume")
+    assert "other inputs or settings" in same.received and same.hint.endswith("--also=2 --no-draw")
 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"form": 1}', '{"form": 1, "key": "a", "values": 3}', "\x00"])

@@ -17,6 +17,14 @@ from tests.guards.listing import ROOT
 SAMPLE = ROOT / "examples" / "sample-project" / "project"
 
 
+def _refused(folder: Path, monkeypatch: pytest.MonkeyPatch, typed: str) -> str:
+    """What a command that is typed in a copy of the sample project says, being wrong."""
+    monkeypatch.chdir(shutil.copytree(SAMPLE, folder / "project"))
+    result = invoke(*typed.split())
+    assert result.exit_code == 2
+    return result.stderr
+
+
 @pytest.mark.parametrize(
     ("typed", "hint"),
     [
@@ -34,10 +42,7 @@ def test_what_was_wrong_is_mended_where_it_stood(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, typed: str, hint: str
 ) -> None:
     """All else stays."""
-    monkeypatch.chdir(shutil.copytree(SAMPLE, tmp_path / "project"))
-    result = invoke(*typed.split())
-    assert result.exit_code == 2
-    assert result.stderr.endswith(f"hint: r2s2r {hint}\n")
+    assert _refused(tmp_path, monkeypatch, typed).endswith(f"hint: r2s2r {hint}\n")
 
 
 @pytest.mark.parametrize(
@@ -54,10 +59,9 @@ def test_an_argument_typed_as_an_option_becomes_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, typed: str, hint: str
 ) -> None:
     """A policy of a plan with the plan where the command asks for it; of no policy nobody knows what was meant."""
-    monkeypatch.chdir(shutil.copytree(SAMPLE, tmp_path / "project"))
-    result = invoke(*typed.split())
-    assert result.exit_code == 2 and "policies without an option" in result.stderr
-    assert result.stderr.endswith(f"hint: r2s2r {hint}\n")
+    said = _refused(tmp_path, monkeypatch, typed)
+    assert "policies without an option" in said
+    assert said.endswith(f"hint: r2s2r {hint}\n")
     if hint.startswith("simulate"):
         assert invoke(*hint.split()).exit_code == 0
 

@@ -13,19 +13,6 @@ from r2s2r_cli.views.figure import BLUE
 from tests.support.diagnosed import report
 
 
-@pytest.fixture
-def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    """What is drawn, instead of files."""
-    found: list[Figure] = []
-
-    def kept(figure: Figure) -> bytes:
-        found.append(figure)
-        return b""
-
-    monkeypatch.setattr("r2s2r_cli.views.diagnose.png_bytes", kept)
-    return found
-
-
 def gap() -> ArtifactData:
     """Two runs of two intervals; one stands out."""
     refit = np.array([0.002, 0.003, 0.1, 0.004])

@@ -27,20 +27,6 @@ def said(verdict: str, element: ElementFound | None, channel: str | None = "moto
     return report().model_copy(update={"verdict": verdict, "where": where, **update})
 
 
-@pytest.fixture
-def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    """What is drawn, instead of files."""
-    found: list[Figure] = []
-
-    def kept(figure: Figure) -> bytes:
-        found.append(figure)
-        return b""
-
-    for name in ("diagnose", "diagnose_robot", "diagnose_floor"):
-        monkeypatch.setattr(f"r2s2r_cli.views.{name}.png_bytes", kept)
-    return found
-
-
 def robot() -> ArtifactData:
     """Two rods whose first caps lie on each other from the side, as do both winched cables."""
     p = np.array([[0.0, -0.1, 0.0], [0.2, 0.0, 0.2], [0.0, 0.1, 0.0], [0.25, 0.0, 0.1]])

@@ -1,0 +1,20 @@
+"""What tests of pictures share."""
+
+from __future__ import annotations
+
+import pytest
+from matplotlib.figure import Figure
+
+
+@pytest.fixture
+def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """What the pictures of a diagnosis draw, instead of files."""
+    found: list[Figure] = []
+
+    def kept(figure: Figure) -> bytes:
+        found.append(figure)
+        return b""
+
+    for name in ("diagnose", "diagnose_robot", "diagnose_floor"):
+        monkeypatch.setattr(f"r2s2r_cli.views.{name}.png_bytes", kept)
+    return found

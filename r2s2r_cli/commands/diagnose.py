@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -126,7 +127,7 @@ def diagnose(
         with resumable(checkpoint, here.relative(unfinished), again, done="simulated"):
             result, report = run.run(
                 lambda: _compute(asked, settings, checkpoint, console, draw),
-                (lambda data, said: pictures(data, said, asked.effects)) if draw else None,
+                partial(pictures, asked=asked.effects) if draw else None,
                 lambda said: checkpoint.clear(),
             )  # fmt: skip
     show_outcome(answer(result, report), console)

@@ -15,6 +15,7 @@ from r2s2r_cli.commands.named_runs import Source, estimated, named_runs, nearest
 from r2s2r_cli.commands.outcome import require_input, require_model
 from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.project import Iteration, Project
+from schemas.config import IdentifySettings
 from schemas.header import InputRef
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 TRAIN, TEST = 1, 2
 """Codes of `schemas.identification.ROLES`."""
-TRAIN_SHARE = 0.65
+TRAIN_SHARE: float = IdentifySettings.model_fields["train_share"].default
 """Of the intervals of a run, where no identification says which are fitted."""
 
 
@@ -165,7 +166,7 @@ class Asked:
             return split(caps, self.train, self.test, TRAIN_SHARE)
         table = found.groups["segments"]
         fit, judge = (_selected(table, role, {run.name for run in runs}) for role in (TRAIN, TEST))
-        known = {name.decode() for name in table["run"].tolist()}
+        known = _runs_of(table)
         new = [run for run in runs if run.name not in known]
         added = list(whole(new))
         if added and judge:
@@ -186,7 +187,8 @@ class Asked:
         fit, judge = split([run.caps for run in runs], (), (), TRAIN_SHARE)
         if say is not None:
             words = (", ".join(f"{one.run}:{in_words(one.intervals)}" for one in part) for part in (fit, judge))
-            trained = {one.run for one in _selected(found.groups["segments"], TRAIN, None)}
+            table = found.groups["segments"]
+            trained = {one.run for one in _selected(table, TRAIN, _runs_of(table))}
             whom = "healthy runs alone" if trained <= {*self.healthy} else "none of these runs"
             said = "the identification was fitted to {}: here {} is fitted, {} judged; else say --train and --test"
             say(said.format(whom, *words))
@@ -231,14 +233,18 @@ def _unsaid(model: Identified, path: Path) -> tuple[str, ...]:
     return (f"uncertainty of {', '.join(names)}: {path.name} has none, so the refit takes its usual priors",)
 
 
-def _selected(table: Group, role: int, names: set[str] | None) -> list[Selection]:
-    """The intervals of a role, of the runs of these names or of all."""
+def _runs_of(table: Group) -> set[str]:
+    """Names of the runs in the table of segments of an identification."""
+    return {name.decode() for name in table["run"].tolist()}
+
+
+def _selected(table: Group, role: int, names: set[str]) -> list[Selection]:
     from r2s2r_cli.stages.identify.data import Selection
 
     found: dict[str, list[int]] = {}
     for run, interval, own in zip(
         table["run"].tolist(), table["interval"].tolist(), table["role"].tolist(), strict=True
     ):
-        if own == role and (names is None or run.decode() in names):
+        if own == role and run.decode() in names:
             found.setdefault(run.decode(), []).append(int(interval))
     return [Selection(run, tuple(sorted(set(numbers)))) for run, numbers in found.items()]

@@ -42,6 +42,9 @@ def score(
         typer.Option("--page", metavar="FILE", help="HTML page; default: NAME-score.html beside the verdicts, of "
                      "published files here."),
     ] = None,
+    markdown: Annotated[
+        Path | None, typer.Option("--markdown", metavar="FILE", help="Also all tables as Markdown, to be published.")
+    ] = None,
     draw: DrawOption = True,
     json: JsonOption = False,
     quiet: QuietOption = False,
@@ -74,6 +77,11 @@ def score(
         console.table(table.title, table.columns, table.rows)
     for text in result.warnings:
         console.warn(text)
+    if markdown is not None:
+        from r2s2r_cli.views.blind_markdown import blind_markdown
+
+        write_text(markdown, blind_markdown(result))
+        console.say(f"tables: {markdown}")
     if draw:
         pictures = dict(draw_blind(result))
         target = page or beside.parent / f"{beside.name}-score.html"

@@ -117,7 +117,8 @@ def _place(project: Path | None) -> Iterator[Probe]:
 
 
 def _outlets() -> Iterator[Probe]:
-    """Serial ports, and what reads a RealSense camera; the rig and TCP or UDP robots need neither."""
+    """Serial ports, and what can read a RealSense camera; the rig and TCP or UDP robots need neither. Whether there is
+    a camera is not looked at: that takes seconds and switches it on."""
     from importlib.util import find_spec
 
     from r2s2r_cli.commands.doctor_ports import machine
@@ -126,8 +127,9 @@ def _outlets() -> Iterator[Probe]:
         yield probe.model_copy(update={"state": "ok", "hint": ""}) if probe.name == NO_PORTS else probe
     modules = (("realsense", "pyrealsense2"), ("open3d", "open3d"))
     ways = [f"--camera {way}" for way, module in modules if find_spec(module)]
-    yield Probe(name="RealSense cameras", state="ok",
-                found=" or ".join(ways) if ways else "neither pyrealsense2 nor open3d is installed")  # fmt: skip
+    yield Probe(name="RealSense drivers", state="ok",
+                found=f"{' or '.join(ways)}; r2s2r doctor camera looks for one" if ways else
+                "neither pyrealsense2 nor open3d is installed")  # fmt: skip
 
 
 def _library(name: str, failed_state: str, hint: str) -> Probe:

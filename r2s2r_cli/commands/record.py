@@ -132,6 +132,7 @@ def _policies(
     from r2s2r_cli.commands.simulate_inputs import read_policies
     from r2s2r_cli.stages.record import excitation, random_targets
     from r2s2r_cli.stages.simulate.policies import sequence
+    from r2s2r_cli.views.diagnose_commands import ROBOT
 
     found = [policy for text in files for policy in read_policies(text)]
     if random is not None:
@@ -140,8 +141,7 @@ def _policies(
     if not found:
         raise UsageError("there is nothing to record", where="r2s2r record",
                          expected="a policy file, --random N or --excite NAME", received="none of them",
-                         hint="r2s2r record --random 15 --port /dev/ttyUSB0 --protocol legacy --camera realsense",
-                         )  # fmt: skip
+                         hint=f"r2s2r record --random 15 {ROBOT}")  # fmt: skip
     for policy in found:
         sequence(policy, robot)  # for this robot, before anything moves
     return found

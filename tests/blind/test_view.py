@@ -4,6 +4,7 @@ import numpy as np
 
 from r2s2r_cli.blind.score import score_of
 from r2s2r_cli.views.blind import _interval, blind_page, blind_tables, draw_blind
+from r2s2r_cli.views.blind_markdown import blind_markdown
 from schemas.results_blind import BlindRow
 from tests.support import blind_bank
 
@@ -44,3 +45,20 @@ def test_confusion_counts_every_decided_set_once() -> None:
     counts = np.array(result.confusion)
     assert counts.shape == (len(result.classes),) * 2 and np.array_equal(counts, np.diag(np.diag(counts)))
     assert counts[result.classes.index("none")].sum() == sum(one["kind"] == "none" for one in labels)
+
+
+def test_markdown_holds_the_same_tables() -> None:
+    """Every table of the terminal, cell by cell; bars and line breaks in a cell do not break its row; what was said of
+    a truth adds up to its row of the matrix."""
+    labels = blind_bank.bank(60)
+    result = score_of(blind_bank.answered(labels, blind_bank.by_chance), tier="B", bank="test|b", sets=61, index="f00")
+    text = blind_markdown(result)
+    tables = [part for part in text.split("## ") if part]
+    assert len(tables) == len(list(blind_tables(result))) + 1
+    for part, table in zip(tables, blind_tables(result), strict=False):
+        lines = [line for line in part.splitlines() if line.startswith("|")]
+        assert len(lines) == len(table.rows) + 2
+        assert {line.replace("\\|", "").count("|") for line in lines} == {len(table.columns) + 1}
+    said = [line.split(" | ")[1] for line in tables[-1].splitlines() if line.startswith("| ")][2:]
+    counts = [sum(int(one.split()[1]) for one in line.rstrip(" |").split(", ")) for line in said]
+    assert counts == [sum(row) for row in result.confusion if any(row)]

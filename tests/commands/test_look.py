@@ -193,7 +193,7 @@ def test_doctor_names_the_project_and_the_libraries(project: Path) -> None:
     assert probes["schemas"]["state"] == probes["HDF5 write and read"]["state"] == "ok"
     assert str(project) in probes["project"]["found"]
     assert "serial ports" in probes or any(name.startswith(("/dev/", "COM")) for name in probes)
-    assert probes["import mujoco"]["state"] == "ok" and "--camera open3d" in probes["RealSense cameras"]["found"]
+    assert probes["import mujoco"]["state"] == "ok" and "--camera open3d" in probes["RealSense drivers"]["found"]
     assert {probe["state"] for name, probe in probes.items() if name.startswith("import ")} <= {"ok", "warning"}
 
 

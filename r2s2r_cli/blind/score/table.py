@@ -84,7 +84,7 @@ def _why(t: Truth, s: Said) -> str:
     if t.right in s.set90:
         words.append("in the 90 % set")
     if t.channel is not None:
-        words.append("channel right" if s.channel == t.channel else f"channel {t.channel}, said {s.channel}")
+        words.append("channel right" if s.channel == t.channel else f"channel {t.channel}, said {s.channel or 'none'}")
     if t.element is not None:
         words.append(f"{t.element['kind']} {t.element['index']}")
     return ", ".join(words)

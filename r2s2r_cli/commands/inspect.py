@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,6 +15,9 @@ from r2s2r_cli.store.again import command_at
 from r2s2r_cli.store.header import HDF5_SIGNATURE, NotAnArtifact
 from schemas.header import Header
 from schemas.results import InspectResult, NodeInfo
+
+if TYPE_CHECKING:
+    from schemas.base import ArtifactSpec
 
 
 def inspect(
@@ -83,6 +87,8 @@ def _foreign(path: Path) -> InspectResult:
 
 
 def _show(result: InspectResult, console: Console) -> None:
+    from schemas.versions import KINDS
+
     if console.json:
         return
     if result.header is None:
@@ -90,12 +96,24 @@ def _show(result: InspectResult, console: Console) -> None:
     else:
         for name, text in _facts(result.header):
             console.data(f"{name:12} {text}")
-    rows = [
-        [node.path, "x".join(map(str, node.shape)) if node.shape is not None else "", node.dtype, node.unit, node.frame,
-         node.description or ", ".join(f"{k}={v}" for k, v in node.attributes.items())]
-        for node in result.nodes
-    ]  # fmt: skip
+    spec = KINDS.get(result.header["kind"]) if result.header else None
+    rows = [row for node in result.nodes for row in _rows(node, spec)]
     console.table("", ["path", "shape", "dtype", "unit", "frame", "meaning"], rows)
+
+
+def _rows(node: NodeInfo, spec: ArtifactSpec | None) -> Iterator[list[str]]:
+    """A node, and below a group its attributes, each with its value; unit and meaning where the kind is known."""
+    shape = "x".join(map(str, node.shape)) if node.shape is not None else ""
+    yield [node.path, shape, node.dtype, node.unit, node.frame, node.description]
+    group = spec.group(node.path) if spec else None
+    told = {one.name: one for one in group.attributes} if group else {}
+    for name, value in node.attributes.items():
+        known = told.get(name)
+        shown = (f"{value:.6g}" if isinstance(value, float) else str(value)) or "empty"
+        if known is None:
+            yield [f"{node.path}@{name}", "", "", "", "", shown]
+        else:
+            yield [f"{node.path}@{name}", "", known.type, known.unit, "", f"{shown} ({known.description})"]
 
 
 def _facts(header: dict[str, Any]) -> list[tuple[str, str]]:

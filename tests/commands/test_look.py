@@ -137,6 +137,15 @@ def test_inspect_shows_units_and_provenance(estimated: Path) -> None:
     assert made["inputs"][0]["sha256"] == read_header(estimated / RECORD).content_sha256
 
 
+def test_inspect_says_what_attributes_are(estimated: Path) -> None:
+    """Each has a line of its own with its value, its unit and what it is; of a file of others its value alone."""
+    words = [line.split() for line in invoke("inspect", ESTIMATE).stdout.splitlines()]
+    assert ["runs/sample@robot", "str", "1", "threebar", "(name", "of", "the"] in [line[:7] for line in words]
+    with h5py.File("foreign.h5", "w") as file:
+        file.create_group("of_others").attrs["mass"] = 1.25
+    assert "of_others@mass 1.25" in " ".join(invoke("inspect", "foreign.h5").stdout.split())
+
+
 def test_inspect_names_what_differs(estimated: Path) -> None:
     """--same-as leaves with 3 and names the datasets where the contents differ."""
     (estimated / "other.h5").write_bytes((estimated / ESTIMATE).read_bytes())

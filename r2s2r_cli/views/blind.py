@@ -135,8 +135,9 @@ def _number(row: BlindRow, value: float | None) -> str:
 
 
 def _interval(row: BlindRow) -> str:
-    low, high = _number(row, row.low), _number(row, row.high)
-    return "" if not row.n else low if low == high == "not finite" else f"{low} to {high}"
+    if not row.n or row.low is row.high is None:
+        return "" if not row.n else "not finite" if row.value is None else "too few"
+    return f"{_number(row, row.low)} to {_number(row, row.high)}"
 
 
 def _target(row: BlindRow) -> str:

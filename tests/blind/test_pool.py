@@ -64,12 +64,17 @@ def test_what_does_not_belong_together_is_refused(options: dict[str, Any], words
 
 
 def test_no_world_counts_twice(tmp_path: Path) -> None:
-    """The same file again; a set of the same name; another name for the same seed."""
+    """The same file again; a set of the same name; another name for the same seed; the same worlds seen through other
+    noise."""
     a, b = shard(tmp_path / "a", slice(0, 20)), shard(tmp_path / "b", slice(10, 30))
     c = tmp_path / "c" / "shard.json"
     made = Folder(c.parent, LABELS[:5], knows_by_number, names=["a", "b", "c", "d", "e"])
     c.write_bytes(published(opened(made.bank, made.verdicts, made.key), CODE))
-    for files in ([a, a], [a, b], [a, c]):
+    again = [one | {"observed": 1} for one in LABELS[:5]]
+    made = Folder(tmp_path / "d", again, knows_by_number, names=["f", "g", "h", "i", "j"])
+    d = tmp_path / "d" / "shard.json"
+    d.write_bytes(published(opened(made.bank, made.verdicts, made.key), CODE))
+    for files in ([a, a], [a, b], [a, c], [a, d]):
         with pytest.raises(InputError, match="counted twice"):
             score_published(files)
 

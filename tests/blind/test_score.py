@@ -8,8 +8,9 @@ import pytest
 
 from r2s2r_cli.blind.score import score_of
 from r2s2r_cli.blind.score.facts import said_of, truth_of
-from r2s2r_cli.blind.score.rows import same_element
-from r2s2r_cli.blind.score.wilson import Z95, bootstrap, wilson
+from r2s2r_cli.blind.score.rows import Metric, calibrated_error, calibration_error, row as row_of, same_element
+from r2s2r_cli.blind.score.wilson import Z95, bootstrap, of_median, wilson
+from r2s2r_cli.errors import InputError
 from schemas.results_blind import BlindRow, BlindScoreResult
 from tests.support import blind_bank
 
@@ -75,8 +76,32 @@ def test_not_shown_where_the_interval_holds_the_target() -> None:
 
 def test_an_infinite_distance_is_no_number_in_between() -> None:
     """Whoever names no place is infinitely far: a median of such stays infinite."""
-    low, high = bootstrap(np.array([0.1, math.inf, math.inf]), "median")
+    low, high = of_median(np.array([0.1, 0.2, 0.3, 0.4, math.inf, math.inf, math.inf]))
     assert low == 0.1 and high == math.inf
+
+
+@pytest.mark.parametrize("n", [6, 7, 14, 41])
+def test_the_interval_of_a_median_holds_it_in_95_percent(n: int) -> None:
+    """Of lognormal draws with the median 1; one value less on either side would hold it too seldom."""
+    rng = np.random.default_rng(n)
+    drawn = rng.lognormal(size=(4000, n))
+    held = [low <= 1.0 <= high for low, high in map(of_median, drawn)]
+    assert np.mean(held) > 0.94
+    inner = np.sort(drawn, axis=1)
+    cut = int(np.searchsorted(inner[0], of_median(drawn[0])[0]))
+    assert np.mean((inner[:, cut + 1] <= 1.0) & (inner[:, n - cut - 2] >= 1.0)) < 0.96
+
+
+@pytest.mark.parametrize("values", [[3.0], [1.0, 2.0], [1.0, 2.0, 3.0, 4.0, 5.0]])
+def test_few_values_show_nothing(values: list[float]) -> None:
+    """Five of a median lie all on one side in one of 16 trials: no interval of theirs holds it in 95 %, so a figure
+    that reaches its target does not show it."""
+    assert of_median(np.array(values)) == (-math.inf, math.inf)
+    metric = Metric("m", "m", {"B": 9.0}, lambda pair: None, "number", above=False, of="median")
+    chosen = iter(values)
+    found = row_of(replace(metric, chosen=lambda pair: next(chosen)), [None] * len(values), "B")  # type: ignore[list-item]
+    assert found.passed is True and found.shown is False and found.low is found.high is None
+    assert bootstrap(np.array([3.0])) == (-math.inf, math.inf)
 
 
 def test_elements_of_one_string_are_the_same() -> None:
@@ -94,6 +119,52 @@ def test_a_set_that_failed_is_a_miss_everywhere() -> None:
     rows = {row.name: row for row in result.rows}
     assert result.failed == 1 and rows["top1_clear"].value == 0.0 and rows["share_named"].value == 0.0
     assert result.misses[0].why == "the diagnosis broke off"
+    assert rows["channel_claimed"].value == 0.0 and rows["clear_no_gap"].value == 0.0
+
+
+def test_a_diagnosis_that_broke_off_is_no_all_clear() -> None:
+    """Where nothing is wrong it counts as an alarm, by either count."""
+    label = next(one for one in LABELS if one["kind"] == "none")
+    found = [("a", truth_of(label), said_of({"failed": "no memory", "diagnosis": {}}))]
+    rows = {row.name: row for row in score_of(found, tier="B", bank="test", sets=1, index="0").rows}
+    assert rows["false_alarm"].value == rows["false_claim"].value == 1.0
+
+
+def test_where_no_gap_is_said_no_channel_is_asked_for() -> None:
+    """Two clear sets, one said to have no gap: the row that is asked for counts both, the one beside it the other."""
+    label = next(one for one in LABELS if one["kind"] == "single" and one["d"] > 8 and one["effects"][0]["element"])
+    truth, rng = truth_of(label), np.random.default_rng(0)
+    silent = blind_bank.document("no_gap", [], {"none": 0.9, "other": 0.1}) | {"where": {}}
+    answers = (blind_bank.right(label, rng), silent)
+    found = [(str(i), truth, said_of({"diagnosis": answer})) for i, answer in enumerate(answers)]
+    rows = {row.name: row for row in score_of(found, tier="B", bank="test", sets=2, index="0").rows}
+    assert (rows["channel_clear"].value, rows["channel_claimed"].value) == (0.5, 1.0)
+    assert rows["channel_claimed"].n == 1 and rows["clear_no_gap"].value == 0.5
+
+
+def test_a_calibrated_guesser_errs_by_what_chance_gives() -> None:
+    """Probabilities that are right: the error of the guesses lies where the row beside it says, which for few sets is
+    far from nothing and for many is near it."""
+    label = next(one for one in LABELS if one["kind"] == "single" and one["d"] > 8)
+    truth = truth_of(label)
+    rng = np.random.default_rng(2)
+    chance = {}
+    for n in (60, 3000):
+        p = rng.uniform(0.3, 1.0, n)
+        names = np.where(rng.random(n) < p, str(truth.right), "wrong").tolist()
+        answers = [blind_bank.document("effect", [], {name: one}) for name, one in zip(names, p.tolist(), strict=True)]
+        pairs = [(truth, said_of({"diagnosis": answer})) for answer in answers]
+        error, chance[n] = calibration_error(pairs, "B"), calibrated_error(pairs)
+        low, high = chance[n].low, chance[n].high
+        assert low is not None and high is not None and error.value is not None and low <= error.value <= high
+    assert (chance[60].value or 0) > 4 * (chance[3000].value or 1) and chance[60].passed is None
+
+
+def test_a_set_without_d_is_not_scored() -> None:
+    """It would count as nothing wrong, and teach that."""
+    label = next(one for one in LABELS if one["kind"] == "single")
+    with pytest.raises(InputError, match="without d"):
+        truth_of(label | {"d": None})
 
 
 def test_the_90_percent_set_of_a_diagnosis_that_broke_off_holds_nothing() -> None:

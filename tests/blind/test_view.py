@@ -31,11 +31,13 @@ def test_tables_and_page_hold_every_figure() -> None:
 
 
 def test_an_interval_that_is_not_finite_says_so_once() -> None:
-    """Not `not finite to not finite`; where one end is, both are told."""
+    """Not `not finite to not finite`; where one end is, both are told; of a number without an interval that they are
+    too few."""
     row = BlindRow(name="loss", what="loss", target=None, above=False, unit="number", value=None, n=3, low=None,
                    high=None, passed=None, shown=None)  # fmt: skip
     assert _interval(row) == "not finite"
     assert _interval(row.model_copy(update={"low": 1.0})) == "1.0 to not finite"
+    assert _interval(row.model_copy(update={"value": 2.0})) == "too few"
 
 
 def test_confusion_counts_every_decided_set_once() -> None:

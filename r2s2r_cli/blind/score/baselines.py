@@ -1,7 +1,8 @@
 """Diagnosers that look at nothing, scored on the labels of the trial: what a figure is worth beside them.
 
 One guesses at random among all names, with an element, a place and an onset of another set. The others know how often
-each name is right in this very bank, which nobody could, and always say the same.
+each name is right in this very bank, which nobody could, and always say the same, with the middle of the floor, where
+every run begins, as the place.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from schemas.results_blind import BlindBaseline, Tier
 DRAWS = 20
 """Guesses a set, of the one who guesses."""
 HELD = 0.90
+MIDDLE = (0.0, 0.0)
 T = TypeVar("T", bound=Hashable)
 
 
@@ -63,7 +65,7 @@ def _always(order: Sequence[str], often: Counter[str], told: Sequence[Truth]) ->
     elements = [(one["kind"], one["index"]) for t in told if (one := t.element) is not None]
     most = _most(elements)
     return _said(tuple(order), tuple(share), tuple(order[:within]), _most(t.channel for t in told),
-                 None if most is None else {"kind": most[0], "index": most[1]},
+                 {"xy_m": MIDDLE} if most is None else {"kind": most[0], "index": most[1], "xy_m": MIDDLE},
                  _most(int(t.onset["of_set"]) for t in told if t.onset is not None))  # fmt: skip
 
 

@@ -70,12 +70,13 @@ def _alike(shards: Sequence[Shard], what: str, of: Callable[[Shard], str]) -> No
 
 
 def _apart(shards: Sequence[Shard]) -> None:
-    """Names come from key and number: two shards of one key have the same names for other worlds."""
+    """Names come from key and number: two shards of one key have the same names for other worlds. Other noise on a
+    world makes no other world: two such sets are no two trials."""
     there: dict[object, str] = {}
     for shard in shards:
         for one in shard.sets:
             seed = one.label.get("seed")
-            world = one.name if seed is None else (seed, one.label.get("observed"))
+            world = one.name if seed is None else seed
             if world in there:
                 where = there[world]
                 raise InputError(

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from r2s2r_cli.blind.score.facts import NONE, UNKNOWN, WEAK, Said, Truth
-from r2s2r_cli.blind.score.wilson import bootstrap, wilson
+from r2s2r_cli.blind.score.wilson import bootstrap, of_median, wilson
 from schemas.results_blind import BlindRow, Tier
 
 Pair = tuple[Truth, Said]
@@ -42,21 +42,39 @@ def row(metric: Metric, pairs: Sequence[Pair], tier: Tier) -> BlindRow:
         right = sum(bool(value) for value in values)
         return _row(metric, target, right / len(values), len(values), wilson(right, len(values)))
     numbers = np.array(values, dtype=float)
-    value = float(np.median(numbers) if metric.of == "median" else numbers.mean())
-    return _row(metric, target, value, len(numbers), bootstrap(numbers, metric.of))
+    if metric.of == "median":
+        return _row(metric, target, float(np.median(numbers)), len(numbers), of_median(numbers))
+    return _row(metric, target, float(numbers.mean()), len(numbers), bootstrap(numbers))
 
 
 def calibration_error(pairs: Sequence[Pair], tier: Tier) -> BlindRow:
     """Expected calibration error of the first guess over ten equal steps of probability."""
     metric = Metric("ece", "calibration error of the first guess's probability, all sets but pairs",
                     {"A": 0.07, "B": 0.10}, lambda pair: None, above=False)  # fmt: skip
-    told = [(s.probability[0], s.first == t.right) for t, s in pairs if t.right is not None and s.order]
-    if not told:
+    p, right = _guesses(pairs)
+    if not len(p):
         return _row(metric, metric.targets[tier], None, 0, None)
-    p, right = (np.array(column, dtype=float) for column in zip(*told, strict=True))
     rng = np.random.default_rng(0)
     drawn = sorted(_ece(p[i], right[i]) for i in rng.integers(0, len(p), (500, len(p))))
     return _row(metric, metric.targets[tier], _ece(p, right), len(p), (drawn[12], drawn[487]))
+
+
+def calibrated_error(pairs: Sequence[Pair]) -> BlindRow:
+    """What the calibration error of as many guesses comes to by chance where every probability is right: few sets in
+    a step are never half right. In the mean, with 95 % of what is drawn."""
+    metric = Metric("ece_calibrated", "the same error where all these probabilities were right, by chance", {},
+                    lambda pair: None)  # fmt: skip
+    p, _ = _guesses(pairs)
+    if not len(p):
+        return _row(metric, None, None, 0, None)
+    drawn = sorted(_ece(p, right) for right in np.random.default_rng(0).random((500, len(p))) < p)
+    return _row(metric, None, float(np.mean(drawn)), len(p), (drawn[12], drawn[487]))
+
+
+def _guesses(pairs: Sequence[Pair]) -> tuple[np.ndarray, np.ndarray]:
+    """Probability of the first guess, and whether it is right, of all sets but pairs."""
+    told = [(s.probability[0], s.first == t.right) for t, s in pairs if t.right is not None and s.order]
+    return np.array([p for p, _ in told], dtype=float), np.array([right for _, right in told], dtype=float)
 
 
 def coverage(pairs: Sequence[Pair], tier: Tier) -> BlindRow:
@@ -92,6 +110,11 @@ def _ece(p: np.ndarray, right: np.ndarray) -> float:
     place = np.minimum((p * BINS).astype(int), BINS - 1)
     parts = [(place == k) for k in range(BINS)]
     return float(sum(abs(p[k].sum() - right[k].sum()) for k in parts) / len(p))
+
+
+def _claimed(s: Said) -> bool:
+    """Whether it says that there is a gap; `no_gap` says where none lies."""
+    return s.verdict != "no_gap"
 
 
 def _clear(t: Truth) -> bool:
@@ -166,7 +189,13 @@ METRICS = (
            lambda p: p[0].right in p[1].order[:3] if _weak(p[0]) else None),
     Metric("channel_clear", "channel right, clear", {"A": 0.95, "B": 0.88},
            lambda p: p[1].channel == p[0].channel if _clear(p[0]) else None),
+    Metric("channel_claimed", "channel right, clear, where a gap is claimed", {},
+           lambda p: p[1].channel == p[0].channel if _clear(p[0]) and _claimed(p[1]) else None),
     Metric("element_clear", "element right, clear effects that have one", {"A": 0.90, "B": 0.80}, _element),
+    Metric("element_claimed", "element right, clear effects that have one, where a gap is claimed", {},
+           lambda p: _element(p) if _claimed(p[1]) else None),
+    Metric("clear_no_gap", "'no gap' said, clear single effects", {},
+           lambda p: not _claimed(p[1]) if _clear(p[0]) else None),
     Metric("place_clear", "distance to the middle of a patch, clear, median", {"A": 0.06, "B": 0.10}, _place, "m",
            above=False, of="median"),
     Metric("onset_clear", "target interval in which it begins right, clear effects that begin", {"A": 0.85, "B": 0.75},
@@ -174,11 +203,13 @@ METRICS = (
     Metric("false_alarm", "anything but 'no gap' where nothing is wrong", {"A": 0.05, "B": 0.10},
            lambda p: p[1].verdict != "no_gap" if p[0].kind == "none" else None, above=False),
     Metric("false_claim", "an effect, a pair or 'unknown' said where nothing is wrong", {"A": 0.05, "B": 0.10},
-           lambda p: p[1].verdict in ("effect", "pair", "unknown") if p[0].kind == "none" else None, above=False),
+           lambda p: p[1].verdict not in ("no_gap", "ambiguous") if p[0].kind == "none" else None, above=False),
     Metric("sub_floor", "'no gap' where the effect lies under the floor", {"A": 0.90, "B": 0.85},
            lambda p: p[1].verdict == "no_gap" if p[0].stratum == "sub-floor" else None),
     Metric("outside_recall", "'unknown' where no catalogue has it, clear", {"A": 0.80, "B": 0.65},
            lambda p: p[1].verdict == "unknown" if p[0].kind == "outside" and p[0].stratum == "clear" else None),
+    Metric("outside_recall_all", "'unknown' where no catalogue has it, however little it does", {},
+           lambda p: p[1].verdict == "unknown" if p[0].kind == "outside" else None),
     Metric("outside_precision", "no catalogue has it where 'unknown' is said", {"A": 0.85, "B": 0.75},
            lambda p: p[0].kind == "outside" if p[1].verdict == "unknown" else None),
     Metric("outside_channel", "channel right where 'unknown' is said rightly", {"A": 0.75, "B": 0.60},
@@ -189,7 +220,7 @@ METRICS = (
            lambda p: set(p[1].named) == set(p[0].effects) if _both(p[0]) else None),
     Metric("set_size", "size of the 90 % set, median, of diagnoses that did not break off", {"A": 2.0, "B": 3.0},
            lambda p: None if p[1].failed else float(len(p[1].set90)), "number", above=False, of="median"),
-    Metric("own_share", "own share of the floor-corrected gap where the right effect is named, clear, median",
+    Metric("own_share", "own share of the gap above the floor, right effect named and a gap left, clear, median",
            {"A": 0.80, "B": 0.60}, _own, of="median"),
     Metric("foretold", "predicted against realised own share, mean distance", {"A": 0.08, "B": 0.12}, _foretold,
            above=False),

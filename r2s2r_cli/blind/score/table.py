@@ -8,7 +8,16 @@ from typing import Any
 
 from r2s2r_cli.blind.score.baselines import baselines
 from r2s2r_cli.blind.score.facts import Said, Truth
-from r2s2r_cli.blind.score.rows import BINS, CLASSES_LAST, CONTROL, METRICS, calibration_error, coverage, row
+from r2s2r_cli.blind.score.rows import (
+    BINS,
+    CLASSES_LAST,
+    CONTROL,
+    METRICS,
+    calibrated_error,
+    calibration_error,
+    coverage,
+    row,
+)
 from r2s2r_cli.blind.score.splits import splits
 from schemas.results_blind import BlindBin, BlindMiss, BlindRecall, BlindScoreResult
 
@@ -20,7 +29,7 @@ def score_of(
     """The table of truths and verdicts by name. shuffled: of the negative control, in which nothing is true."""
     pairs = [(t, s) for _, t, s in found]
     rows = [row(metric, pairs, tier) for metric in ((CONTROL,) if shuffled else METRICS)]
-    rows += [] if shuffled else [coverage(pairs, tier), calibration_error(pairs, tier)]
+    rows += [] if shuffled else [coverage(pairs, tier), calibration_error(pairs, tier), calibrated_error(pairs)]
     classes, confusion = _confusion(pairs)
     return BlindScoreResult(
         tier=tier, bank=bank, sets=sets, scored=len(found), failed=sum(s.failed for _, s in pairs), index_sha256=index,

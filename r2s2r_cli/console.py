@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.errors import InputError, R2S2RError
 
@@ -51,7 +51,7 @@ class Console:
     def document(self, result: BaseModel) -> None:
         """The command's one JSON document, if --json was given."""
         if self.json:
-            out(result.model_dump_json(by_alias=True, indent=2))
+            out(_as_json(result))
 
     def raw(self, text: str) -> None:
         """Text on stdout that is data in both forms."""
@@ -182,6 +182,26 @@ class _Lines:
         self.say(f"{part}: {done} of {total} after {now - self.begun:.0f} s{left}{beside}")
 
 
+def _as_json(result: BaseModel) -> str:
+    """The document as text. A name that is not UTF-8 holds half characters, which JSON has no form for: they become
+    `\\udcff` and the like, as on the other stream."""
+    from pydantic_core import PydanticSerializationError, to_json
+
+    try:
+        return result.model_dump_json(by_alias=True, indent=2)
+    except PydanticSerializationError:
+        return to_json(_whole_characters(result.model_dump(mode="json", by_alias=True)), indent=2).decode()
+
+
+def _whole_characters(value: Any) -> Any:
+    """The same, of dicts, lists and plain values, with every half character of its texts written out."""
+    if isinstance(value, str):
+        return value.encode("utf-8", "backslashreplace").decode("utf-8")
+    if isinstance(value, dict):
+        return {_whole_characters(key): _whole_characters(item) for key, item in value.items()}
+    return [_whole_characters(item) for item in value] if isinstance(value, list) else value
+
+
 def print_error(error: R2S2RError, *, as_json: bool) -> None:
     """The error on stderr for people, and with --json as the document on stdout as well; a stream that takes no more
     is left out: what went wrong may be just that."""
@@ -193,6 +213,6 @@ def print_error(error: R2S2RError, *, as_json: bool) -> None:
             received=error.received, hint=error.hint,
         )  # fmt: skip
         with suppress(PipeClosed, InputError):
-            out(document.model_dump_json(by_alias=True, indent=2))
+            out(_as_json(document))
     with suppress(OSError):
         print("\n".join([f"error: {error.what}", *error.lines()[1:]]), file=sys.stderr)

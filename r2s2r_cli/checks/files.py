@@ -43,12 +43,12 @@ def values_allowed(reading: Reading) -> Iterator[Found]:
     Reading,
     what="this r2s2r knows the kind of the artifact, and its schema version or a migration from it",
     why="a newer version may mean something else by the same name; guessing would be silent damage",
-    fix="pip install --upgrade r2s2r",
+    fix="git pull && pip install -e .   # in your clone of r2s2r",
 )
 def version_known(reading: Reading) -> Iterator[Found]:
     """An artifact of a newer r2s2r."""
     for error in reading.refused if reading.newer else ():
-        yield Found(error.where, error.what, error.expected, error.received)
+        yield Found(error.where, error.what, error.expected, error.received, error.hint)
 
 
 @check(

@@ -91,7 +91,7 @@ def robot_is_the_projects(links: Links) -> Iterator[Found]:
     Links,
     what="the stage that made it is not newer than this r2s2r knows",
     why="this r2s2r would make something else from the same input, and call the newer result stale",
-    fix="pip install --upgrade r2s2r",
+    fix="git pull && pip install -e .   # in your clone of r2s2r",
 )
 def stage_not_newer(links: Links) -> Iterator[Found]:
     """Made by a newer r2s2r of the same schema version."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,7 +25,7 @@ from r2s2r_cli.store.project import Project
 from schemas.header import InputRef
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from r2s2r_cli.artifact import ArtifactData
     from r2s2r_cli.stages.calibrate import Source
@@ -217,12 +218,19 @@ def _show(report: CalibrationReport, console: Console, *, applied: bool) -> None
     for text in report.warnings:
         console.warn(text)
     if report.changes.empty:
-        names = ", ".join(s.name for s in report.sets)
-        if names and report.used is None:
-            console.hint(f"r2s2r calibrate --points ... --use SET   # SET one of: {names}")
+        if report.sets and report.used is None:
+            console.hint(_with_set([one.name for one in report.sets]))
         return
     if applied:
         what = [f"{len(report.changes.sensors)} sensor lines" if report.changes.sensors else "",
                 "the tendon curve" if report.changes.tendon else "",
                 f"the parts of {len(report.changes.rods)} rods" if report.changes.rods else ""]  # fmt: skip
         console.say(f"robot.toml has new numbers: {', '.join(filter(None, what))}")
+
+
+def _with_set(names: Sequence[str]) -> str:
+    """The command as typed, with a set of the points that goes into robot.toml."""
+    from r2s2r_cli.commands.typed import typed_words
+
+    others = f"   # or --use {' | '.join(names[1:])}" if names[1:] else ""
+    return shlex.join(["r2s2r", *typed_words("calibrate"), "--use", names[0]]) + others

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from r2s2r_cli.commands.compare_models import learned_names, require_current
 from r2s2r_cli.commands.outcome import require_input, require_model
 from r2s2r_cli.errors import InputError, UsageError, quoted
-from r2s2r_cli.store.project import Iteration, Project
+from r2s2r_cli.store.project import Iteration, Project, iteration_number
 from schemas.header import InputRef
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 INITIAL = "initial"
 """Name of the simulator with the numbers of robot.toml."""
+TAKEN = ("real", "real robot", "floor")
+"""What tables and pictures call what is no simulator."""
 TRAIN = 1
 """Code of `schemas.identification.ROLES`."""
 
@@ -67,21 +70,30 @@ class Asked:
 
     @cached_property
     def files(self) -> dict[str, Path]:
-        """Identifications by the name of their simulator. Raises UsageError for two of one name."""
+        """Identifications by the name of their simulator. Raises UsageError for two of one name, for none, and for a
+        name that stands for the robot or its floor."""
         if not self.models:
             earlier = [place for place in self.project.iterations() if place.number <= self.iteration.number]
             paths = [(place, place.artifact("identification")) for place in earlier]
             return {f"iteration {place.number}": path for place, path in paths if path.exists()}
         found: dict[str, Path] = {}
         for text in self.models:
-            name, equals, typed = text.rpartition("=")
-            if not typed:
+            name, path = _split(text)
+            if path is None:
                 raise self._without_file(text)
-            path = Path(typed)
-            name = name if equals else f"iteration {int(path.parent.name)}" if path.parent.name.isdigit() else path.stem
+            if name is None:
+                number = iteration_number(path.parent)
+                name = path.stem if number is None else f"iteration {number}"
+            if not name.strip():
+                raise UsageError("a simulator has no name", where="--model", expected="FILE or NAME=FILE",
+                                 received=text, hint=f"--model {quoted(path)}")  # fmt: skip
             if name in found or name == INITIAL:
                 raise UsageError("two simulators would have the same name", where="--model", expected="a name for each",
-                                 received=name, hint="--model first=a.h5 --model second=b.h5")  # fmt: skip
+                                 received=text, hint=_named(name, path, found))  # fmt: skip
+            if name.strip().casefold() in TAKEN:
+                raise UsageError("the name is that of no simulator in tables and pictures", where="--model",
+                                 expected=f"another name than {' | '.join(TAKEN)}", received=text,
+                                 hint=_named("simulated", path, found))  # fmt: skip
             found[name] = path
         return found
 
@@ -92,7 +104,7 @@ class Asked:
         there = [os.path.relpath(path) for one in places if (path := one.artifact("identification")).exists()]
         return UsageError(
             "a simulator has no file", where="--model", expected="FILE or NAME=FILE", received=text or "nothing",
-            hint=f"--model {quoted(text + there[-1])}" if there else "r2s2r identify",
+            hint=f"--model {quoted(text.removeprefix('=') + there[-1])}" if there else "r2s2r identify",
         )  # fmt: skip
 
     def refs(self) -> list[InputRef]:
@@ -150,7 +162,7 @@ class Asked:
         for name, path in self.files.items():
             header, data = read_artifact(path, "identification")
             said += [f"simulator {name}: {text}" for text in require_current(self.project, name, path, header)]
-            called = learned_names(self.project, header)
+            called = learned_names(self.project, path, header)
             segments = data.groups["segments"]
             roles = zip(segments["run"].tolist(), segments["role"].tolist(), strict=True)
             trained = {run.decode() for run, role in roles if role == TRAIN}
@@ -178,3 +190,21 @@ class Asked:
             return None
         group = read_artifact(self.floor, "floor")[1].groups.get("caps")
         return None if group is None else float(group.attributes["floor"])
+
+
+def _split(text: str) -> tuple[str | None, Path | None]:
+    """Name and file of FILE or NAME=FILE; None for one that is not given. Both may hold `=`: a file that is there
+    decides, else the first sign does."""
+    if "=" not in text or Path(text).is_file():
+        return None, Path(text) if text else None
+    parts = text.split("=")
+    ways = [("=".join(parts[:i]), "=".join(parts[i:])) for i in range(1, len(parts))]
+    name, file = next((way for way in ways if Path(way[1]).is_file()), ways[0])
+    return name, Path(file) if file else None
+
+
+def _named(name: str, path: Path, others: Collection[str]) -> str:
+    """The option with a name that no other simulator has: this one, else with a number."""
+    names = (name, *(f"{name}-{number}" for number in range(2, len(others) + 4)))
+    free = next(one for one in names if one not in others and one != INITIAL)
+    return f"--model {quoted(f'{free}={path}')}"

@@ -8,7 +8,7 @@ from pathlib import Path
 from r2s2r_cli.commands.wanted import robot_part
 from r2s2r_cli.errors import InputError, R2S2RError
 from r2s2r_cli.store.header import read_header
-from r2s2r_cli.store.project import Project
+from r2s2r_cli.store.project import Project, iteration_number
 from r2s2r_cli.store.staleness import differences, input_reasons
 from schemas.header import Header
 from schemas.versions import STAGE_VERSIONS
@@ -25,12 +25,12 @@ def require_current(project: Project, name: str, path: Path, header: Header) -> 
     if made.stage_version != now:
         wrong.insert(0, f"made by version {made.stage_version} of identify, this is {now}")
     if wrong:
-        number = path.parent.name
+        number = iteration_number(path.parent)
         raise InputError(
             f"the simulator {name} is stale: its numbers are those of another robot or version",
             where=project.relative(path), expected="an identification with this robot.toml and this r2s2r",
             received="; ".join(wrong[:3]) + (f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""),
-            hint="r2s2r identify" + (f" --iteration {int(number)}" if number.isdigit() else ""),
+            hint="r2s2r identify" + ("" if number is None else f" --iteration {number}"),
         )  # fmt: skip
     if not path.resolve().is_relative_to(project.root):
         return []  # of another project: its inputs are not here
@@ -48,17 +48,25 @@ def not_told(warnings: Sequence[str], told: Sequence[str]) -> list[str]:
     return [text for text in warnings if not again(text)]
 
 
-def learned_names(project: Project, header: Header) -> dict[tuple[str, str], str]:
+def learned_names(project: Project, model: Path, header: Header) -> dict[tuple[str, str], str]:
     """What `identify` called the runs of its estimates: by path of the estimate and name of the run there.
 
     Runs of the main iteration (that of the first input) keep their names, others are called NNN-RUN; a name that is
-    taken becomes executed-NAME. An estimate that cannot be read any more is left out.
+    taken becomes executed-NAME. An estimate that cannot be read any more is left out. model: the identification's file.
+    What one from elsewhere learned from is here only where the recording or the estimate is the same: in another
+    project others lie at the same places. In this one what was estimated anew still are the runs it learned from.
     """
-    estimates = [ref.path for ref in header.provenance.inputs if ref.kind == "estimate"]
+    foreign = not model.resolve().is_relative_to(project.root)
+    inputs = header.provenance.inputs
+    here = {Path(ref.path).parent for ref in inputs if not foreign or not input_reasons(project, ref)}
+    estimates = [ref for ref in inputs if ref.kind == "estimate"]
     found: dict[tuple[str, str], str] = {}
     taken: set[str] = set()
-    for path in estimates:
-        same = Path(path).parent.name == Path(estimates[0]).parent.name
+    for ref in estimates:
+        path = ref.path
+        if Path(path).parent not in here:
+            continue
+        same = Path(path).parent.name == Path(estimates[0].path).parent.name
         try:
             held = read_header(project.root / path).datasets
         except R2S2RError:

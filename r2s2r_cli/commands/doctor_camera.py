@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from r2s2r_cli.commands.typed import typed_words
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import R2S2RError, UsageError
+from r2s2r_cli.errors import InputError, R2S2RError, UsageError
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 
 if TYPE_CHECKING:
@@ -73,16 +74,22 @@ def camera(
     if save and not boxes:
         raise UsageError("there is nothing to save", where="--save", expected="--click or --box, on a cap of each rod",
                          received="neither", hint="r2s2r doctor camera --preview see.png")  # fmt: skip
+    command = shlex.join(["r2s2r", "doctor", "camera", "--camera", source,
+                          *(["--project", str(project)] if project else [])])  # fmt: skip
     device = camera_of(source)
     with device:
         taken, statistics = _take(device, frames, console)
-        looked = look(
-            taken, name=device.name, lens=device.intrinsics, depth_scale=device.depth_scale, rate_hz=device.rate_hz,
-            robot=robot, statistics=statistics, boxes=boxes,
-        )  # fmt: skip
+        try:
+            looked = look(
+                taken, name=device.name, lens=device.intrinsics, depth_scale=device.depth_scale, rate_hz=device.rate_hz,
+                robot=robot, statistics=statistics, boxes=boxes,
+            )  # fmt: skip
+        except InputError as error:  # a mark beside the caps: without the marks, which would be refused again
+            error.hint = f"{command} --preview see.html   # what the camera sees; takes clicks on the caps"
+            raise
     result = looked.result
     if preview is not None:
-        _draw(looked, device, preview, f"r2s2r doctor camera --camera {shlex.quote(source)}")
+        _draw(looked, device, preview, command)
         result = result.model_copy(update={"preview": str(preview)})
     if save and path is not None:
         _save(path, looked, len(boxes))
@@ -95,10 +102,15 @@ def camera(
         console.data(f"colour ranges written: {result.saved}")
     for remark in looked.remarks:
         console.warn(remark)
-    if any(rod.measured for rod in result.rods) and not save:
-        console.hint("the same command with --save writes the measured ranges into robot.toml")
+    if any(rod.measured for rod in result.rods) and not save and path is not None:
+        console.hint(_typed("--save") + "   # writes the measured ranges into robot.toml")
     elif preview is None:
-        console.hint("--preview see.html shows what the camera sees, and takes clicks on the caps")
+        console.hint(_typed("--preview", "see.html") + "   # what the camera sees; takes clicks on the caps")
+
+
+def _typed(*more: str) -> str:
+    """The command as typed, with more words."""
+    return shlex.join(["r2s2r", "doctor", "camera", *typed_words("doctor")[2:], *more])
 
 
 def _robot(project: Path | None, *, needed: bool) -> tuple[Path | None, Robot | None]:
@@ -136,7 +148,8 @@ def _take(device: Camera, count: int, console: Console) -> tuple[list[Frame], Fe
     if not found:
         raise CameraError(
             "the camera gives no frame", where=device.name, expected=f"{device.rate_hz:g} a second",
-            received=f"none in {PATIENCE_S:g} s", hint="look at its cable and at its own messages",
+            received=f"none in {PATIENCE_S:g} s",
+            hint="r2s2r doctor   # what can read a camera; look at its cable and at its own messages",
         )  # fmt: skip
     return found, statistics
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from enum import StrEnum
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -62,33 +63,42 @@ def export(
     if run and to not in (Format.TRAJECTORY, Format.POLICY):
         raise UsageError("only trajectory and policy take one run", where="--run", expected="--to trajectory | policy",
                          received=f"--to {to}", hint=f"r2s2r export {quoted(path)} --to {to}")  # fmt: skip
-    files = _robot_files(path, set_ or []) if to == Format.MJCF else _artifact_files(path, to, run)
-    written = [_write(out / name, content, force) for name, content in files]
+    names, files = _robot_files(path, set_ or []) if to == Format.MJCF else _artifact_files(path, to, run)
+    _require_free([out / name for name in names], out, force)
+    written = [_write(out / name, content) for name, content in files]
     console.document(ExportResult(source=str(path), format=to, files=tuple(map(str, written))))
     for name in written:
         console.data(str(name))
 
 
-def _robot_files(path: Path, overrides: list[str]) -> Iterable[tuple[str, bytes]]:
+_Files = tuple[Sequence[str], Iterable[tuple[str, bytes]]]
+"""Names of the files, and each with its content, made when it is written: of pictures only one at a time fits."""
+
+
+def _robot_files(path: Path, overrides: list[str]) -> _Files:
     from r2s2r_cli.commands.export_mjcf import mjcf_file
 
-    return [mjcf_file(path, overrides)]
+    name, content = mjcf_file(path, overrides)
+    return [name], [(name, content)]
 
 
-def _artifact_files(path: Path, to: Format, run: str | None) -> Iterable[tuple[str, bytes]]:
+def _artifact_files(path: Path, to: Format, run: str | None) -> _Files:
+    from r2s2r_cli.stages.export.tables import csv_files, csv_names
     from r2s2r_cli.store.read import read_artifact
-
-    header, data = read_artifact(path, blobs=to == Format.CSV)
-    return _files(path, to, run, header, data)
-
-
-def _files(path: Path, to: Format, run: str | None, header: Header, data: ArtifactData) -> Iterable[tuple[str, bytes]]:
-    from r2s2r_cli.stages.export.logs import policy_file, trajectory_files
-    from r2s2r_cli.stages.export.tables import csv_files, npz_file
     from schemas.versions import KINDS
 
+    header, data = read_artifact(path, blobs=to == Format.CSV)
     if to == Format.CSV:
-        return csv_files(data, KINDS[header.kind], path.stem)
+        asked = (data, KINDS[header.kind], path.stem)
+        return csv_names(*asked), csv_files(*asked)
+    files = _few_files(path, to, run, header, data)
+    return [name for name, _ in files], files
+
+
+def _few_files(path: Path, to: Format, run: str | None, header: Header, data: ArtifactData) -> list[tuple[str, bytes]]:
+    from r2s2r_cli.stages.export.logs import policy_file, trajectory_files
+    from r2s2r_cli.stages.export.tables import npz_file
+
     if to == Format.NPZ:
         return [npz_file(data, path.stem, header.model_dump_json())]
     if header.kind != "recording":
@@ -99,13 +109,29 @@ def _files(path: Path, to: Format, run: str | None, header: Header, data: Artifa
         raise UsageError("there is no such run", where=str(path), expected=" | ".join(data.runs()), received=run,
                          hint=f"r2s2r inspect {quoted(path)}")  # fmt: skip
     if to == Format.POLICY:
-        return [policy_file(data, name) for name in runs]
-    return [file for name in runs for file in trajectory_files(data, name)]
+        return [policy_file(data, name, source=str(path)) for name in runs]
+    return [file for name in runs for file in trajectory_files(data, name, source=str(path))]
 
 
-def _write(path: Path, content: bytes, force: bool) -> Path:
-    if path.exists() and not force:
-        raise UsageError("the file is in the way", where=str(path), expected="a new file", received="one that exists",
-                         hint="give another --out, or --force to overwrite it")  # fmt: skip
+def _require_free(targets: Iterable[Path], out: Path, force: bool) -> None:
+    """Before the first is written: files of two exports beside each other would look like one. Raises UsageError."""
+    for path in targets:
+        if path.is_dir() or (path.exists() and not force):
+            raise UsageError("the file is in the way", where=str(path), expected="a new file",
+                             received="a directory" if path.is_dir() else "one that exists",
+                             hint=f"--out {quoted(_unused(out))}   # or with --force: it is overwritten")  # fmt: skip
+
+
+def _unused(out: Path) -> Path:
+    """A directory beside `out` that is not there yet; of the working directory one in it."""
+    first = out / "exported" if not out.name else out
+    return next(path for number in count(1) if not (path := _numbered(first, number)).exists())
+
+
+def _numbered(path: Path, number: int) -> Path:
+    return path if number == 1 else path.with_name(f"{path.name}-{number}")
+
+
+def _write(path: Path, content: bytes) -> Path:
     write_bytes(path, content)
     return path

@@ -16,6 +16,7 @@ def read_numbers(project: Project, path: Path) -> ArtifactData:
     """The identification at `path`. Raises ArtifactError; InputError where robot.toml was changed since, in a part that
     the numbers depend on: they would then be mixed with others; or where another version of `identify` made them."""
     from r2s2r_cli.commands.wanted import robot_part
+    from r2s2r_cli.store.project import iteration_number
     from r2s2r_cli.store.read import read_artifact
     from schemas.versions import STAGE_VERSIONS
 
@@ -23,8 +24,8 @@ def read_numbers(project: Project, path: Path) -> ArtifactData:
     made = header.provenance
     if made.stage != "identify":
         return data
-    number = path.resolve().parent.name
-    again = f"r2s2r identify --iteration {int(number)}" if number.isdigit() else "r2s2r identify"
+    number = iteration_number(path.resolve().parent)
+    again = "r2s2r identify" + ("" if number is None else f" --iteration {number}")
     version = STAGE_VERSIONS["identify"]
     if made.stage_version != version:
         raise InputError(

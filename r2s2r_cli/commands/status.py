@@ -161,10 +161,13 @@ def _state(
 
 
 def _mends(error: ArtifactError, path: Path, name: str) -> str:
-    """What brings a damaged artifact back, or, where there is nothing in it or its end is gone, makes it again."""
+    """What brings a damaged artifact back, or, where there is nothing in it or its end is gone, makes it again; of one
+    that the system does not let us read, what shows why."""
     from r2s2r_cli.store.again import command_at
     from r2s2r_cli.store.verify import find_body
 
+    if isinstance(error.__cause__, OSError):  # what may not be read, `recover` may not read either
+        return error.hint
     if isinstance(error, CutOff) and command_at(path):
         return error.hint
     nothing = isinstance(error, NotAnArtifact) and find_body(path) is None

@@ -26,15 +26,18 @@ def whole(error: R2S2RError, arguments: Sequence[str]) -> str:
 
 def _placed(arguments: Sequence[str], name: str, value: str, error: R2S2RError) -> list[str]:
     key, received = value.partition("=")[0], error.received
-    wrong = {received, key, f"{key.rpartition('.')[0]}.{received}", error.where.removeprefix(f"{name} ")}
+    named = error.where.removeprefix(f"{name} ")
+    keys = {received, key, f"{key.rpartition('.')[0]}.{received}", named}
     found = list(arguments)
-    places: list[tuple[bool, int, bool]] = []
+    places: list[tuple[int, int, bool]] = []
     for i, word in enumerate(found):
         option, equals, behind = word.partition("=")
         at, given = (i, behind) if equals else (i + 1, found[i + 1] if i + 1 < len(found) else "")
-        exact = bool({given, given.partition("=")[0].strip()} & wrong)
-        if option == name and (exact or "=" not in value):
-            places.append((not exact, at, bool(equals)))
+        given_key = given.partition("=")[0].strip()
+        # What was received as it stands is the wrong one, though another has the same key.
+        rank = 0 if given in (received, named) else 1 if given_key == named else 2 if given_key in keys else 3
+        if option == name and (rank < 3 or "=" not in value):
+            places.append((rank, at, bool(equals)))
     if not places:
         return [*found, name, value]
     _, at, joined = min(places)  # the one that was wrong, else the first of that name

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from r2s2r_cli.store.project import ITERATIONS, root_of
+from r2s2r_cli.store.project import ITERATIONS, iteration_number, root_of
 from schemas.header import Provenance
 from schemas.versions import KINDS, STAGE_VERSIONS
 
@@ -55,9 +55,10 @@ def command_at(path: Path) -> str:
         return ""
     words = ["r2s2r", BARE[kind.kind]]
     if kind.level == "iteration":
-        if path.parent.parent != root / ITERATIONS or not path.parent.name.isdigit():
+        number = iteration_number(path.parent)
+        if path.parent.parent != root / ITERATIONS or number is None:
             return ""
-        words += [*(["--of", "execute"] * (path.name == kind.executed)), "--iteration", str(int(path.parent.name))]
+        words += [*(["--of", "execute"] * (path.name == kind.executed)), "--iteration", str(number)]
     elif path.parent != root:
         return ""
     return shlex.join([*words, *([] if Path.cwd().is_relative_to(root) else ["--project", os.path.relpath(root)])])
@@ -80,8 +81,9 @@ def command_again(made: Provenance, artifact: Path, *, force: bool = False, dry_
     words += [word for option, key, usual in options for word in _typed(option, flags.get(key), usual)]
     words += [word for key, value in made.overrides.items() for word in ("--set", f"{key}={_toml(value)}")]
     folder = artifact.resolve().parent
-    if folder.parent.name == ITERATIONS and folder.name.isdigit():
-        words += ["--iteration", str(int(folder.name))]
+    number = iteration_number(folder)
+    if folder.parent.name == ITERATIONS and number is not None:
+        words += ["--iteration", str(number)]
     return shlex.join([*words, *(["--force"] if force else []), *(["--dry-run"] if dry_run else [])])
 
 

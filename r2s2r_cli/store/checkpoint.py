@@ -12,6 +12,7 @@ from typing import Any
 from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.atomic import PARTIAL, write_text
 from r2s2r_cli.store.canonical import json_sha256
+from r2s2r_cli.store.project import iteration_number
 
 _FORM = 1
 
@@ -86,8 +87,8 @@ def of_another(checkpoint: Path, command: Sequence[str]) -> UsageError:
         return UsageError(what, where=where, expected="the inputs, settings and options that it was made with",
                           received="others" if typed is None else "the same command, with other inputs or settings",
                           hint=begin_anew(command))  # fmt: skip
-    folder = checkpoint.resolve().parent.name
-    place = ["--iteration", str(int(folder))] if folder.isdigit() else []
+    number = iteration_number(checkpoint.resolve().parent)
+    place = [] if number is None else ["--iteration", str(number)]
     project = [word for option in _options(command) if option[0] == "--project" for word in option]
     words = [word for option in _options(typed) if option[0] not in _MANNER for word in option]
     return OtherRequest(

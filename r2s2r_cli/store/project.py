@@ -185,6 +185,12 @@ def _is_iteration(name: str) -> bool:
     return re.fullmatch(r"\d{3,}", name) is not None and name == f"{int(name):03d}"
 
 
+def iteration_number(folder: Path) -> int | None:
+    """The number that a folder is called by, `iterations/007` or any other; None where its name is no number. The
+    digits of ASCII alone: `²` is one for `str.isdigit`, and none for `int`."""
+    return int(folder.name) if folder.name.isascii() and folder.name.isdigit() else None
+
+
 def _into(folder: Path) -> str:
     """How to come to a project from a folder above it: into the first one that lies there, else by a new one."""
     try:

@@ -20,6 +20,7 @@ from r2s2r_cli.store.hdf5_errors import translate
 from r2s2r_cli.store.header import CutOff, body_sha256, mends_cut_off, read_header
 from r2s2r_cli.store.isolated import IsolatedReader
 from r2s2r_cli.store.layout import BLOB_BYTES, BLOB_OFFSET
+from r2s2r_cli.store.newer import newer_r2s2r
 from schemas.header import Header
 from schemas.results import NodeInfo
 from schemas.versions import KINDS, NoMigration, chain
@@ -137,7 +138,7 @@ def _check_kind(path: Path, header: Header, kind: str | None) -> None:
             where=str(path),
             expected=kind or " | ".join(KINDS),
             received=header.kind,
-            hint=f"r2s2r inspect {quoted(path)}",
+            hint=f"r2s2r inspect {quoted(path)}" if header.kind in KINDS else newer_r2s2r(),
         )
 
 
@@ -150,7 +151,7 @@ def _check_version(path: Path, header: Header) -> None:
             where=str(path),
             expected=f"version {KINDS[header.kind].version} of kind {header.kind}, or one that migrates to it",
             received=str(error),
-            hint="pip install --upgrade r2s2r",
+            hint=newer_r2s2r(),
         ) from error
 
 

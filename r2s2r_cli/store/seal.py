@@ -18,6 +18,7 @@ from r2s2r_cli.store.atomic import keep_beside
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.journal import Field, JournalHead, Stream
 from r2s2r_cli.store.journal_read import fixed_place, read_field, read_head, records, torn_at, unwatched
+from r2s2r_cli.store.newer import newer_r2s2r
 from r2s2r_cli.store.read import checked_header, length
 from r2s2r_cli.store.write import write_artifact
 from schemas.header import Header, Provenance
@@ -132,7 +133,7 @@ def _provenance(journal: Path, head: JournalHead) -> Provenance:
             where=str(journal),
             expected="a kind, version and provenance that this r2s2r knows",
             received=" ".join(str(error).split())[:200],
-            hint="pip install --upgrade r2s2r",
+            hint=newer_r2s2r(),
         ) from error
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group, Scalar
-from r2s2r_cli.views.figure import BLUE, GREEN, ORANGE, PURPLE, new_figure, png_bytes, rod_color
+from r2s2r_cli.views.figure import BLUE, GREEN, ORANGE, PURPLE, as_typed, new_figure, png_bytes, rod_color
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +26,7 @@ def model_color(k: int) -> str:
 
 def draw_comparison(data: ArtifactData) -> Iterator[tuple[str, bytes]]:
     """(run, PNG) of every run."""
-    names = [name.decode() for name in data.groups["models"]["name"].tolist()]
+    names = [as_typed(name.decode()) for name in data.groups["models"]["name"].tolist()]
     for run in data.runs():
         real, simulated = data.groups[f"runs/{run}/real"], data.groups[f"runs/{run}/simulated"]
         figure = new_figure(_WIDTH, _HEIGHT)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from r2s2r_cli.views.compare import MODELS
 from r2s2r_cli.views.compare_tables import MEASURES, TRAINED
-from r2s2r_cli.views.figure import new_figure, png_bytes
+from r2s2r_cli.views.figure import as_typed, new_figure, png_bytes
 from r2s2r_cli.views.page import PageTable
 from schemas.results_compare import CompareHistory, CompareReport
 
@@ -83,7 +83,7 @@ def _panel(axes: Axes, report: CompareReport, name: str, models: list[str]) -> N
             axes.axhline(scale * floor, color=color, lw=1.2, ls=":")
     axes.plot([], [], "o", color="gray", mfc="white", mew=1.6, label="the simulator learned from them")
     axes.plot([], [], ":", color="gray", label="floor")
-    axes.set_xticks(range(len(models)), models, rotation=20, ha="right")
+    axes.set_xticks(range(len(models)), [as_typed(model) for model in models], rotation=20, ha="right")
     axes.set_xlim(-0.4, len(models) - 0.6)
     axes.set_ylim(0, 1.1 * axes.get_ylim()[1])
     axes.set_title(words.replace(", command replay", "").replace(" [", "\n["), fontsize=10)

@@ -9,7 +9,7 @@ import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.compare import REAL, model_color
-from r2s2r_cli.views.figure import new_figure, png_bytes, rod_color
+from r2s2r_cli.views.figure import as_typed, new_figure, png_bytes, rod_color
 from r2s2r_cli.views.simulation_scene import BOTTOM, TOP, depth, screen
 from schemas.robot import Robot
 
@@ -24,7 +24,7 @@ _GRID_M = 0.1
 
 def draw_strips(data: ArtifactData, robot: Robot) -> Iterator[tuple[str, bytes]]:
     """(run, PNG) of every run: the real robot above, a row a simulator below it, the real one's rods behind in grey."""
-    names = [name.decode() for name in data.groups["models"]["name"].tolist()]
+    names = [as_typed(name.decode()) for name in data.groups["models"]["name"].tolist()]
     for run in data.runs():
         real, simulated = data.groups[f"runs/{run}/real"], data.groups[f"runs/{run}/simulated"]
         yield run, _strip(run, real, simulated, names, robot)

@@ -51,6 +51,11 @@ def texts(group: Group, name: str) -> list[str]:
     return [bytes(value).decode() for value in group[name]]
 
 
+def as_typed(name: str) -> str:
+    """A name that somebody chose, for a picture: between two `$` matplotlib would read formulas, or refuse them."""
+    return name.replace("$", r"\$")
+
+
 def rod_color(cap: int) -> str:
     """Colour of the rod that `cap` belongs to."""
     return ROD_COLORS[cap // 2 % len(ROD_COLORS)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import tomllib
 from pathlib import Path
 
@@ -41,13 +42,18 @@ def sensor_zero() -> dict[str, float]:
     return found
 
 
-def test_of_several_sets_none_is_chosen(points: Path) -> None:
-    """Without --use robot.toml stays as it is, byte for byte, and the hint names the sets."""
+def test_of_several_sets_none_is_chosen(points: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without --use robot.toml stays as it is, byte for byte; the hint names the sets and, pasted, uses one."""
     before = Path("robot.toml").read_bytes()
-    result = invoke("calibrate", "--points", "points.csv", "--no-draw")
+    typed = ["calibrate", "--points", "points.csv", "--no-draw"]
+    monkeypatch.setattr("sys.argv", ["r2s2r", *typed])
+    result = invoke(*typed)
     assert result.exit_code == 0
-    assert "monday" in result.stderr.splitlines()[-1]
     assert Path("robot.toml").read_bytes() == before
+    mended = shlex.split(result.stderr.splitlines()[-1], comments=True)[2:]
+    assert mended == [*typed, "--use", "monday"] and "   # or --use friday" in result.stderr
+    assert invoke(*mended).exit_code == 0
+    assert sensor_zero()["offset_f"] == pytest.approx(OFFSET_PF * 1e-12, rel=1e-3)
 
 
 def test_the_chosen_set_goes_into_robot_toml(points: Path) -> None:

@@ -19,6 +19,11 @@ from tests.guards.listing import ROOT
 SHA = "0" * 64
 
 
+def model_of(project: Project) -> Path:
+    """Where an identification lies, there or not."""
+    return project.root / "iterations" / "001" / "30-identify.h5"
+
+
 def header(project: Path, *estimates: str, **changed: object) -> Header:
     """That of an identification from these estimates, in the order in which `identify` read them."""
     found = read_header(project / "iterations" / "001" / "20-estimate.h5")
@@ -55,14 +60,25 @@ def test_runs_are_found_under_the_names_that_identify_gave_them(
 ) -> None:
     """Those of other iterations carry its number, executed ones a word where the name is taken."""
     paths = [f"iterations/{name}-estimate.h5" for name in read]
-    found = learned_names(looped, header(looped.root, *paths))
+    found = learned_names(looped, model_of(looped), header(looped.root, *paths))
     assert found == {(f"iterations/{key}-estimate.h5", "sample"): name for key, name in wanted.items()}
 
 
 def test_an_estimate_that_is_gone_is_not_looked_into(looped: Project) -> None:
     """Its runs cannot be compared either."""
-    found = learned_names(looped, header(looped.root, "iterations/007/20-estimate.h5"))
+    found = learned_names(looped, model_of(looped), header(looped.root, "iterations/007/20-estimate.h5"))
     assert found == {}
+
+
+def test_runs_of_another_project_are_not_those_at_the_same_place(looped: Project, tmp_path: Path) -> None:
+    """A simulator from elsewhere has learned from what lies here only where that is the same, by its hash; one that was
+    copied out of this project has."""
+    elsewhere, name = tmp_path / "elsewhere" / "30-identify.h5", "iterations/001/20-estimate.h5"
+    assert learned_names(looped, elsewhere, header(looped.root, name)) == {}
+    same = read_header(looped.root / name).content_sha256
+    ref = InputRef(path=name, kind="estimate", schema_version=1, sha256=same)
+    found = learned_names(looped, elsewhere, header(looped.root, inputs=(ref,)))
+    assert found == {(name, "sample"): "sample"}
 
 
 def test_numbers_of_another_robot_or_version_are_refused(looped: Project) -> None:

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.commands.compare_inputs import Asked
 from r2s2r_cli.stages.compare.runs import real_runs
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.write import write_artifact
-from tests.commands.conftest import invoke
+from tests.commands.conftest import document, invoke
 from tests.support import builders
 from tests.support.identified import identification
 
@@ -126,3 +127,63 @@ def test_a_simulator_without_a_file_is_named_with_one(estimated: Path) -> None:
         option = [f"--model={value}"] if len(typed) == 1 else ["--model", value]
         assert mended == ["compare", "--of", "record", *option, "--dry-run"]
         assert invoke(*mended).exit_code == 0
+
+
+@pytest.fixture
+def learned(estimated: Path) -> Path:
+    """The estimated sample, its working directory, with an identification of it at `a=b/30-identify.h5`."""
+    data = identification(Project.find(estimated).robot())
+    for folder in ("a=b", "²"):
+        (estimated / folder).mkdir()
+        write_artifact(estimated / folder / "30-identify.h5", data, builders.provenance())
+    return estimated
+
+
+def asked(project: Path, *models: str) -> dict[str, Path]:
+    """The simulators that `--model` names."""
+    here = Project.find(project)
+    return Asked(here, here.iteration(1), models, "record").files
+
+
+def test_a_file_that_is_there_is_not_split_at_its_equals_sign(learned: Path) -> None:
+    """With a name before it or without; a file that is not there is split at the first sign."""
+    file = Path("a=b/30-identify.h5")
+    assert asked(learned, str(file)) == {"30-identify": file}
+    assert asked(learned, f"the one={file}") == {"the one": file}
+    assert asked(learned, "c=d=e.h5") == {"c": Path("d=e.h5")}
+    result = document("compare", "--of", "record", "--model", str(file), "--dry-run")
+    assert str(file) in result["inputs"]
+
+
+@pytest.mark.parametrize("name", ["", " ", "real robot", "Real", "floor", "initial"])
+@pytest.mark.parametrize("joined", [True, False])
+def test_a_name_of_something_else_is_no_name_of_a_simulator(learned: Path, name: str, joined: bool) -> None:
+    """Nothing, or what tables call the robot, its floor and the first simulator; the hint names it otherwise."""
+    value = f"{name}=a=b/30-identify.h5"
+    typed = [f"--model={value}"] if joined else ["--model", value]
+    refused = invoke("compare", "--of", "record", *typed, "--dry-run")
+    assert refused.exit_code == 2 and f"received: {value}" in refused.stderr
+    mended = shlex.split(refused.stderr.splitlines()[-1])[2:]
+    assert mended[:3] == ["compare", "--of", "record"] and mended[-1] == "--dry-run" and len(mended) == 4 + len(typed)
+    assert invoke(*mended).exit_code == 0
+
+
+def test_two_of_one_name_are_told_apart(learned: Path) -> None:
+    """The second one gets another name, and keeps its file."""
+    models = ["--model", "a=a=b/30-identify.h5", "--model", "a=²/30-identify.h5"]
+    refused = invoke("compare", "--of", "record", *models, "--dry-run")
+    assert refused.exit_code == 2 and "two simulators would have the same name" in refused.stderr
+    mended = shlex.split(refused.stderr.splitlines()[-1])[2:]
+    assert mended[3:7] == [*models[:3], "a-2=²/30-identify.h5"]
+    assert invoke(*mended).exit_code == 0
+
+
+def test_a_folder_called_by_a_digit_that_is_no_number_has_no_iteration(learned: Path) -> None:
+    """`²` is a digit for Python and no number: the file gives the name, and no command a number."""
+    assert asked(learned, "²/30-identify.h5") == {"30-identify": Path("²/30-identify.h5")}
+    document("compare", "--of", "record", "--model", "²/30-identify.h5", "--dry-run")
+    made = builders.provenance(stage="identify", stage_version=99)
+    write_artifact(learned / "²" / "30-identify.h5", identification(Project.find(learned).robot()), made)
+    for command in (["compare", "--of", "record"], ["simulate", "--random", "3"]):
+        refused = invoke(*command, "--model", "²/30-identify.h5")
+        assert refused.exit_code == 4 and refused.stderr.endswith("\nhint: r2s2r identify\n")

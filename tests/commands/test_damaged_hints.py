@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import shlex
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -51,6 +53,22 @@ def test_what_was_cut_off_is_made_as_it_was(estimated: Path, monkeypatch: pytest
     monkeypatch.chdir(estimated.parent)
     last = invoke("inspect", f"robot/{ESTIMATE}").stderr.splitlines()[-1]
     assert last == "hint: r2s2r estimate --iteration 1 --project robot"
+
+
+def test_what_may_not_be_read_is_shown(estimated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`recover` could not read it either: the hint shows whose it is, and does not make it again over what is whole."""
+    really = Path.open
+
+    def forbidden(path: Path, *how: Any, **more: Any) -> Any:
+        if path.name == Path(ESTIMATE).name:
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return really(path, *how, **more)
+
+    monkeypatch.setattr(Path, "open", forbidden)
+    answer = document("status")
+    assert [one["state"] for one in answer["artifacts"]] == ["fresh", "damaged"]
+    assert answer["artifacts"][1]["reasons"] == ["the file cannot be read"]
+    assert answer["next"] == f"ls -la {estimated / ESTIMATE}"
 
 
 def test_what_may_be_brought_back_is_recovered(estimated: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import threading
 import time
 import tomllib
@@ -104,13 +105,40 @@ def test_clicks_and_boxes_become_ranges_in_robot_toml(spec: str, project: Path) 
         assert in_range(hsv_of(color), new[rod])[row, column]
 
 
-def test_without_save_nothing_is_written(spec: str, project: Path) -> None:
-    """Marks alone show the measured ranges, and the hint says how to keep them."""
+def pasted(stderr: str) -> list[str]:
+    """The last hint as the words behind `r2s2r doctor camera`."""
+    words = shlex.split(stderr.splitlines()[-1], comments=True)
+    assert words[:4] == ["hint:", "r2s2r", "doctor", "camera"]
+    return words[4:]
+
+
+def test_without_save_nothing_is_written(spec: str, project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Marks alone show the measured ranges; the hint, pasted, keeps them."""
     before = (project / "robot.toml").read_bytes()
-    code, out, err = run("--camera", spec, "--frames", "5", "--click", f"red:{pixel(1)}")
+    typed = ["--camera", spec, "--frames", "5", "--click", f"red:{pixel(1)}"]
+    monkeypatch.setattr("sys.argv", ["r2s2r", "doctor", "camera", *typed])
+    code, out, err = run(*typed)
     assert code == 0 and "measured" in out
-    assert "--save" in err.splitlines()[-1]
     assert (project / "robot.toml").read_bytes() == before
+    assert pasted(err) == [*typed, "--save"]
+    assert run(*pasted(err))[0] == 0
+    assert (project / "robot.toml").read_bytes() != before
+
+
+def test_marks_beside_the_caps_are_looked_at_in_a_preview(spec: str, project: Path) -> None:
+    """Without the marks, which would be refused again, through the same camera; so is a camera without any mark."""
+    code, _, err = run("--camera", spec, "--frames", "2", "--project", ".", "--click", "red:5,5")
+    assert code == 4 and pasted(err) == ["--camera", spec, "--project", ".", "--preview", "see.html"]
+    code, _, err = run(*pasted(err), "--frames", "2")
+    assert code == 0 and (project / "see.html").is_file()
+    assert pasted(run("--camera", spec, "--frames", "2")[2])[-2:] == ["--preview", "see.html"]
+
+
+def test_without_a_project_nothing_can_be_saved(spec: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The hint does not ask for it."""
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run("--camera", spec, "--frames", "2", "--click", f"red:{pixel(1)}")
+    assert code == 0 and "measured" in out and "--save" not in err.splitlines()[-1]
 
 
 @pytest.mark.parametrize(

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import csv
 import json
+import shlex
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.stages.export.tables import column_names
 from r2s2r_cli.store.read import read_artifact
+from r2s2r_cli.store.write import write_artifact
 from schemas.base import Unit, column
 from schemas.policy import PolicyFile
 from tests.commands.conftest import document, invoke
@@ -138,6 +141,54 @@ def test_nothing_is_overwritten(estimated: Path) -> None:
     assert invoke("export", ESTIMATE, "--to", "npz").exit_code == 2
     assert Path("20-estimate.npz").read_text() == "mine"
     assert invoke("export", ESTIMATE, "--to", "npz", "--force").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("source", "to", "last"),
+    [
+        (RECORD, "trajectory", "out/sample.toml"),
+        (RECORD, "csv", "out/10-record/attributes.json"),
+        (ESTIMATE, "npz", "out/20-estimate.npz"),
+        ("robot.toml", "mjcf", "out/threebar.xml"),
+    ],
+)
+def test_nothing_is_written_where_the_last_file_is_in_the_way(estimated: Path, source: str, to: str, last: str) -> None:
+    """A new log beside somebody's old sidecar would be another run; the hint, pasted, writes all into a new place."""
+    Path(last).parent.mkdir(parents=True)
+    Path(last).write_text("mine")
+    Path("out-2").mkdir()
+    refused = invoke("export", source, "--to", to, "--out", "out")
+    assert refused.exit_code == 2 and f"where: {last}" in refused.stderr
+    assert [path for path in Path("out").rglob("*") if path.is_file()] == [Path(last)]
+    mended = shlex.split(refused.stderr.splitlines()[-1], comments=True)[2:]
+    assert mended == ["export", source, "--to", to, "--out", "out-3"]
+    assert invoke(*mended).exit_code == 0 and Path(last.replace("out", "out-3", 1)).is_file()
+    assert invoke("export", source, "--to", to, "--out", "out", "--force").exit_code == 0
+    assert Path(last).read_bytes() == Path(last.replace("out", "out-3", 1)).read_bytes()
+
+
+def test_a_directory_is_not_overwritten_half_way(estimated: Path) -> None:
+    """One that has the name of a file stops --force too, before anything is written."""
+    Path("sample.toml").unlink()
+    Path("sample.toml").mkdir()
+    before = Path("sample.csv").read_bytes()
+    refused = invoke("export", RECORD, "--to", "trajectory", "--force")
+    assert refused.exit_code == 2 and "received: a directory" in refused.stderr
+    assert Path("sample.csv").read_bytes() == before
+    assert "--out exported   #" in refused.stderr
+
+
+def test_a_run_without_commands_is_exported_as_tables_instead(estimated: Path) -> None:
+    """The hint names the artifact, and what it says works."""
+    header, data = read_artifact(Path(RECORD))
+    kept = {path: group for path, group in data.groups.items() if not path.endswith(("/commands", "/intervals"))}
+    write_artifact(Path("a b.h5"), ArtifactData("recording", kept), header.provenance)
+    for to in ("trajectory", "policy"):
+        refused = invoke("export", "a b.h5", "--to", to, "--run", "sample")
+        assert refused.exit_code == 4 and "where: a b.h5, run sample" in refused.stderr
+        mended = shlex.split(refused.stderr.splitlines()[-1])[2:]
+        assert mended == ["export", "a b.h5", "--to", "csv"]
+    assert invoke(*mended).exit_code == 0
 
 
 @pytest.mark.parametrize(

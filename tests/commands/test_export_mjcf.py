@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import mujoco
@@ -76,6 +77,36 @@ def test_what_cannot_be_is_refused(arguments: tuple[str, ...], code: int, says: 
     assert result.exit_code == code, result.output
     assert says in result.stderr
     assert list(Path().glob("*.xml")) == []
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        ("options=3", "options.timestep_s=0.001"),
+        ("options.=3", "options.timestep_s=0.001"),
+        ("options.ridges=1", ""),
+        ("options.gravity=[0, 0]", "options.gravity=[0.0, 0.0, -9.81]"),
+        ("options.rod_contact=1", "options.rod_contact=true"),
+        ("kables.6.stiffness_n_per_m=90", "cables.6.stiffness_n_per_m=90"),
+        ("cables.99.stiffness_n_per_m=90", "cables.8.stiffness_n_per_m=90"),
+        ("contact.friction.x=0.5", "contact.friction=0.5"),
+        ("contact.x.y=0.5", ""),
+        ("name.x.y=1", ""),
+        ("contact.friction", "contact.friction=0.5"),
+    ],
+)
+@pytest.mark.parametrize("joined", [True, False])
+@pytest.mark.usefixtures("project")
+def test_the_hint_takes_the_place_of_what_was_wrong(wrong: str, right: str, joined: bool) -> None:
+    """Pasted, it is a command that works: nothing of what was refused is left in it, and all else stays."""
+    typed = [f"--set={wrong}"] if joined else ["--set", wrong]
+    before = ["export", "robot.toml", "--to", "mjcf", "--set", "contact.friction=0.4"]
+    refused = invoke(*before, *typed, "--out", "out")
+    assert refused.exit_code == 2 and list(Path().glob("out/*")) == []
+    mended = shlex.split(refused.stderr.splitlines()[-1])[2:]
+    assert mended[:6] == before and mended[-2:] == ["--out", "out"] and len(mended) == 8 + len(typed)
+    assert wrong not in mended[6:] and mended[-3].endswith(right)
+    assert invoke(*mended).exit_code == 0
 
 
 @pytest.mark.usefixtures("estimated")

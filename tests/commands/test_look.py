@@ -40,6 +40,25 @@ def test_comments_order_and_times_do_not_count(estimated: Path) -> None:
     assert {state for state, _ in states().values()} == {"fresh"}
 
 
+@pytest.mark.parametrize("command", [["status", "--project"], ["inspect"], ["export"]])
+def test_an_error_about_a_name_that_is_not_utf8_is_a_document(estimated: Path, command: list[str]) -> None:
+    """A byte that is no character stands in it as on the other stream, and the document is JSON that all can read."""
+    refused = invoke(*command, "/nowhere/\udcff", "--json")
+    error = json.loads(refused.stdout)
+    assert refused.exit_code == error["exit_code"] == 4 and "Traceback" not in refused.stderr
+    assert "/nowhere/\\udcff" in error["where"]
+
+
+def test_a_document_with_a_name_that_is_not_utf8_is_json(estimated: Path) -> None:
+    """What was written is named as on the other stream; numbers and truth values stay what they are."""
+    Path("o\udcff").mkdir()
+    written = document("export", RECORD, "--to", "npz", "--out", "o\udcff")
+    assert written["files"] == ["o\\udcff/10-record.npz"] and written["schema"] == "r2s2r.export/1"
+    Path("robot.toml").rename("robot\udcff.toml")
+    answer = json.loads(invoke("validate", "robot\udcff.toml", "--json").stdout)
+    assert answer["files"] == ["robot\\udcff.toml"]
+
+
 def test_a_setting_names_itself(estimated: Path) -> None:
     """A changed setting makes its own stage stale, with old and new value, and no other."""
     text = Path("project.toml").read_text()

@@ -77,5 +77,8 @@ def test_an_option_alone_becomes_the_command_line() -> None:
     assert hint("--depth-scale 0.001   # L515", "import", "a") == "r2s2r import a --depth-scale 0.001   # L515"
     assert hint("--set a.b=1", "a", "--set", "a.c=2", "--set", "a.b=0") == "r2s2r a --set a.c=2 --set a.b=1"
     assert hint("--set a.bc=1", "a", "--set", "a.b=1", received="b") == "r2s2r a --set a.bc=1"
+    assert (
+        hint("--set a.b=1", "a", "--set", "a.b=2", "--set", "a.b", received="a.b") == "r2s2r a --set a.b=2 --set a.b=1"
+    )
     for said in ("r2s2r status", "--one 1 or --two 2", "--open 'quote", "ls -la ."):
         assert hint(said, "import", "a") == said

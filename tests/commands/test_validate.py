@@ -13,6 +13,7 @@ import pytest
 
 from r2s2r_cli.checks import CHECKS
 from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.newer import newer_r2s2r
 from schemas.results import ValidateResult
 from tests.commands.conftest import invoke
 from tests.support.forge import forge, forge_head, put
@@ -156,11 +157,11 @@ def test_nan_where_it_means_nothing(estimated: Path) -> None:
 
 
 def test_a_newer_version_is_refused(estimated: Path) -> None:
-    """An artifact of a newer r2s2r: code 4, and the hint is to upgrade."""
+    """An artifact of a newer r2s2r: code 4, and the hint brings this one up to date."""
     forge_head(RECORDING, schema_version=99)
     code, document = outcome(str(RECORDING))
     assert (code, checks(document)) == (4, ["version_known"])
-    assert document.findings[0].hint == "pip install --upgrade r2s2r"
+    assert document.findings[0].hint == newer_r2s2r()
 
 
 def test_a_head_that_contradicts_its_body(estimated: Path) -> None:

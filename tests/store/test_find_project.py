@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from r2s2r_cli.errors import ArtifactError
-from r2s2r_cli.store.project import PROJECT_FILE, Project
+from r2s2r_cli.store.project import PROJECT_FILE, Project, iteration_number
 
 NEW = "r2s2r init myrobot && cd myrobot"
 
@@ -39,3 +39,11 @@ def test_a_project_that_was_named_is_not_looked_for_elsewhere(tmp_path: Path) ->
     with pytest.raises(ArtifactError) as raised:
         Project.find(tmp_path)
     assert raised.value.hint == NEW
+
+
+@pytest.mark.parametrize(
+    ("name", "number"), [("007", 7), ("12", 12), ("²", None), ("٣", None), ("", None), ("1a", None), ("-1", None)]
+)
+def test_a_folder_has_the_number_that_it_is_called_by(name: str, number: int | None) -> None:
+    """Digits that are no number, as Python has some, are none."""
+    assert iteration_number(Path(name)) == number

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import warnings
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 from r2s2r_cli.errors import ArtifactError, DamageWarning
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.isolated import IsolatedReader
+from r2s2r_cli.store.newer import newer_r2s2r
 from r2s2r_cli.store.read import checked_header, load, read_artifact
 from r2s2r_cli.store.write import write_artifact
 from schemas.versions import KINDS
@@ -100,7 +102,7 @@ def test_a_newer_version_is_refused_with_the_way_out(tmp_path: Path, monkeypatch
         patch.setitem(KINDS, "policy", newer)
         write_artifact(tmp_path / "policies.h5", policy(), provenance())
     error = refused(tmp_path / "policies.h5")
-    assert "newer" in error.received and "upgrade" in error.hint
+    assert "newer" in error.received and error.hint == newer_r2s2r()
 
 
 def test_an_unknown_kind_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,7 +111,22 @@ def test_an_unknown_kind_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         patch.setitem(KINDS, "gap", KINDS["policy"].model_copy(update={"kind": "gap"}))
         data = policy()
         write_artifact(tmp_path / "gap.h5", type(data)("gap", data.groups), provenance())
-    assert refused(tmp_path / "gap.h5").received == "gap"
+    error = refused(tmp_path / "gap.h5")
+    assert (error.received, error.hint) == ("gap", newer_r2s2r())
+
+
+@pytest.mark.parametrize("cloned", [True, False])
+def test_a_newer_r2s2r_comes_from_the_clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cloned: bool) -> None:
+    """Its folder as a shell takes it; where r2s2r is not run from a clone, the command is for one. No index has it."""
+    root = tmp_path / "my clone"
+    (root / "r2s2r_cli" / "store").mkdir(parents=True)
+    (root / ".git").mkdir()
+    if cloned:
+        (root / "pyproject.toml").touch()
+    monkeypatch.setattr("r2s2r_cli.store.newer.__file__", str(root / "r2s2r_cli" / "store" / "newer.py"))
+    words = shlex.split(newer_r2s2r(), comments=True)
+    where = ["-C", str(root)] if cloned else []
+    assert words == ["git", *where, "pull", "&&", "pip", "install", "-e", str(root) if cloned else "."]
 
 
 def test_swapping_the_bodies_of_two_artifacts_is_noticed(golden: Copy) -> None:

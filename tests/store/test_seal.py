@@ -13,6 +13,7 @@ from r2s2r_cli.errors import ArtifactError
 from r2s2r_cli.store import seal as module
 from r2s2r_cli.store.journal import Field, Journal, Stream
 from r2s2r_cli.store.journal_read import fixed_place, read_field, read_head, records
+from r2s2r_cli.store.newer import newer_r2s2r
 from r2s2r_cli.store.read import read_artifact
 from r2s2r_cli.store.seal import Late, seal
 from r2s2r_cli.store.write import write_artifact
@@ -217,8 +218,9 @@ def test_a_journal_of_an_older_version_is_migrated(tmp_path: Path, monkeypatch: 
         walk = groups.pop(RUN)
         return {**groups, RUN: type(walk)(walk.datasets, {**walk.attributes, "source": "migrated"})}
 
-    with pytest.raises(ArtifactError, match="another version"):
+    with pytest.raises(ArtifactError, match="another version") as caught:
         seal(journal, target)
+    assert caught.value.hint == newer_r2s2r()
     monkeypatch.setitem(MIGRATIONS, ("recording", spec.version - 1), step)
     result = seal(journal, target)
     assert result.header is not None and result.header.schema_version == spec.version

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.views.compare import draw_comparison
 from r2s2r_cli.views.compare_history import draw_history, history_table
 from r2s2r_cli.views.compare_page import comparison_page
 from r2s2r_cli.views.compare_playback import playback_data
@@ -185,6 +186,23 @@ def test_frames_are_drawn_of_every_run() -> None:
     assert run == "walk" and png.startswith(b"\x89PNG")
     assert picked(1) == [0] and picked(3) == [0, 1, 2]
     assert picked(25)[0] == 0 and picked(25)[-1] == 24 and len(picked(25)) == COLUMNS
+
+
+@pytest.mark.parametrize("name", [r"cost $\\frac$ b", "$x$", "a$"])
+def test_a_name_is_no_formula(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Between two `$` matplotlib would read one; what it cannot read would lose the whole comparison."""
+    read: list[str] = []
+    monkeypatch.setattr("matplotlib.mathtext.MathTextParser.parse", lambda parser, text, *more: read.append(text))
+    plain, said = builders.comparison(), report()
+    names = {**plain.groups["models"].datasets, "name": np.array([b"initial", name.encode()])}
+    data = ArtifactData("comparison", {**plain.groups, "models": Group(names)})
+    history = tuple(one.model_copy(update={"model": one.model.replace("refined", name)}) for one in said.history)
+    draws = (
+        lambda: list(draw_comparison(data)), lambda: list(draw_strips(data, builders.robot())),
+        lambda: draw_history(said.model_copy(update={"history": history})),
+    )  # fmt: skip
+    for draw in draws:
+        assert draw() and read == []
 
 
 def test_the_page_needs_nothing_else() -> None:

@@ -33,21 +33,28 @@ def in_common(rows: Sequence[CompareRun], fallen: Mapping[str, str]) -> tuple[li
     """The same rows, without the measures of a run that one simulator has and another has not: what they err by is
     compared over the same runs. A simulator that has a measure of no run takes nothing from the others. fallen: runs
     that have none for anybody, and why. And what is to be said of each run that lost a measure."""
-    blank: dict[str, dict[str, None]] = {run: dict.fromkeys(RUN_VALUES.values()) for run in fallen}
-    missing: dict[str, set[str]] = {}
-    for field in RUN_VALUES.values():
-        has = [(row.model, row.run) for row in rows if getattr(row, field) is not None]
-        models = dict.fromkeys(model for model, _ in has)
-        runs = dict.fromkeys(run for _, run in has if run not in fallen)
-        for run in runs:
-            if without := {model for model in models if (model, run) not in has}:
-                blank.setdefault(run, {})[field] = None
-                missing.setdefault(run, set()).update(without)
-    why = {run: f"{', '.join(sorted(models))} could not be simulated in it" for run, models in missing.items()} | dict(
-        fallen
-    )
-    said = [f"run {run} is left out of the figures over several runs for all simulators: {why[run]}" for run in why]
-    return [row.model_copy(update=blank.get(row.run, {})) for row in rows], said
+    fields = tuple(RUN_VALUES.values())
+    able = {field: {row.model for row in rows if getattr(row, field) is not None} for field in fields}
+    blank: dict[str, dict[str, None]] = {run: dict.fromkeys(fields) for run in fallen}
+    said = dict.fromkeys(_left_out(run, reason) for run, reason in fallen.items())
+    for run in dict.fromkeys(row.run for row in rows if row.run not in fallen):
+        mine = [row for row in rows if row.run == run]
+        lost = {row.model for row in mine if all(getattr(row, field) is None for field in fields)}
+        for name, field in RUN_VALUES.items():
+            without = sorted(row.model for row in mine if getattr(row, field) is None and row.model in able[field])
+            if not without or len(without) == len(able[field]):
+                continue
+            blank.setdefault(run, {})[field] = None
+            if gone := [model for model in without if model in lost]:
+                said[_left_out(run, f"{', '.join(gone)} could not be simulated in it")] = None
+            else:
+                of = f" of the {name.rpartition('_')[0].replace('_', ' ')}"
+                said[_left_out(run, f"{', '.join(without)} has none in it", of)] = None
+    return [row.model_copy(update=blank.get(row.run, {})) for row in rows], list(said)
+
+
+def _left_out(run: str, why: str, of: str = "") -> str:
+    return f"run {run} is left out of the figures{of} over several runs for all simulators: {why}"
 
 
 def floor_of(walks: Mapping[str, Walk], policies: Mapping[str, str], keyframe_m: float | None) -> CompareFloor:

@@ -111,9 +111,9 @@ def ended(walk: Walk) -> np.ndarray:
     Without a heading along the axes of W: runs that started turned differently then differ by more than they repeat.
     """
     away = (walk.com[-1] - walk.com[0])[:2]
-    if walk.heading is None:
+    if walk.first_heading is None:
         return away
-    c, s = np.cos(walk.heading[0]), np.sin(walk.heading[0])
+    c, s = np.cos(walk.first_heading), np.sin(walk.first_heading)
     return np.array([c * away[0] + s * away[1], -s * away[0] + c * away[1]])
 
 

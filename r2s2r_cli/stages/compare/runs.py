@@ -106,7 +106,7 @@ def _run(
             expected=f"at least two complete target intervals{after}", received=f"{count}",
             hint="r2s2r record --random 15 --port /dev/ttyUSB0",
         )  # fmt: skip
-    walk = without_opening(whole, opening)
+    walk = without_opening(whole, opening).first(count)
     if not (known := np.isfinite(walk.p_WE[0]).all(axis=-1)).all():
         frame = "last frame of the opening rest" if opening.intervals else "first frame"
         raise InputError(f"run {run} starts nowhere: a simulation has no start", where=f"runs/{run}/frames/p_WE",

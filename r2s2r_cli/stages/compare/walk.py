@@ -36,6 +36,12 @@ class Walk:
         """Of the mean rod axis (frame,) [rad], whole turns counted; None where it has none at some frame."""
         return headings(self.p_WE)
 
+    @cached_property
+    def first_heading(self) -> float | None:
+        """Of the first frame alone [rad]: where the axis stands upright later, only that frame has one."""
+        found = headings(self.p_WE[:1])
+        return None if found is None else float(found[0])
+
     @property
     def durations(self) -> np.ndarray:
         """Of the target intervals [s], (interval,); an interval lasts until the next one begins."""

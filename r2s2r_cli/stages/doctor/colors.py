@@ -73,7 +73,7 @@ def measure_range(pictures: Sequence[np.ndarray], boxes: Sequence[Box], rod: str
                     where=f"u {box.u0} .. {box.u1}, v {box.v0} .. {box.v1}",
                     expected=f"{_LEAST_PIXELS} coloured pixels (saturation {_LEAST_SATURATION:g} and more)",
                     received=str(len(found)),
-                    hint="draw what the camera sees for the coordinates of the caps: --preview see.png",
+                    hint="r2s2r doctor camera --preview see.html   # what the camera sees; takes clicks on the caps",
                 )  # fmt: skip
             taken.append(found)
     pixels = np.concatenate(taken)

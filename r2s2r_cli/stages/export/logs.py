@@ -8,7 +8,7 @@ import io
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
-from r2s2r_cli.errors import InputError
+from r2s2r_cli.errors import InputError, quoted
 from r2s2r_cli.stages.frames import in_order
 
 _STATED = {"frame_stated": "frame", "start_unix": "start_unix_s"}
@@ -20,25 +20,25 @@ _PID = {
 _NOT_STATED = "not stated"
 
 
-def trajectory_files(data: ArtifactData, run: str) -> list[tuple[str, bytes]]:
-    """`<run>.csv` and its sidecar `<run>.toml`: `import` gives the same run again.
+def trajectory_files(data: ArtifactData, run: str, *, source: str) -> list[tuple[str, bytes]]:
+    """`<run>.csv` and its sidecar `<run>.toml`: `import` gives the same run again. source: the artifact's file.
 
     Raises InputError where the run has no observed end caps on the time of its commands.
     """
-    caps, commands = _need(data, run, "caps"), _need(data, run, "commands")
+    caps, commands = _need(data, run, "caps", source), _need(data, run, "commands", source)
     rows = np.arange(len(caps["t"]))
     if len(commands["t"]) != len(rows):  # rows whose stamps ran backwards have no place among the commands
         rows = np.flatnonzero(in_order(caps["t"], caps["drop_reason"]))
     t = caps["t"][rows]
     if not np.array_equal(t, commands["t"]):
-        raise _cannot(run, "end caps and commands on one time axis", "two time axes")
+        raise _cannot(run, "end caps and commands on one time axis", "two time axes", source)
     columns = [("t_s", t)]
     for i in range(caps["p_WE"].shape[1]):
         columns += [(f"cap{i}_{axis}_m", caps["p_WE"][rows, i, k]) for k, axis in enumerate("xyz")]
     for name in ("target", "control"):
         if name in commands:
             columns += [(f"{name}{i}", commands[name][:, i]) for i in range(commands[name].shape[1])]
-    columns += _lengths(data, run, t)
+    columns += _lengths(data, run, t, source)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([name for name, _ in columns])
@@ -46,23 +46,24 @@ def trajectory_files(data: ArtifactData, run: str) -> list[tuple[str, bytes]]:
     return [(f"{run}.csv", text.getvalue().encode()), (f"{run}.toml", _sidecar(data.groups[f"runs/{run}"], caps))]
 
 
-def _lengths(data: ArtifactData, run: str, t: np.ndarray) -> list[tuple[str, np.ndarray]]:
+def _lengths(data: ArtifactData, run: str, t: np.ndarray, source: str) -> list[tuple[str, np.ndarray]]:
     """Columns of the sensor lengths, named by the cable that each sensor measures."""
     sensors = data.group(run, "sensors")
     if sensors is None or "length" not in sensors:
         return []
     if not np.array_equal(sensors["t"], t):
-        raise _cannot(run, "sensor lengths on the time axis of the end caps", "another time axis")
+        raise _cannot(run, "sensor lengths on the time axis of the end caps", "another time axis", source)
     length = sensors["length"]
     cables = sensors["cable"] if "cable" in sensors else np.arange(length.shape[1])
     return [(f"length{cable}_m", length[:, i]) for i, cable in enumerate(cables)]
 
 
-def policy_file(data: ArtifactData, run: str) -> tuple[str, bytes]:
-    """`<run>.policy.toml`: the target intervals of a run as a policy. Raises InputError where it has none."""
+def policy_file(data: ArtifactData, run: str, *, source: str) -> tuple[str, bytes]:
+    """`<run>.policy.toml`: the target intervals of a run as a policy. source: the artifact's file. Raises InputError
+    where it has none."""
     import tomlkit
 
-    targets = _need(data, run, "intervals")["target"]
+    targets = _need(data, run, "intervals", source)["target"]
     document = tomlkit.document()
     document["schema_version"] = 1
     document["robot"] = str(data.groups[f"runs/{run}"].attributes["robot"])
@@ -99,18 +100,18 @@ def _sidecar(run: Group, caps: Group) -> bytes:
     return tomlkit.dumps(document).encode()
 
 
-def _need(data: ArtifactData, run: str, stream: str) -> Group:
+def _need(data: ArtifactData, run: str, stream: str, source: str) -> Group:
     group = data.group(run, stream)
     if group is None:
-        raise _cannot(run, f"a group runs/{run}/{stream}", "none")
+        raise _cannot(run, f"a group runs/{run}/{stream}", "none", source)
     return group
 
 
-def _cannot(run: str, expected: str, received: str) -> InputError:
+def _cannot(run: str, expected: str, received: str, source: str) -> InputError:
     return InputError(
         "this run cannot be exported in that form",
-        where=f"run {run}",
+        where=f"{source}, run {run}",
         expected=expected,
         received=received,
-        hint="r2s2r export FILE --to csv",
+        hint=f"r2s2r export {quoted(source)} --to csv",
     )

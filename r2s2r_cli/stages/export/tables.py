@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
@@ -25,6 +26,16 @@ def csv_files(data: ArtifactData, spec: ArtifactSpec, stem: str) -> Iterator[tup
     `<group path>_by_<axis>.csv` for values that it holds by something else (`caps_by_rod.csv`), and
     `<group path>_constant.csv` for single vectors beside rows. Numbers are written with all their digits.
     """
+    return ((name, content()) for name, content in _files(data, spec, stem))
+
+
+def csv_names(data: ArtifactData, spec: ArtifactSpec, stem: str) -> list[str]:
+    """The names alone, in the same order: no table is written for them."""
+    return [name for name, _ in _files(data, spec, stem)]
+
+
+def _files(data: ArtifactData, spec: ArtifactSpec, stem: str) -> Iterator[tuple[str, Callable[[], bytes]]]:
+    """The name of each file, and what makes its content."""
     attributes: dict[str, object] = {}
     for path, group in data.groups.items():
         layout = spec.group(path)
@@ -34,9 +45,9 @@ def csv_files(data: ArtifactData, spec: ArtifactSpec, stem: str) -> Iterator[tup
             attributes[path] = dict(group.attributes)
         tables = _by_rows(group, layout)
         for place, (axis, names) in enumerate(tables.items()):
-            yield f"{stem}/{path}{_ending(axis) if place else ''}.csv", _table(group, layout, names)
+            yield f"{stem}/{path}{_ending(axis) if place else ''}.csv", partial(_table, group, layout, names)
         yield from _frames(group, f"{stem}/{path}")
-    yield f"{stem}/attributes.json", (json.dumps(attributes, indent=2, ensure_ascii=False) + "\n").encode()
+    yield f"{stem}/attributes.json", (json.dumps(attributes, indent=2, ensure_ascii=False) + "\n").encode
 
 
 def npz_file(data: ArtifactData, stem: str, header_json: str) -> tuple[str, bytes]:
@@ -105,8 +116,8 @@ def _cell(value: object) -> str:
     return repr(value.item()) if isinstance(value, np.generic) else str(value)
 
 
-def _frames(group: Group, folder: str) -> Iterator[tuple[str, bytes]]:
+def _frames(group: Group, folder: str) -> Iterator[tuple[str, Callable[[], bytes]]]:
     for name, value in group.datasets.items():
         if isinstance(value, Blobs):
             for i, image in enumerate(value.items):
-                yield f"{folder}/{name}/{i:06d}.{_IMAGE_ENDING.get(image[:4], 'bin')}", image
+                yield f"{folder}/{name}/{i:06d}.{_IMAGE_ENDING.get(image[:4], 'bin')}", partial(bytes, image)

@@ -87,12 +87,15 @@ def _warnings(
                     "Numbers with which the robot may not stand say little of gaits")  # fmt: skip
     if len(world.reference.group) == 1:
         said.append("the robot has no symmetry: a gait serves the triangle that it was found on, and no other")
+    if upright := world.reference.upright():
+        said.append(f"after {upright} of {len(world.reference.group)} symmetries the mean of the rods' axes stands "
+                    "upright: what a gait turns by is not known where it ends on such a triangle")  # fmt: skip
     kept = {name: [one for one in primitives if one.behaviour == name] for name in request.rewards}
     for name, gaits in kept.items():
         if len(gaits) < settings.kept:
             said.append(f"{name}: {len(gaits)} gaits found, {settings.kept} were wanted")
         if gaits and gaits[0].mean <= 0:
-            said.append(f"{name}: the best gait earns {gaits[0].mean:.3g}: the robot does not move that way")
+            said.append(f"{name}: not even the best gait earns anything: the robot does not move that way")
     named = {one.name for one in policies}
     said += [f"{name}: no sequence of the gaits turns that way: there is no such policy"
              for name in SIGNS if name not in named]  # fmt: skip

@@ -12,7 +12,7 @@ from r2s2r_cli.stages.plan.goal import Goal
 from r2s2r_cli.stages.plan.long import Walk
 from r2s2r_cli.stages.plan.placement import Reference
 from r2s2r_cli.stages.plan.rewards import Outcomes
-from r2s2r_cli.stages.plan.robust import Primitive
+from r2s2r_cli.stages.plan.robust import Primitive, together
 from r2s2r_cli.stages.plan.route import Paths, farthest, walked
 from schemas.results_plan import GaitFigures, PolicyFigures
 
@@ -40,12 +40,12 @@ class LongPolicy:
 
     @property
     def reached(self) -> np.ndarray:
-        """x, y [m] and turn [rad] of every draw that worked, or of all where none did, (B, 3); whole turns as on
-        paper."""
+        """x, y [m] and turn [rad] of every draw that worked, or of all where none did, (B, 3): turns round the one that
+        they lie about, which has as many whole turns as on paper."""
         rows = np.flatnonzero(self.good) if self.good.any() else np.arange(len(self.good))
-        turn = self.came.turn[rows]
-        turn = turn + 2 * np.pi * np.round((self.expected[2] - turn) / (2 * np.pi))
-        return np.column_stack([self.came.com[rows, :2], turn])
+        moves = together(np.column_stack([self.came.com[rows, :2], self.came.turn[rows]]))
+        moves[:, 2] += 2 * np.pi * np.round((self.expected[2] - moves[:, 2].mean()) / (2 * np.pi))
+        return moves
 
     def off_goal(self) -> str:
         """How far it ends from its goal, and what is near enough, where it is not: simulated, else on paper. Empty

@@ -16,6 +16,9 @@ import numpy as np
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.plan.symmetry import SymmetryGroup, principal_axis, support_caps
 
+LYING = 0.05
+"""Least horizontal part of the mean of unit rod axes that has a direction over the ground."""
+
 
 @dataclass(frozen=True)
 class Placement:
@@ -49,9 +52,17 @@ class Reference:
 
     def axis_angles(self) -> np.ndarray:
         """Direction of the principal axis over the ground [rad] of the reference after each symmetry, (element,)."""
-        relabelled = np.stack([self.p[np.argsort(element.caps)] for element in self.group.elements])
-        axis = principal_axis(relabelled)
+        axis = self._axes()
         return np.asarray(np.arctan2(axis[:, 1], axis[:, 0]))
+
+    def upright(self) -> int:
+        """After how many symmetries the principal axis has no such direction: what a gait turns by is not known when it
+        ends there. None of a prism's; a robot of six bars has some."""
+        axis = self._axes()
+        return int((np.hypot(axis[:, 0], axis[:, 1]) < LYING).sum())
+
+    def _axes(self) -> np.ndarray:
+        return principal_axis(np.stack([self.p[np.argsort(element.caps)] for element in self.group.elements]))
 
     def place(self, p_WE: np.ndarray) -> Placement:
         """The placement of poses p_WE (B, cap, 3) [m]."""
@@ -72,7 +83,7 @@ def reference_of(p_WE: np.ndarray, group: SymmetryGroup) -> Reference:
     """The reference from a resting pose (cap, 3) [m]. Raises InputError where its principal axis stands upright."""
     p_WE = np.asarray(p_WE, dtype=float)
     axis = principal_axis(p_WE)
-    if float(np.hypot(axis[0], axis[1])) < 0.05:
+    if float(np.hypot(axis[0], axis[1])) < LYING:
         raise InputError(
             "the mean of the rods' axes has no direction in the ground plane: nothing to turn or roll about",
             where="robot.toml: rest_caps_m", expected="a principal axis that lies", received=f"({axis[0]:.3g}, "

@@ -115,7 +115,7 @@ def _direction(turn: np.ndarray) -> float:
     return float(np.angle(np.exp(1j * turn).sum()))
 
 
-def _together(moves: np.ndarray) -> np.ndarray:
+def together(moves: np.ndarray) -> np.ndarray:
     """Moves (B, 3) with turns less than half a turn from the one that they lie about: of 179 and -179 degrees the mean
     is 180, not 0. Whole turns alone are added, so that others keep their numbers to the bit."""
     whole = 2 * np.pi * np.round((_direction(moves[:, 2]) - moves[:, 2]) / (2 * np.pi))
@@ -142,7 +142,7 @@ def primitive(
     every = np.column_stack([came.com[:, :2], came.turn])
     of[of] = usual_ends(every[of])
     rows = np.flatnonzero(of) if of.any() else np.arange(1)
-    shown, moves = came.take(rows), _together(every[rows])
+    shown, moves = came.take(rows), together(every[rows])
     move = moves.mean(axis=0)
     move[2] = move[2] if abs(move[2]) <= np.pi else wrapped(move[2])
     same = float(of.sum() / good.sum()) if good.any() else 0.0

@@ -16,7 +16,7 @@ import numpy as np
 
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.calibrate.masses import mass_properties
-from schemas.robot import Robot
+from schemas.robot import Cable, Robot
 
 SHAPE_TOLERANCE = 0.04
 """Share of the longest rod by which distances of caps may differ: rest poses are made by hand, or sag under gravity."""
@@ -141,7 +141,9 @@ class _Parts:
         self.robot = robot
         self.tolerance = tolerance
         self.bodies = [mass_properties(rod.parts) for rod in robot.rods]
-        self.by_ends = {frozenset(cable.caps): k for k, cable in enumerate(robot.cables)}
+        self.by_ends: dict[frozenset[int], list[int]] = {}
+        for k, cable in enumerate(robot.cables):
+            self.by_ends.setdefault(frozenset(cable.caps), []).append(k)
 
     def rods(self, caps: tuple[int, ...]) -> tuple[int, ...] | None:
         taken = []
@@ -161,17 +163,19 @@ class _Parts:
         return tuple(taken)
 
     def cables(self, caps: tuple[int, ...]) -> tuple[int, ...] | None:
-        taken = []
+        """Several cables may join the same two caps: each takes the place of another one."""
+        taken: list[int] = []
         for own in self.robot.cables:
-            k = self.by_ends.get(frozenset(caps[cap] for cap in own.caps))
+            there = self.by_ends.get(frozenset(caps[cap] for cap in own.caps), [])
+            k = next((k for k in there if k not in taken and self._same_cable(own, self.robot.cables[k])), None)
             if k is None:
-                return None
-            other = self.robot.cables[k]
-            rest = (own.rest_length_m or 0.0, other.rest_length_m or 0.0)
-            if own.kind != other.kind or not self._equal((own.stiffness_n_per_m, other.stiffness_n_per_m), rest):
                 return None
             taken.append(k)
         return tuple(taken)
+
+    def _same_cable(self, own: Cable, other: Cable) -> bool:
+        rest = (own.rest_length_m or 0.0, other.rest_length_m or 0.0)
+        return own.kind == other.kind and self._equal((own.stiffness_n_per_m, other.stiffness_n_per_m), rest)
 
     def _equal(self, *pairs: tuple[float, float]) -> bool:
         return all(abs(a - b) <= self.tolerance * max(abs(a), abs(b)) for a, b in pairs)

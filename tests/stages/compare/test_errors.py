@@ -164,6 +164,18 @@ def test_ranking_is_of_order_and_not_of_size() -> None:
     assert ranking(few, few, policies) is None
 
 
+def test_a_rod_that_stands_up_on_the_way_does_not_turn_the_end() -> None:
+    """Where it ended is told by how it began: it has no turn then, but the same place."""
+    plain = walk(move=PlanarMove(1.2, np.zeros(3)))
+    p = plain.p_WE.copy()
+    p[120, 1::2] = p[120, 0::2] + [0.0, 0.0, 0.3]
+    risen = replace(plain, p_WE=p)
+    assert risen.heading is None and turned(risen) is None
+    assert ended(risen) == pytest.approx(ended(plain), abs=1e-12)
+    upright = replace(plain, p_WE=p[120:])
+    assert ended(upright) == pytest.approx((upright.com[-1] - upright.com[0])[:2])  # along the axes of the world
+
+
 def test_simulators_are_compared_over_the_same_runs() -> None:
     """A run in which one simulator fails counts for none, or the one that gets through would pay for it; a simulator
     that gets through no run takes nothing from the others, and what all have stays."""
@@ -185,7 +197,13 @@ def test_simulators_are_compared_over_the_same_runs() -> None:
     even, said = in_common(rows, {})
     assert [one.com_end_error_m for one in even] == [0.02, None, 0.03, None, None, None]
     assert all(one.keyframe_cap_rmse_m == 0.01 for one in even)
-    assert len(said) == 1 and "hard" in said[0] and "for all simulators: a could" in said[0]
+    assert len(said) == 1 and "run hard is left out of the figures of the com end" in said[0]
+    assert said[0].endswith("for all simulators: a has none in it")
+    broken, said = in_common([row("hard", "a", None, None), *rows[:1], *rows[2:]], {})
+    assert all(one.com_end_error_m is one.keyframe_cap_rmse_m is None for one in broken if one.run == "hard")
+    assert len(said) == 1 and said[0].endswith(
+        "figures over several runs for all simulators: a could not be simulated in it"
+    )
     lying, said = in_common(rows[::2], {"easy": "cable 1 is long"})
     assert all(one.com_end_error_m is None and one.keyframe_cap_rmse_m is None for one in lying)
     assert len(said) == 1 and "easy" in said[0] and "cable 1 is long" in said[0]

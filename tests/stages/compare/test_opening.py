@@ -116,9 +116,28 @@ def test_an_estimate_that_opens_in_the_rest_shape_is_compared_from_its_end() -> 
     groups["runs/walk/intervals"] = replace(spans, datasets=third)
     del groups["runs/walk/policy"]
     (run,), _ = real_runs(builders.ArtifactData("estimate", groups), None, builders.robot(), iteration=1)
+    assert run.walk.t[-1] == t[third["last"][-1]]
     begin = int(third["last"][0])
     assert run.opening.intervals == 1
     assert run.walk.t[0] == t[begin]
     assert run.walk.intervals.first.tolist() == [1, cut - begin]
     assert run.intervals == len(run.walk.intervals) == len(run.targets.target) == 2
     assert np.array_equal(run.targets.target, third["target"][1:])
+
+
+def test_a_run_that_is_cut_off_ends_where_its_last_whole_interval_does() -> None:
+    """What came of the interval that broke off is no end to compare with, nor one that repeats could differ by."""
+    groups = dict(builders.estimate(90).groups)
+    spans = groups["runs/walk/intervals"]
+    third = {name: np.concatenate([spans[name], spans[name][-1:]]) for name in spans.datasets}
+    cut = int(spans["first"][-1]) + 5
+    t = groups["runs/walk/frames"]["t"]
+    third["last"][-2], third["first"][-1] = cut - 1, cut
+    third["t_last"][-2], third["t_first"][-1] = t[cut - 1], t[cut]
+    third["target"] = np.vstack([spans["target"][1], 0.5 * spans["target"][1] + 0.1, spans["target"][1]])
+    third["complete"] = np.array([True, True, False])
+    groups["runs/walk/intervals"] = replace(spans, datasets=third)
+    del groups["runs/walk/policy"]
+    (run,), said = real_runs(builders.ArtifactData("estimate", groups), None, builders.robot(), iteration=1)
+    assert run.intervals == 3 and len(run.walk.intervals) == 2 and "the next is not complete" in said[0]
+    assert run.walk.t[-1] == t[cut - 1] and len(run.walk.p_WE) == cut

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -43,6 +44,20 @@ def test_what_ends_elsewhere_says_how_far_and_how_far_is_near_enough(
     found = ended(paper, simulated, GOAL).off_goal()
     assert found == (f"{said}; near enough are 0.1 m (plan.goal_within_m) and 20 deg" if said else "")
     assert ended(paper, simulated, None).off_goal() == ""
+
+
+@pytest.mark.parametrize(
+    "turns", [(-88.0, -92.0, -91.0, -89.0), (268.0, -92.0, 269.0, -89.0), (91.0, 89.0, 90.0, 90.0)]
+)
+def test_draws_that_end_the_other_way_round_do_not_make_up_for_each_other(turns: tuple[float, ...]) -> None:
+    """Half a turn off in every draw, by a little more or less, or with a whole turn more: off by half a turn."""
+    one = ended((0.2, 0.1, 90.0), (0.2, 0.1, 90.0), Goal((0.2, 0.1), math.radians(90.0)))
+    count = len(turns)
+    xyz = np.tile([0.2, 0.1, 0.0], (count, 1))
+    came = Outcomes(xyz, np.radians(turns), *(np.zeros(count) for _ in range(4)))
+    many = replace(one, came=came, good=np.ones(count, dtype=bool))
+    assert np.degrees(many.reached[:, 2].std()) < 2.0
+    assert bool(many.off_goal()) == (turns[0] != 91.0)
 
 
 def test_the_table_calls_it_as_execute_does() -> None:

@@ -122,6 +122,34 @@ def test_nearly_symmetric_is_said() -> None:
         symmetry_group(robot.model_copy(update={"cables": tuple(cables)}))
 
 
+def test_cables_side_by_side_change_places_one_by_one() -> None:
+    """A second cable beside each, of its kind or passive beside a winched one: the same symmetries, and each motor,
+    cable and target goes to one of its own."""
+    robot = subject("threebar").robot
+    plain = symmetry_group(robot)
+    doubled = robot.cables + robot.cables
+    passive = next(one for one in robot.cables if one.kind != robot.cables[robot.actuated[0]].kind)
+    beside = tuple(passive.model_copy(update={"caps": robot.cables[k].caps}) for k in robot.actuated)
+    for cables in (doubled, robot.cables + beside):
+        wide = robot.model_copy(update={"cables": tuple(
+            one.model_copy(update={"name": f"c{k}"}) for k, one in enumerate(cables)
+        )})  # fmt: skip
+        group = symmetry_group(wide)
+        assert [one.caps for one in group.elements] == [one.caps for one in plain.elements]
+        assert group.elements[0].cables == tuple(range(len(cables)))
+        motors = len(wide.actuated)
+        for element in group.elements:
+            assert sorted(element.motors) == list(range(motors))
+            assert sorted(element.relabelled(np.arange(motors, dtype=float)).tolist()) == list(range(motors))
+
+
+def test_after_which_symmetries_there_is_no_heading() -> None:
+    """Those of the prism all have one; three of the twelve of a robot of six bars do not."""
+    assert three_bar().upright() == 0
+    robot = subject("sixbar").robot
+    assert reference_of(np.array(robot.rest_caps_m), symmetry_group(robot)).upright() == 3
+
+
 def three_bar() -> Reference:
     """The reference of the paper's robot."""
     robot = subject("threebar").robot

@@ -9,6 +9,7 @@ from r2s2r_cli.console import Console
 
 if TYPE_CHECKING:
     from r2s2r_cli.artifact import ArtifactData
+    from schemas.config import LinkSettings
     from schemas.results_diagnose import DiagnoseReport, DiagnoseResult
 
 NEXT = "-next.toml"
@@ -27,8 +28,11 @@ def answer(result: Any, report: DiagnoseReport | None) -> DiagnoseResult:
     return DiagnoseResult(**shared, **{name: getattr(report, name) for name in names})
 
 
-def pictures(data: ArtifactData, report: DiagnoseReport, asked: Sequence[str] = ()) -> Iterator[tuple[str, bytes]]:
-    """What lies beside the artifact: the policy to run next, pictures and the page. asked: of `--effect`."""
+def pictures(
+    data: ArtifactData, report: DiagnoseReport, asked: Sequence[str] = (), *, link: LinkSettings | None = None
+) -> Iterator[tuple[str, bytes]]:
+    """What lies beside the artifact: the policy to run next, pictures and the page. asked: of `--effect`. link: of the
+    project."""
     from r2s2r_cli.views.diagnose import draw_diagnosis
     from r2s2r_cli.views.diagnose_page import diagnose_page
 
@@ -38,7 +42,7 @@ def pictures(data: ArtifactData, report: DiagnoseReport, asked: Sequence[str] = 
     for name, title, png in draw_diagnosis(data, report, asked):
         yield f"-{name}.png", png
         drawn.append((title, png))
-    yield ".html", diagnose_page(report, drawn)
+    yield ".html", diagnose_page(report, drawn, _reached(link))
 
 
 def _policy(report: DiagnoseReport) -> bytes:
@@ -58,8 +62,10 @@ def _policy(report: DiagnoseReport) -> bytes:
     return tomlkit.dumps(head).encode()
 
 
-def show(report: DiagnoseReport, console: Console, asked: Sequence[str] = ()) -> None:
-    """The tables, the verdict, what to type next and what is warned of. asked: of `--effect`."""
+def show(
+    report: DiagnoseReport, console: Console, asked: Sequence[str] = (), *, link: LinkSettings | None = None
+) -> None:
+    """The tables, the verdict, what to type next and what is warned of. asked: of `--effect`. link: of the project."""
     from r2s2r_cli.views.diagnose_commands import diagnose_commands
     from r2s2r_cli.views.diagnose_page import diagnose_tables
     from r2s2r_cli.views.diagnose_words import loud_words, verdict_words
@@ -70,7 +76,14 @@ def show(report: DiagnoseReport, console: Console, asked: Sequence[str] = ()) ->
     console.data(report.sentence)
     if loud := loud_words(report):
         console.data(loud)
-    for what, command in diagnose_commands(report):
+    for what, command in diagnose_commands(report, _reached(link)):
         console.data(f"{what}: {command}")
     for text in report.warnings:
         console.warn(text)
+
+
+def _reached(link: LinkSettings | None) -> str:
+    """Options by which the robot is reached: what the project says is not typed again."""
+    from r2s2r_cli.views.diagnose_commands import ROBOT
+
+    return ROBOT if link is None or not link.port else ROBOT[ROBOT.index("--camera") :]

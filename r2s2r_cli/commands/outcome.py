@@ -49,10 +49,14 @@ def require_input(path: Path, command: str) -> None:
 
 
 def require_model(project: Project, path: Path, command: str) -> None:
-    """Raises ArtifactError where an identification that was named with --model is not there. command: of the option."""
+    """Raises ArtifactError where an identification that was named with --model is not there, or is something else.
+    command: of the option."""
     from r2s2r_cli.commands.typed import typed_instead
+    from r2s2r_cli.store.header import whole_header
+    from r2s2r_cli.store.read import check_kind_and_version
 
     if path.is_file():
+        check_kind_and_version(path, whole_header(path), "identification")
         return
     places = [place.artifact("identification") for place in project.iterations()]
     there = [os.path.relpath(one) for one in places if one.exists()]

@@ -21,6 +21,7 @@ from r2s2r_cli.store.lock import writer
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import Header, Provenance
 from schemas.results import ArtifactState, StatusResult
+from schemas.versions import KINDS
 
 if TYPE_CHECKING:
     from schemas.results_compare import CompareReport
@@ -72,6 +73,11 @@ def status(
         )
 
 
+LATER = {KINDS["floor"].filename: 1, KINDS["policy"].filename: 1, KINDS["comparison"].filename: 2,
+         KINDS["diagnosis"].filename: 2}  # fmt: skip
+"""Artifacts that read others which stand below them in the list."""
+
+
 def survey(project: Project, *, thorough: bool = False) -> StatusResult:
     """The state of every artifact of a project, in the order of the data.
 
@@ -79,14 +85,16 @@ def survey(project: Project, *, thorough: bool = False) -> StatusResult:
     """
     iterations = {iteration.path: iteration for iteration in project.iterations()}
     journals = project.journals()
-    states: list[ArtifactState] = []
     kept = checkpoints(project)
     again: list[str] = []
     runs: list[str] = []
     stale: set[str] = set()
-    for path in project.artifacts():
-        state, mend = _state(project, iterations.get(path.parent), path, stale, thorough)
-        states.append(state)
+    listed = project.artifacts()
+    # As they are read: what is made of the runs of all iterations is after them, and before what reads it.
+    found = {path: _state(project, iterations.get(path.parent), path, stale, thorough)
+             for path in sorted(listed, key=lambda path: LATER.get(path.name, 0))}  # fmt: skip
+    states = [found[path][0] for path in listed]
+    for state, mend in (found[path] for path in listed):
         going_on = kept.get((state.stage, state.iteration))
         if mend.command:  # made anew, what is kept would be lost
             again.append(mend.command if going_on is None else going_on.command)

@@ -8,6 +8,9 @@ from r2s2r_cli.views.compare_tables import MEASURES
 from r2s2r_cli.views.page import counted
 from schemas.results_compare import CompareMeasure, CompareReport
 
+FEW = 6
+"""Of fewer runs a 95 % interval holds what it should in 73 to 85 % (docs/concepts/measures.md)."""
+
 
 def verdict(report: CompareReport) -> str:
     """What the last simulator is worth beside the first, in sentences: of runs that none was trained on, if any."""
@@ -63,7 +66,9 @@ def _against(first: str, last: str, side: Mapping[str, CompareMeasure]) -> str:
     better = [name for name, one in side.items() if one.change is not None and name not in worse]
     words = []
     if better:
-        part = f", beyond doubt in {len(sure)}" if sure else ""
+        fewest = min(one.runs for one in side.values())
+        rather = ", which of so few runs holds less often" if fewest < FEW else ""
+        part = f", in {len(sure)} beyond its 95 % interval{rather}" if sure else ""
         words.append(
             f"Of {counted(len(better) + len(worse), 'measure')} {last} is better than {first} in {len(better)}{part}."
         )

@@ -8,19 +8,19 @@ if TYPE_CHECKING:
     from schemas.results_diagnose import DiagnoseReport
 
 ROBOT = "--port /dev/ttyUSB0 --protocol legacy --camera realsense"
-"""How the robot of the paper is reached, in commands that are shown."""
+"""How the robot of the paper is reached, in commands that are shown; `--camera` is last."""
 REPEATS = 2
 
 
-def diagnose_commands(report: DiagnoseReport) -> list[tuple[str, str]]:
-    """(what for, command), in the order in which they are typed."""
+def diagnose_commands(report: DiagnoseReport, robot: str = ROBOT) -> list[tuple[str, str]]:
+    """(what for, command), in the order in which they are typed. robot: options by which the robot is reached."""
     command = use(report)
     found = [("use it", command)] if command else []
     if report.next_gait is None:
-        healthy = _healthy(report) if healthy_help(report) else ()
+        healthy = _healthy(report, robot) if healthy_help(report) else ()
         return found + [("next", words) for words in healthy]
     if report.next_gait.file:
-        found.append(("next", f"r2s2r record {report.next_gait.file}{_free(report)} --repeats {REPEATS} {ROBOT}"))
+        found.append(("next", f"r2s2r record {report.next_gait.file}{_free(report)} --repeats {REPEATS} {robot}"))
     return found
 
 
@@ -43,7 +43,7 @@ def healthy_help(report: DiagnoseReport) -> bool:
     return report.next_gait is None and report.verdict == "ambiguous" and lacking
 
 
-def _healthy(report: DiagnoseReport) -> tuple[str, ...]:
+def _healthy(report: DiagnoseReport, robot: str) -> tuple[str, ...]:
     """Records healthy runs in an iteration of their own and diagnoses again with them."""
     again = "" if report.iteration is None else f" --iteration {report.iteration}"
     also = "" if report.free_iteration is None else f" --also {report.free_iteration}"
@@ -52,7 +52,7 @@ def _healthy(report: DiagnoseReport) -> tuple[str, ...]:
     if report.free_iteration is not None:
         names = [f"{report.free_iteration:03d}-random-0-{number}" for number in range(1, REPEATS + 1)]
     return (
-        f"r2s2r record --random 15 --repeats {REPEATS}{_free(report)} {ROBOT}",
+        f"r2s2r record --random 15 --repeats {REPEATS}{_free(report)} {robot}",
         f"r2s2r estimate{_free(report)}",
         f"r2s2r diagnose{again}{also} {' '.join(f'--healthy {name}' for name in names)}",
     )

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from r2s2r_cli.views.diagnose_commands import diagnose_commands, healthy_help
+from r2s2r_cli.views.diagnose_commands import ROBOT, diagnose_commands, healthy_help
 from r2s2r_cli.views.diagnose_ranking import element_words, ranking_table
 from r2s2r_cli.views.diagnose_words import (
     HELD_OUT,
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 AT_FLOOR = "at the floor"
 """Instead of a share, where there is no gap to close."""
 BELOW = " (command: below)"
+NO_BETTER = 1.1
+"""A gait that is worth less than a tenth more than the runs so far is no better than they are."""
 
 
 def diagnose_tables(report: DiagnoseReport, *, brief: bool = False, asked: Sequence[str] = ()) -> Iterator[PageTable]:
@@ -54,8 +56,8 @@ def diagnose_tables(report: DiagnoseReport, *, brief: bool = False, asked: Seque
     yield PageTable("how", ["what", "found"], list(_how(report, brief=brief)))
 
 
-def diagnose_page(report: DiagnoseReport, pictures: Sequence[tuple[str, bytes]]) -> bytes:
-    """The page, self-contained."""
+def diagnose_page(report: DiagnoseReport, pictures: Sequence[tuple[str, bytes]], robot: str = ROBOT) -> bytes:
+    """The page, self-contained. robot: how the robot is reached, in commands that are shown."""
     labels = list(report.warnings)
     if report.calibrated.startswith("uncalibrated"):
         labels.insert(0, f"probabilities are {report.calibrated}")
@@ -67,7 +69,7 @@ def diagnose_page(report: DiagnoseReport, pictures: Sequence[tuple[str, bytes]])
         Page(
             title=f"Diagnosis of {report.robot}: {report.verdict}", sentence=report.sentence,
             notes=[*filter(None, [loud_words(report)]), f"Verdict {verdict_words(report)}"], labels=labels,
-            tables=list(diagnose_tables(report)), commands=diagnose_commands(report),
+            tables=list(diagnose_tables(report)), commands=diagnose_commands(report, robot),
             pictures=[Picture(title, png) for title, png in pictures],
         )
     )  # fmt: skip
@@ -144,7 +146,7 @@ def _limits(report: DiagnoseReport) -> Iterator[list[str]]:
     if report.next_gait is None:
         yield ["run next", f"no gait of the library is likely to decide more{_healthy(report)}{_any(report)}"]
     else:
-        yield ["run next", _next(report.next_gait)]
+        yield ["run next", _next(report.next_gait, {one.effect: one.probability for one in report.ranking})]
 
 
 def _healthy(report: DiagnoseReport) -> str:
@@ -158,14 +160,15 @@ def _any(report: DiagnoseReport) -> str:
     return "; more runs of any gait narrow the bound that `no_gap` is judged by" if open_ else ""
 
 
-def _next(one: NextGaitFound) -> str:
-    """What to run, and what it is worth beside the runs so far."""
+def _next(one: NextGaitFound, probability: Mapping[str, float]) -> str:
+    """What to run, between how likely candidates, and what it is worth beside the runs so far."""
     how = BELOW if one.file else ""
-    if one.now is not None and one.nats <= one.now:
+    if one.now is not None and one.nats <= NO_BETTER * one.now:
         return f"nothing separates the candidates better than these runs; the best of the library is {one.name}{how}"
     beside = "" if one.now is None else f", these runs again {one.now:.1f}"
     enough = "" if one.nats >= INDISTINCT else " (little)"
-    names = [IN_WORDS.get(name, name) for name in one.candidates]
+    names = [IN_WORDS.get(name, name) + (f" ({100 * probability[name]:.0f} %)" if name in probability else "")
+             for name in one.candidates]  # fmt: skip
     whom = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "the likeliest candidates"
     return f"{one.name}: likeliest to decide between {whom}, worth {one.nats:.1f} nats{enough}{beside}{how}"
 

@@ -187,3 +187,12 @@ def test_a_folder_called_by_a_digit_that_is_no_number_has_no_iteration(learned: 
     for command in (["compare", "--of", "record"], ["simulate", "--random", "3"]):
         refused = invoke(*command, "--model", "²/30-identify.h5")
         assert refused.exit_code == 4 and refused.stderr.endswith("\nhint: r2s2r identify\n")
+
+
+def test_a_dry_run_looks_at_what_a_simulator_is(estimated: Path) -> None:
+    """States are no simulator: refused before anything is simulated, as the run itself would."""
+    states = "iterations/001/20-estimate.h5"
+    for words in (("--dry-run",), ()):
+        refused = invoke("compare", "--of", "record", "--model", states, *words)
+        assert refused.exit_code == 4 and "this artifact is of another kind" in refused.stderr
+        assert refused.stderr.endswith(f"hint: r2s2r inspect {states}\n")

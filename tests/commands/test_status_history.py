@@ -8,7 +8,9 @@ from types import SimpleNamespace
 import pytest
 
 from r2s2r_cli.commands.next_command import explained, forward
-from r2s2r_cli.store.project import Iteration
+from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.project import Iteration, Project
+from r2s2r_cli.store.staleness import artifact_ref
 from r2s2r_cli.store.write import write_artifact
 from schemas.results_compare import CompareFloor, CompareHistory, CompareMeasure, CompareReport
 from tests.commands.conftest import document, invoke
@@ -78,6 +80,23 @@ def test_what_is_left_to_do_is_a_diagnosis(tmp_path: Path) -> None:
     project.iterations()[0].artifact("diagnosis").unlink()
     project.iterations()[0].artifact("identification").unlink()
     assert explained(project) == ""  # type: ignore[arg-type]
+
+
+def test_a_floor_of_stale_states_is_stale(estimated: Path) -> None:
+    """It stands above the states that it was made of, and its staleness goes on to what was compared beside it."""
+    here = Project.find(estimated)
+    states = estimated / "iterations" / "001" / "20-estimate.h5"
+    refs = (artifact_ref(here, states, read_header(states)),)
+    write_artifact(here.artifact("floor", None), builders.floor(), builders.provenance(stage="x", inputs=refs))
+    refs = (artifact_ref(here, here.artifact("floor", None), read_header(here.artifact("floor", None))),)
+    compared = estimated / "iterations" / "001" / "60-compare.h5"
+    write_artifact(compared, builders.comparison(), builders.provenance(stage="x", inputs=refs))
+    path = estimated / "project.toml"
+    path.write_text(path.read_text().replace("contact_clearance_m = 0.003", "contact_clearance_m = 0.004"))
+    said = {one["artifact"]: one["reasons"] for one in document("status")["artifacts"]}
+    assert "input iterations/001/20-estimate.h5 is stale itself" in said["floor.h5"]
+    assert "input floor.h5 is stale itself" in said["iterations/001/60-compare.h5"]
+    assert next(iter(said)) == "floor.h5"
 
 
 def _planned(folder: Path, stage: str) -> SimpleNamespace:

@@ -10,6 +10,7 @@ from r2s2r_cli.stages.record.plan import plans
 from r2s2r_cli.stages.record.policies import random_targets
 from r2s2r_cli.views.diagnose_commands import REPEATS, ROBOT, diagnose_commands, use
 from r2s2r_cli.views.diagnose_page import diagnose_page, diagnose_tables
+from schemas.config import LinkSettings
 from schemas.results_diagnose import DiagnoseReport, NextGaitFound
 from tests.support.diagnosed import report
 from tests.support.rig_robots import known
@@ -40,6 +41,7 @@ def test_what_was_named_comes_with_the_command_that_uses_it() -> None:
             "ramps: likeliest to decide between the likeliest candidates, worth 30.0 nats, these runs again 2.0",
         ),
         (2.0, 3.0, "nothing separates the candidates better than these runs; the best of the library is ramps"),
+        (4.12, 4.08, "nothing separates the candidates better than these runs; the best of the library is ramps"),
         (2.0, None, "ramps: likeliest to decide between the likeliest candidates, worth 2.0 nats (little)"),
     ],
 )
@@ -73,6 +75,16 @@ def test_where_no_gait_helps_healthy_runs_would() -> None:
     plain = "no gait of the library is likely to decide more"
     assert advice(undecided.model_copy(update={"missing": ()})) == plain == advice(report().model_copy(update=lacking))
     assert diagnose_commands(undecided.model_copy(update={"missing": ()})) == []
+
+
+def test_a_robot_that_the_project_names_is_not_named_again(capsys: pytest.CaptureFixture[str]) -> None:
+    """Port and protocol of project.toml hold; without a port there both are shown."""
+    one = NextGaitFound(name="ramps", file="70-diagnose-next.toml", targets=((1.0,),), nats=9.0, now=None)
+    made = report().model_copy(update={"next_gait": one, "free_iteration": 2})
+    record = "next: r2s2r record 70-diagnose-next.toml --iteration 2 --repeats 2"
+    for link, reached in ((LinkSettings(), ROBOT), (LinkSettings(port="udp://0.0.0.0:2390"), "--camera realsense")):
+        show(made, Console(), link=link)
+        assert f"{record} {reached}" in capsys.readouterr().out.splitlines()
 
 
 def test_a_command_is_a_line_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:

@@ -95,13 +95,13 @@ def test_two_effects_at_once_say_what_the_second_one_adds() -> None:
 
 
 def test_what_would_be_told_apart_is_named_nothing_wrong_among_it() -> None:
-    """The refit nominal model is a candidate too, in words."""
+    """The refit nominal model is a candidate too, in words; how likely each is stands beside it."""
     one = NextGaitFound(name="ramps", file=None, targets=((1.0,),), nats=9.0, now=None,
                         candidates=("none", "payload", "com_offset"))  # fmt: skip
     rows = [row for table in diagnose_tables(report().model_copy(update={"next_gait": one})) for row in table.rows]
     assert [
         "run next",
-        "ramps: likeliest to decide between nothing wrong, payload and com_offset, worth 9.0 nats",
+        "ramps: likeliest to decide between nothing wrong (10 %), payload (90 %) and com_offset, worth 9.0 nats",
     ] in rows
 
 

@@ -149,3 +149,13 @@ def test_second_verdicts_are_read_as_carefully(tmp_path: Path) -> None:
     path.write_text(good[:-9])
     with pytest.raises(InputError, match="cannot be read"):
         score_published([a], again=[folder])
+
+
+def test_a_set_without_d_teaches_nothing(tmp_path: Path) -> None:
+    """It would teach that nothing is wrong where something is."""
+    labels = [one | {"d": None} for one in LABELS[:20]]
+    made = Folder(tmp_path / "a", labels, knows_by_number, names=NAMES[:20])
+    path = tmp_path / "a" / "shard.json"
+    path.write_bytes(published(opened(made.bank, made.verdicts, made.key), CODE))
+    with pytest.raises(InputError, match="without d"):
+        calibration_published([path])

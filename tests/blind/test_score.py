@@ -10,7 +10,6 @@ from r2s2r_cli.blind.score import score_of
 from r2s2r_cli.blind.score.facts import said_of, truth_of
 from r2s2r_cli.blind.score.rows import Metric, calibrated_error, calibration_error, row as row_of, same_element
 from r2s2r_cli.blind.score.wilson import Z95, bootstrap, of_median, wilson
-from r2s2r_cli.errors import InputError
 from schemas.results_blind import BlindRow, BlindScoreResult
 from tests.support import blind_bank
 
@@ -158,13 +157,6 @@ def test_a_calibrated_guesser_errs_by_what_chance_gives() -> None:
         low, high = chance[n].low, chance[n].high
         assert low is not None and high is not None and error.value is not None and low <= error.value <= high
     assert (chance[60].value or 0) > 4 * (chance[3000].value or 1) and chance[60].passed is None
-
-
-def test_a_set_without_d_is_not_scored() -> None:
-    """It would count as nothing wrong, and teach that."""
-    label = next(one for one in LABELS if one["kind"] == "single")
-    with pytest.raises(InputError, match="without d"):
-        truth_of(label | {"d": None})
 
 
 def test_the_90_percent_set_of_a_diagnosis_that_broke_off_holds_nothing() -> None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from r2s2r_cli.errors import InputError
-
 NONE, UNKNOWN = "none", "unknown"
 NO_REPLAY = ("camera_pose", "dropout")
 """Effects that change no prediction, only what is seen or missing (a test holds it to that of `diagnose`)."""
@@ -82,13 +80,7 @@ class Said:
 
 
 def truth_of(label: dict[str, Any]) -> Truth:
-    """Of a label. Raises InputError where something is wrong in its world and nobody worked out how clear it is: it
-    would count as nothing."""
-    if label["kind"] != "none" and label["d"] is None:
-        raise InputError("a set was made without d, by which clear sets are told from faint ones",
-                         where=str(label.get("seed", "a label")), expected="d of every set with something wrong",
-                         received="a bank made with --no-oracle",
-                         hint="r2s2r blind make --bank calibration --count 24 --key trial.key bank")  # fmt: skip
+    """Of a label. One without d (`make --no-oracle`) counts as under the floor."""
     effects = label["effects"]
     one = effects[0] if label["kind"] == "single" else None
     element = one["element"] if one else None

@@ -87,10 +87,10 @@ def _foreign(path: Path) -> InspectResult:
 
 
 def _show(result: InspectResult, console: Console) -> None:
-    from schemas.versions import KINDS
-
     if console.json:
         return
+    from schemas.versions import KINDS
+
     if result.header is None:
         console.data(f"{result.path}: an HDF5 file of another program")
     else:

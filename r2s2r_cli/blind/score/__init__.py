@@ -106,6 +106,11 @@ def _must_teach(pool: Pool, where: str) -> None:
         raise InputError("only a calibration bank may teach anything", where=where, expected="calibration",
                          received=f"{pool.bank}, commands exchanged" if pool.shuffled else pool.bank,
                          hint="r2s2r blind make --bank calibration --count 120 --key cal.key cal")  # fmt: skip
+    if any(one.label["kind"] != "none" and one.label["d"] is None for one in pool.sets):
+        raise InputError("a set was made without d, by which clear sets are told from faint ones: it would teach that "
+                         "nothing is wrong", where=where, expected="d of every set with something wrong",
+                         received="a bank made with --no-oracle",
+                         hint="r2s2r blind make --bank calibration --count 120 --key cal.key cal")  # fmt: skip
 
 
 def _cases(pool: Pool) -> list[tuple[Truth, Case]]:
@@ -116,11 +121,6 @@ def _cases(pool: Pool) -> list[tuple[Truth, Case]]:
 
 def _calibration(pool: Pool, where: str, older: Sequence[Path]) -> dict[str, Any]:
     _must_teach(pool, where)
-    if any(one.label["kind"] != "none" and one.label["d"] is None for one in pool.sets):
-        raise InputError("a set was made without d, by which clear sets are told from faint ones: it would teach that "
-                         "nothing is wrong", where=where, expected="d of every set with something wrong",
-                         received="a bank made with --no-oracle",
-                         hint="r2s2r blind make --bank calibration --count 120 --key cal.key cal")  # fmt: skip
     cases = [one for _, one in _cases(pool)]
     words = f"{len(cases)} sets of the calibration bank {_banks(pool)}"
     if not older:

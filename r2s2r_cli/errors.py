@@ -32,6 +32,10 @@ EXIT_CODE_MEANING: dict[ExitCode, str] = {
 }
 
 
+UPDATE_CLONE = "git pull && pip install -e .   # in your clone of r2s2r"
+"""The command that brings r2s2r up to date, of a clone whose folder is not known: no package index has r2s2r."""
+
+
 def quoted(path: object) -> str:
     """A path as it can be pasted into a shell, whatever its name."""
     return quote(str(path))

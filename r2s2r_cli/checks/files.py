@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from r2s2r_cli.checks.base import Found, check
 from r2s2r_cli.checks.subjects import Reading
+from r2s2r_cli.errors import UPDATE_CLONE
 
 _LIBRARY = re.compile(r"(can't|cannot|unable to|unable) [\w ]+\(.*\)$")
 """Form of the messages of HDF5: `Can't open object (addr overflow, ...)`."""
@@ -43,7 +44,7 @@ def values_allowed(reading: Reading) -> Iterator[Found]:
     Reading,
     what="this r2s2r knows the kind of the artifact, and its schema version or a migration from it",
     why="a newer version may mean something else by the same name; guessing would be silent damage",
-    fix="git pull && pip install -e .   # in your clone of r2s2r",
+    fix=UPDATE_CLONE,
 )
 def version_known(reading: Reading) -> Iterator[Found]:
     """An artifact of a newer r2s2r."""

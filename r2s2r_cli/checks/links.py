@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from r2s2r_cli.checks.base import Found, check
 from r2s2r_cli.checks.subjects import Journals, Links
+from r2s2r_cli.errors import UPDATE_CLONE
 from schemas.versions import KINDS
 
 _IN_BODY = {"kind", "schema_version", "title", "created_by", "content_sha256", "seal_sha256"}
@@ -91,7 +92,7 @@ def robot_is_the_projects(links: Links) -> Iterator[Found]:
     Links,
     what="the stage that made it is not newer than this r2s2r knows",
     why="this r2s2r would make something else from the same input, and call the newer result stale",
-    fix="git pull && pip install -e .   # in your clone of r2s2r",
+    fix=UPDATE_CLONE,
 )
 def stage_not_newer(links: Links) -> Iterator[Found]:
     """Made by a newer r2s2r of the same schema version."""

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from r2s2r_cli.errors import quoted
-
-ANY_CLONE = "git pull && pip install -e .   # in your clone of r2s2r"
+from r2s2r_cli.errors import UPDATE_CLONE, quoted
 
 
 def newer_r2s2r() -> str:
@@ -14,4 +12,4 @@ def newer_r2s2r() -> str:
     root = Path(__file__).resolve().parents[2]
     if (root / "pyproject.toml").is_file() and (root / ".git").exists():
         return f"git -C {quoted(root)} pull && pip install -e {quoted(root)}"
-    return ANY_CLONE
+    return UPDATE_CLONE

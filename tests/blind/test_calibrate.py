@@ -189,7 +189,7 @@ def test_what_is_learned_from_is_what_counts(
     told = by.probabilities({name: by.score(name, m, left_out=left_out, parity=p) for name, (m, p) in rows.items()})
     assert own.probabilities(one) == pytest.approx(by.with_unknown(told, unexplained, 2.0), rel=1e-9)
     for name, nats in (("payload", parity), ("dropout", parity)):
-        assert one.may_name(name) == by.witnessed(left_out, nats)
+        assert one.may_name(name) == by.witnessed(name, left_out, nats, rows[name][0])
 
 
 def test_too_few_sets_teach_nothing() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from r2s2r_cli.blind.score.facts import NO_REPLAY, NONE, UNKNOWN, Truth
+from r2s2r_cli.blind.score.facts import LOGGED, NO_REPLAY, NONE, UNKNOWN, Truth
 from schemas.results_diagnose import BY_CHANCE
 
 HELD = 0.3
@@ -25,7 +25,7 @@ class Case:
     BY_CHANCE. truth: the right name, not among `names` where the screening had lost it, or no catalogue has it
     (`unknown`). strange: ln(1 + x / FEW) of what a wider floor gains beside the best effect, x [nats]; left_sd: what
     that leaves, in sd of healthy pieces, 0 where that is less than in healthy runs. replayed: False, nothing but the
-    parity stage is asked."""
+    parity stage is asked; logs: False, it is not."""
 
     names: tuple[str, ...]
     said: np.ndarray
@@ -35,6 +35,7 @@ class Case:
     left_sd: float = 0.0
     left_out: np.ndarray | None = None
     replayed: bool = True
+    logs: bool = True
 
     @property
     def gain(self) -> np.ndarray:
@@ -52,7 +53,9 @@ class Case:
         if name in (NONE, UNKNOWN):
             return False
         i = self.names.index(name)
-        return self.left_out is None or bool(self.left_out[i] > 0.0 or self.parity[i] > 0.0)
+        if self.left_out is None or self.parity[i] > 0.0:
+            return True
+        return bool(self.left_out[i] > 0.0 and self.said[i] > 0.0) and not (self.logs and name in LOGGED)
 
 
 def case(truth: Truth, document: dict[str, Any]) -> Case | None:

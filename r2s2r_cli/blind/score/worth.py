@@ -99,7 +99,7 @@ def _left_out_alone(one: Case) -> Case:
 
 KINDS: dict[str, Without] = {
     "nothing": lambda one: one,
-    "the parity stage": lambda one: replace(one, parity=np.zeros_like(one.parity)),
+    "the parity stage": lambda one: replace(one, parity=np.zeros_like(one.parity), logs=False),
     "the replay (parity alone)": _parity_alone,
     "left-out gaits, and the witness (all data together instead)": _all_data_alone,
     "all data together (left-out gaits instead)": _left_out_alone,

@@ -97,7 +97,7 @@ def diagnose(
         calibration=learned,
         sizes={} if said is None else said.starts(), told_by=None if said is None else said.nats(),
         effects=settings.effects, seed=settings.seed, told=progress,
-        strangers=settings.with_unknown, healthy=fitted.healthy,
+        strangers=settings.with_unknown, healthy=fitted.healthy, stranger=None if said is None else said.stranger,
     )  # fmt: skip
     found: Where | None = None
     if settings.with_where:

@@ -46,6 +46,8 @@ def _verdict(found: Diagnosis) -> str:
         return text
     if which.verdict == "unknown":
         where = "" if found.channel is None else f" It acts most like something in channel {found.channel}."
+        if which.stranger is not None:
+            where = f" The sensors beside what the camera sees: {which.stranger.what}."
         return (
             f"Something is wrong that none of the effects looked for explains (p = {which.probability:.2f}): "
             f"{refit:.1f} mm at the end of an interval after refitting{part}, floor {floor:.1f} mm.{where}"
@@ -94,7 +96,7 @@ def _shrunk(found: Diagnosis) -> str:
         beside = "" if was is None or 1e3 * was >= after else f"; as identified it is {1e3 * was:.1f} mm"
         return f"{text}: it closes none of the gap{beside}."
     wide = "" if much.ci90 is None else f" ({round(100 * much.ci90[0])} .. {round(100 * much.ci90[1])})"
-    told = "" if much.predicted is None else f"; predicted {share_of_gap(much.predicted)}"
+    told = "" if much.predicted is None else f"; predicted to close {share_of_gap(much.predicted)}"
     text += f", which closes {round(100 * much.share)} %{wide} of the gap above the floor{told}"
     if much.ci90 is not None and much.ci90[0] <= 0.0:
         text += "; that it helps is not shown, so do not act on it yet"

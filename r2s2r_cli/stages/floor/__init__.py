@@ -175,7 +175,7 @@ def _warnings(report: FloorReport, observed: bool) -> list[str]:
             f"{1e3 * lengths.floor_m:.2f} mm: other days, calibrations or robots; --iteration N measures one"
         )
     if report.caps is None:
-        why = "no phase of a gait comes twice" if observed else "no run has observed end caps"
+        why = "no phase of a gait comes twice" if observed else "no run has end caps with states (r2s2r estimate)"
         found.append(f"no floor of the end caps: {why}")
     for what, part in (("end caps", report.caps), ("cable lengths", report.lengths)):
         if part is not None and part.contrasts < FEW:

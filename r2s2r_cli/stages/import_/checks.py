@@ -130,7 +130,8 @@ def check_up_axis(p_WE: np.ndarray, cap_radius: np.ndarray, where: str) -> list[
     p_WE: end caps of the kept frames [m], shape (frame, cap, xyz). cap_radius: [m], shape (cap,). The robot stands
     on at least three caps, at one height, all the time: along the true up axis the lowest cap hardly moves and the
     third lowest lies near it. Another axis is called up if it is twice as steady as z, or as steady as z and
-    (other than z) at the height of a robot on the plane 0. Raises InputError naming the axis.
+    (other than z) at the height of a robot on the plane 0; of several the steadiest, before all those at that height.
+    Raises InputError naming the axis.
     """
     unsteady, offset = {}, {}
     for i, axis in enumerate("xyz"):
@@ -139,11 +140,12 @@ def check_up_axis(p_WE: np.ndarray, cap_radius: np.ndarray, where: str) -> list[
             third = height[:, min(2, height.shape[1] - 1)]
             unsteady[name] = float(height[:, 0].std() + np.median(third - height[:, 0]))
             offset[name] = float(height[:, 0].mean())
-    best = min(unsteady, key=lambda name: unsteady[name])
-    if unsteady[best] + CLEARLY_M < unsteady["z"] / 2:
-        raise _not_up(best, where, unsteady, offset)
+    order = sorted(unsteady, key=lambda name: (abs(offset[name]) > NEAR_GROUND_M, unsteady[name]))
+    for name in order:
+        if unsteady[name] + CLEARLY_M < unsteady["z"] / 2:
+            raise _not_up(name, where, unsteady, offset)
     if abs(offset["z"]) > NEAR_GROUND_M:
-        for name in unsteady:
+        for name in order:
             if name != "z" and abs(offset[name]) <= NEAR_GROUND_M and unsteady[name] < unsteady["z"] + CLEARLY_M:
                 raise _not_up(name, where, unsteady, offset)
         return [f"the ground lies at z = {offset['z']:.3f} m, far from 0: `estimate` must shift it"]

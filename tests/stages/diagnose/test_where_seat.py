@@ -25,7 +25,7 @@ RANKING = (
 
 
 def _which(verdict: str, effects: tuple[str, ...] = ()) -> SimpleNamespace:
-    return SimpleNamespace(verdict=verdict, effects=effects, ranking=RANKING)
+    return SimpleNamespace(verdict=verdict, effects=effects, ranking=RANKING, stranger=None)
 
 
 WHERE = SimpleNamespace(channel="world", element=Element("rod", 1))
@@ -34,7 +34,6 @@ WHERE = SimpleNamespace(channel="world", element=Element("rod", 1))
 @pytest.mark.parametrize(
     ("verdict", "effects", "found"),
     [
-        ("no_gap", (), Seat()),
         ("effect", ("sensor_gain",), Seat("sensing", Element("sensor", 3))),
         ("ambiguous", (), Seat("contact", Element("cap", 5))),
         ("unknown", (), Seat("world", Element("rod", 1))),
@@ -42,8 +41,24 @@ WHERE = SimpleNamespace(channel="world", element=Element("rod", 1))
 )
 def test_the_seat_follows_what_was_concluded(verdict: str, effects: tuple[str, ...], found: Seat) -> None:
     """A committed name has its own seat whatever the probes say; of several the channel whose names are most probable
-    together, not that of the first; without a name the probes'; without a gap nowhere."""
+    together, not that of the first; without a name the probes'."""
     assert seat(_which(verdict, effects), WHERE) == found  # type: ignore[arg-type]
+
+
+def test_below_the_floor_an_effect_that_is_likelier_than_nothing_has_a_place() -> None:
+    """No size is claimed, but where what there is would act; where nothing is likelier, nothing is said of where."""
+    likely = SimpleNamespace(verdict="no_gap", effects=(), ranking=RANKING)
+    assert seat(likely, WHERE) == Seat("contact", Element("cap", 5))  # type: ignore[arg-type]
+    for name in ("none", "unknown"):
+        first = (Ranked(name, 0.0, 0.3), *RANKING)
+        assert seat(SimpleNamespace(verdict="no_gap", effects=(), ranking=first), WHERE) == Seat()  # type: ignore[arg-type]
+
+
+def test_logs_that_show_what_no_law_has_say_where() -> None:
+    """Before the probes, which explain what they can."""
+    which = _which("unknown")
+    which.stranger = SimpleNamespace(channel="sensing", element=Element("sensor"))
+    assert seat(which, WHERE) == Seat("sensing", Element("sensor"))  # type: ignore[arg-type]
 
 
 def test_without_probes_the_names_say_where() -> None:

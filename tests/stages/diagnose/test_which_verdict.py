@@ -9,8 +9,8 @@ import pytest
 
 from r2s2r_cli.blind.score import facts
 from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
-from r2s2r_cli.stages.diagnose.which.calibration import Calibration, calibration
-from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
+from r2s2r_cli.stages.diagnose.which.calibration import LAWLESS, Calibration, calibration
+from r2s2r_cli.stages.diagnose.which.candidates import LOGGED, NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.doubts import unwitnessed
 from r2s2r_cli.stages.diagnose.which.found import Ranked
 from r2s2r_cli.stages.diagnose.which.left import Left
@@ -27,7 +27,7 @@ GAP, NO_GAP = NoGap(0.02, 0.03, 0.01, 0.0), NoGap(0.009, 0.011, 0.01, 0.95)
 
 def ranking(first: str, probability: float, gain: float) -> list[Ranked]:
     """The first guess and another one."""
-    return [Ranked(first, gain, probability), Ranked("backlash", 0.0, 1.0 - probability)]
+    return [Ranked(first, gain, probability, marginal=gain), Ranked("backlash", 0.0, 1.0 - probability)]
 
 
 def test_a_name_has_its_threshold() -> None:
@@ -52,6 +52,43 @@ def test_a_name_needs_a_witness() -> None:
         assert len(unwitnessed(shared, by, pair)) == count
     for seen in (replace(alone, gain=0.1), replace(alone, parity=4.1)):
         assert verdict_of([seen, other], by, None, GAP) == ("effect", ("payload",), 0.9)
+        assert not unwitnessed([seen, other], by, None)
+
+
+def test_left_out_gaits_alone_are_no_witness() -> None:
+    """What they say for an effect is one event where all data together say nothing for it, unless the logs do."""
+    alone = Ranked("command_latency", 104.8, 0.85, marginal=-4.1, parity=0.1)
+    other = Ranked("motor_dead_zone", 6.6, 0.1, marginal=0.3)
+    by = replace(BY, by_chance=4.0)
+    assert verdict_of([alone, other], by, None, GAP) == ("ambiguous", (), 0.85)
+    (said,) = unwitnessed([alone, other], by, None)
+    assert "+104.8 nats" in said and "-4.1 nats" in said
+    for seen in (replace(alone, marginal=0.3), replace(alone, parity=4.1)):
+        assert verdict_of([seen, other], by, None, GAP)[0] == "effect"
+
+
+def test_what_logs_show_by_themselves_they_must_show() -> None:
+    """Sensors that the replay alone finds wrong are not named, but where nobody looked at the logs."""
+    by = replace(BY, by_chance=4.0)
+    for name, left_out_is_enough in (("sensor_gain", False), ("sensor_bias", False), ("payload", True)):
+        ranks = [Ranked(name, 55.0, 0.74, marginal=33.0, parity=1.7), Ranked("none", 0.0, 0.26)]
+        verdict = "effect" if left_out_is_enough else "ambiguous"
+        assert verdict_of(ranks, by, None, GAP)[0] == verdict
+        assert verdict_of(ranks, by, None, GAP, logs=False)[0] == "effect"
+        assert verdict_of([replace(ranks[0], parity=4.1), ranks[1]], by, None, GAP)[0] == "effect"
+        said = unwitnessed(ranks, by, None)
+        assert bool(said) != left_out_is_enough and all(name in text for text in said)
+
+
+def test_what_no_law_has_is_unknown() -> None:
+    """However well an effect explains the rest; without strangers (an ablation) nothing is."""
+    names = BY.probabilities({"sensor_bias": 100.0, "none": 0.0})
+    p = BY.with_unknown(names, 0.0, 0.0, lawless=True)
+    assert p["unknown"] == LAWLESS and sum(p.values()) == pytest.approx(1.0)
+    assert BY.with_unknown(names, -np.inf, 0.0, lawless=True)["unknown"] == 0.0
+    ranks = [Ranked("unknown", 0.0, LAWLESS), Ranked("sensor_bias", 100.0, 0.1, marginal=100.0, parity=50.0)]
+    assert verdict_of(ranks, BY, None, NO_GAP, lawless=True) == ("unknown", (), LAWLESS)
+    assert verdict_of(ranks, BY, None, NO_GAP)[0] == "no_gap"
 
 
 def test_no_gap_is_a_claim_about_size() -> None:
@@ -103,10 +140,10 @@ def test_the_rule_of_the_package_names_a_stranger() -> None:
     certain = {"payload": 0.97, "none": 0.01, "backlash": 0.02}
     for left, verdict in ((5.0, ("unknown", ())), (4.0, ("effect", ("payload",)))):
         found = by.with_unknown(certain, 0.0, left)
-        ranks = [Ranked(name, 100.0, p) for name, p in sorted(found.items(), key=lambda item: -item[1])]
+        ranks = [Ranked(name, 100.0, p, marginal=100.0) for name, p in sorted(found.items(), key=lambda item: -item[1])]
         assert verdict_of(ranks, by, None, GAP, left_sd=left)[:2] == verdict
     found = by.with_unknown(certain, 0.0, 5.0)
-    ranks = [Ranked(name, 100.0, p) for name, p in sorted(found.items(), key=lambda item: -item[1])]
+    ranks = [Ranked(name, 100.0, p, marginal=100.0) for name, p in sorted(found.items(), key=lambda item: -item[1])]
     assert verdict_of(ranks, by, ("payload", "backlash"), GAP, left_sd=5.0)[0] == "unknown"
 
 
@@ -141,7 +178,8 @@ def test_an_effect_that_harms_is_not_there_and_no_less_than_that() -> None:
 
 def test_a_pair_is_as_probable_as_both_its_names() -> None:
     """What speaks for both is shared between them, so that neither alone need reach the threshold."""
-    pair = [Ranked("payload", 30.0, 0.4), Ranked("motor_lag", 8.0, 0.3), Ranked("none", 0.0, 0.3)]
+    first = Ranked("payload", 30.0, 0.4, marginal=30.0)
+    pair = [first, Ranked("motor_lag", 8.0, 0.3), Ranked("none", 0.0, 0.3)]
     assert verdict_of(pair, BY, ("payload", "motor_lag"), GAP) == ("pair", ("payload", "motor_lag"), 0.7)
     assert verdict_of(pair, BY, None, GAP)[0] == "ambiguous"
     assert verdict_of(ranking("payload", 0.9, 30.0), BY, ("motor_lag", "none"), GAP)[0] == "effect"
@@ -204,7 +242,7 @@ def test_a_finding_that_the_replay_refutes_says_nothing() -> None:
     assert learned.score("motor_lag", 2.0, left_out=2.0, parity=21.0) == pytest.approx((1.0 + 4.5) * 2.0)
     assert learned.score("motor_lag", 9.0, left_out=9.0, parity=8.0) == pytest.approx(9.0 + 4.5 * 4.0)
     assert learned.score("dropout", parity=36.0) == pytest.approx(4.5 * 32.0)
-    assert facts.NO_REPLAY == NO_REPLAY
+    assert facts.NO_REPLAY == NO_REPLAY and facts.LOGGED == LOGGED
 
 
 def _score(squared: np.ndarray) -> Score:

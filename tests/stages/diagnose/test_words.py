@@ -19,7 +19,7 @@ def found(verdict: str, **changes: object) -> SimpleNamespace:
         ci90=(-0.004, 0.9), predicted=0.65, rmse={"refit": 0.012, "effect": 0.006}.get,
     )  # fmt: skip
     values = {"verdict": verdict, "effects": ("payload",), "probability": 0.9, "set90": ("payload", "none", "unknown"),
-              "best": best, "confusable": (), "ranking": (SimpleNamespace(effect="none"), best),
+              "best": best, "stranger": None, "confusable": (), "ranking": (SimpleNamespace(effect="none"), best),
               "no_gap": SimpleNamespace(rmse=0.012, upper=0.014, floor=0.005, kept=1.0)}  # fmt: skip
     if changes.pop("first", False):
         values["ranking"] = (best, SimpleNamespace(effect="none"))
@@ -100,7 +100,7 @@ def test_a_name_that_is_not_shown_to_help_comes_with_a_warning() -> None:
     assert "(p = 0.90). These runs cannot tell it from backlash. On" in said
     assert said.endswith("that it helps is not shown, so do not act on it yet.")
     one.much.ci90 = (0.2, 0.9)
-    assert sentence(one).endswith("; predicted 65 %.")  # type: ignore[arg-type]
+    assert sentence(one).endswith("; predicted to close 65 %.")  # type: ignore[arg-type]
 
 
 def test_when_it_began_is_said() -> None:
@@ -131,4 +131,4 @@ def test_a_gap_that_would_grow_is_no_share() -> None:
     """A prediction below nothing closes nothing, by however much."""
     one = found("ambiguous")
     one.much.predicted = -10.2
-    assert "of the gap above the floor; predicted none;" in sentence(one)  # type: ignore[arg-type]
+    assert "of the gap above the floor; predicted to close none;" in sentence(one)  # type: ignore[arg-type]

@@ -12,6 +12,7 @@ from schemas.robot import Robot
 
 if TYPE_CHECKING:
     from r2s2r_cli.stages.diagnose.parity.knocks import Knock
+    from r2s2r_cli.stages.diagnose.parity.stranger import Stranger
 
 KINDS = ("cable", "cap", "rod", "motor", "sensor", "place", "world", "camera")
 """Kinds of elements, as `diagnose --json` has them."""
@@ -95,7 +96,8 @@ class Mismatch:
 class Parity:
     """findings: every quantity that could be measured, strongest first. mismatches: settings; with one, nothing else
     is to be believed. missing: what could not be looked at, and why. differential: whether healthy runs were there.
-    level: false discovery rate at which findings count as `significant`. knock: of the camera, the largest."""
+    level: false discovery rate at which findings count as `significant`. knock: of the camera, the largest. stranger:
+    what no law of the catalogue has."""
 
     findings: tuple[Finding, ...]
     mismatches: tuple[Mismatch, ...] = ()
@@ -103,6 +105,7 @@ class Parity:
     differential: bool = False
     level: float = 0.05
     knock: Knock | None = None
+    stranger: Stranger | None = None
 
     @property
     def significant(self) -> tuple[Finding, ...]:

@@ -13,6 +13,7 @@ from r2s2r_cli.stages.diagnose.parity.fitted import fitted_runs
 from r2s2r_cli.stages.diagnose.parity.mismatch import mismatches
 from r2s2r_cli.stages.diagnose.parity.quantities import Key, Quantities, quantities
 from r2s2r_cli.stages.diagnose.parity.series import Measured
+from r2s2r_cli.stages.diagnose.parity.stranger import stranger
 from r2s2r_cli.stages.diagnose.parity.suspects import suspicions
 from r2s2r_cli.stages.diagnose.parity.winch_fit import LAWS
 
@@ -51,7 +52,9 @@ def parity(evidence: Evidence, *, level: float = 0.05) -> Parity:
         missing += [f"in healthy runs, {what}" for what in base.missing]
     findings = [one for key, value in first.of.items() if (one := finding_of(key, value, base, first)) is not None]
     findings.sort(key=lambda one: -abs(one.z))
-    return Parity(tuple(findings), (), tuple(missing), base is not None, level, first.knock)
+    # Sensors of a robot that was never compared with itself may each be off by what nobody ever calibrated.
+    strange = None if base is None else stranger(findings, first.about)
+    return Parity(tuple(findings), (), tuple(missing), base is not None, level, first.knock, strange)
 
 
 def _scale(found: Quantities, base: Quantities | None) -> float:

@@ -1,8 +1,9 @@
 """Where the cause sits, by both kinds of evidence: the names that compete for the gap, and the probes that have none.
 
 A name that is committed to says its own channel and element, so that a diagnosis does not contradict itself. Where
-several names remain, a channel is as probable as all its names together. Where none fits, the probes say. Both kinds
-stay in `Diagnosis.where` and the ranking as they are.
+several names remain, a channel is as probable as all its names together. Where none fits, the logs say, as far as they
+show what no law has, else the probes. A gap under the floor has no size, but where an effect is likelier than nothing
+it has a place. Both kinds stay in `Diagnosis.where` and the ranking as they are.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import TypeVar
 
 from r2s2r_cli.stages.diagnose.parity.finding import Element
 from r2s2r_cli.stages.diagnose.where.found import Where
-from r2s2r_cli.stages.diagnose.which.found import Ranked, Which
+from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked, Which
 
 T = TypeVar("T", bound=Hashable)
 SAME_STRING = frozenset({"motor", "cable", "sensor"})
@@ -22,7 +23,7 @@ SAME_STRING = frozenset({"motor", "cable", "sensor"})
 
 @dataclass(frozen=True)
 class Seat:
-    """channel: of the design; element: the part; None where there is no gap or nothing says."""
+    """channel: of the design; element: the part; None where nothing says."""
 
     channel: str | None = None
     element: Element | None = None
@@ -30,12 +31,14 @@ class Seat:
 
 def seat(which: Which, where: Where | None) -> Seat:
     """Of a verdict and, where they were fitted, the probes."""
-    if which.verdict == "no_gap":
+    if which.verdict == "no_gap" and which.ranking[0].effect in (NONE, UNKNOWN):
         return Seat()
     if which.verdict in ("effect", "pair"):
         first = next((one for one in which.ranking if one.effect in which.effects), None)
         return Seat() if first is None else Seat(first.channel, first.element)
     names = [one for one in which.ranking if one.channel is not None]
+    if which.verdict == "unknown" and which.stranger is not None:
+        return Seat(which.stranger.channel, which.stranger.element)
     if which.verdict == "unknown" and where is not None and where.channel is not None:
         return Seat(where.channel, where.element)
     channel = _likeliest((one.channel, one.probability) for one in names)

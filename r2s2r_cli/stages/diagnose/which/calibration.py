@@ -10,9 +10,12 @@ from importlib import resources
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
-from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
+from r2s2r_cli.stages.diagnose.which.candidates import LOGGED, NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN
 
+LAWLESS = 0.875
+"""How probable a stranger is where the logs show what no law of the catalogue has: six of six such calibration sets
+were one (`calibration-3` to `-9`; Laplace's rule of succession)."""
 FILE = "calibration.json"
 """Beside this module; made by the calibration run of the blind trials, and frozen before any blind set exists."""
 
@@ -66,10 +69,14 @@ class Calibration:
         heard = max(parity - self.by_chance, 0.0)
         return gain + self.parity * (heard if name in NO_REPLAY else min(heard, gain))
 
-    def witnessed(self, left_out: float, parity: float) -> bool:
+    def witnessed(self, name: str, left_out: float, parity: float, marginal: float, *, logs: bool = True) -> bool:
         """Whether anything speaks for an effect that did not help to fit it: gaits that were left out, or the parity
-        stage [nats]. Without that it is no verdict, however well it explains what it was fitted to."""
-        return left_out > 0.0 or parity > self.by_chance
+        stage [nats]. Without that it is no verdict, however well it explains what it was fitted to; nor is it where
+        left-out gaits alone speak for it, and all data together (marginal) do not. What logs show by themselves they
+        must show (LOGGED), where they were looked at: a replay that prefers other sensors makes up for something."""
+        if parity > self.by_chance:
+            return True
+        return left_out > 0.0 and marginal > 0.0 and not (logs and name in LOGGED)
 
     def absolute(self) -> Calibration:
         """For a diagnosis without healthy runs: nothing says which gains make up for the simulator and were there
@@ -99,17 +106,18 @@ class Calibration:
         return dict(zip(names, p.tolist(), strict=True))
 
     def with_unknown(
-        self, probabilities: Mapping[str, float], unexplained: float, left_sd: float
+        self, probabilities: Mapping[str, float], unexplained: float, left_sd: float, *, lawless: bool = False
     ) -> dict[str, float]:  # fmt: skip
         """Probabilities by name, pairs included, of which `unknown` takes its share. unexplained: what a wider floor
         gains beside the best effect [nats], -inf where that was not asked: then there is no stranger, whatever is
-        left."""
+        left. lawless: the logs show what no law of the catalogue has (`parity.stranger`)."""
         if np.isneginf(unexplained):
             return {**probabilities, UNKNOWN: 0.0}
         odds = np.exp(self.stranger + self.wider * np.log1p(max(np.nan_to_num(unexplained), 0.0) / self.few))
         share = float(odds / (1.0 + odds))
         if self.refuses(left_sd):
             share = max(share, self.unfit_share)
+        share = max(share, LAWLESS) if lawless else share
         return {name: (1.0 - share) * p for name, p in probabilities.items()} | {UNKNOWN: share}
 
     def within(self, probabilities: Mapping[str, float]) -> tuple[str, ...]:

@@ -25,6 +25,8 @@ PASSIVE_ONLY = ("tendon_set",)
 NO_REPLAY = ("camera_pose", "dropout")
 """Effects that change no prediction, only what is seen or missing: intervals begin where the camera saw the robot, so
 that one which was moved is seen where it was. The parity stage sees both."""
+LOGGED = ("sensor_bias", "sensor_gain")
+"""Effects that logs show without a simulator: what a sensor says beside what the camera sees of its cable."""
 PARTS = {
     "friction_field": (("gradient_x_per_m", "gradient_y_per_m"),
                        ("patch_factor", "patch_x_m", "patch_y_m", "patch_radius_m")),

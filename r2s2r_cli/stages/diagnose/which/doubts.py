@@ -17,17 +17,28 @@ def of_first(ranking: Sequence[Ranked], pair: tuple[str, ...] | None) -> float:
 
 
 def unwitnessed(
-    ranking: Sequence[Ranked], calibration: Calibration, pair: tuple[str, ...] | None
+    ranking: Sequence[Ranked], calibration: Calibration, pair: tuple[str, ...] | None, *, logs: bool = True
 ) -> tuple[str, ...]:  # fmt: skip
-    """Why the likeliest name is no verdict, where it would be one with a witness."""
+    """Why the likeliest name is no verdict, where it would be one with a witness. logs: they were looked at."""
     first = ranking[0]
     likely = first.effect not in (NONE, UNKNOWN) and calibration.commits(of_first(ranking, pair))
-    if not likely or calibration.witnessed(first.gain, first.parity):
+    if not likely or calibration.witnessed(first.effect, first.gain, first.parity, first.marginal, logs=logs):
         return ()
-    text = (
-        f"{first.effect} explains what it was fitted to, but nothing else speaks for it: neither what was left out "
-        f"({first.gain:+.1f} nats) nor the parity stage; it may be one event, and is no verdict"
-    )
+    if first.gain > 0.0 and first.marginal > 0.0:
+        text = (
+            f"the replay speaks for {first.effect} ({first.gain:+.1f} nats on what was left out), but not the sensors "
+            f"beside what the camera sees ({first.parity:.1f} nats): it may make up for something, and is no verdict"
+        )
+    elif first.gain > 0.0:
+        text = (
+            f"what was left out speaks for {first.effect} ({first.gain:+.1f} nats), but all data together do not "
+            f"({first.marginal:+.1f} nats), nor does the parity stage; it may be one event, and is no verdict"
+        )
+    else:
+        text = (
+            f"{first.effect} explains what it was fitted to, but nothing else speaks for it: neither what was left out "
+            f"({first.gain:+.1f} nats) nor the parity stage; it may be one event, and is no verdict"
+        )
     return (text,)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from r2s2r_cli.stages.diagnose.parity.finding import Element
+from r2s2r_cli.stages.diagnose.parity.stranger import Stranger
 from r2s2r_cli.stages.diagnose.which.left import Left
 from r2s2r_cli.stages.diagnose.which.pair_share import TwoCauses
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap
@@ -79,7 +80,8 @@ class Which:
     set90: names that hold the truth (`Calibration.conformal`). ranking: best first. chance: gain that the best of the
     catalogue reaches by chance in one of twenty cases [nats]. wider: by how much the floor must grow to explain what
     the best effect leaves; unexplained: what that gains [nats]. left: what today's runs cost more than healthy ones.
-    within: groups that were left out, in words. calibrated: where probabilities come from.
+    within: groups that were left out, in words. calibrated: where probabilities come from. stranger: what the logs
+    show that no law of the catalogue has.
     """
 
     verdict: str
@@ -100,6 +102,7 @@ class Which:
     calibrated: str
     warnings: tuple[str, ...] = ()
     pairs: tuple[TwoCauses, ...] = ()
+    stranger: Stranger | None = None
 
     @property
     def best(self) -> Ranked | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from r2s2r_cli.stages.diagnose.parity.stranger import Stranger
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
@@ -43,6 +44,8 @@ class Material:
     """Ids of the effects that may be named; None: all."""
     parity: Mapping[str, Mapping[int | None, float]] = field(default_factory=dict)
     """What the parity stage says for effects, by element (`Parity.nats`) [nats]."""
+    stranger: Stranger | None = None
+    """What the logs show that no law of the catalogue has."""
 
     def said(self, i: int) -> float:
         """What the parity stage says for the fit i [nats]."""

@@ -53,7 +53,8 @@ def concluded(m: Material) -> Which:
     both = [_two(m, i, best, gains, of_two) for i in order if len(m.fits[i].hypothesis.parts) == 2]
     alone = {name: of_two[i] for name, i in best.items()}
     probability, pair = with_pairs(calibration.probabilities(table), both, alone, m.chance)
-    probability = calibration.with_unknown(probability, m.unexplained, m.left.beyond)
+    lawless = m.stranger is not None
+    probability = calibration.with_unknown(probability, m.unexplained, m.left.beyond, lawless=lawless)
     sds = dict(zip(singles, gain_sds(m.refit, [m.scores[i] for i in singles], m.groups).tolist(), strict=True))
     ranking = [
         replace(
@@ -74,7 +75,10 @@ def concluded(m: Material) -> Which:
     shown = _shown(m.responses)
     ranking = [replace(one, seen=shown.get(one.effect, np.nan)) for one in ranking]
     ranking.sort(key=lambda one: (-one.probability, -one.marginal))
-    verdict, effects, p = verdict_of(ranking, calibration, pair, m.no_gap, left_sd=m.left.beyond)
+    logs = bool(m.parity)
+    verdict, effects, p = verdict_of(
+        ranking, calibration, pair, m.no_gap, left_sd=m.left.beyond, lawless=lawless, logs=logs
+    )
     top = best.get(effects[0]) if effects else None
     return Which(
         verdict=verdict, effects=effects, probability=p, set90=calibration.within(probability), ranking=tuple(ranking),
@@ -85,8 +89,8 @@ def concluded(m: Material) -> Which:
         confusable=confusable(m, [i for i in best.values() if m.fits[i].moved][:ALIKE]),
         not_testable=_not_testable(m.responses), shifts=() if top is None else _shifts(m, m.fits[top]),
         within=_left_out(m), calibrated=calibration.words,
-        warnings=(*unwitnessed(ranking, calibration, pair), *warnings_of(m, list(best.values()))),
-        pairs=tuple(both),
+        warnings=(*unwitnessed(ranking, calibration, pair, logs=logs), *warnings_of(m, list(best.values()))),
+        pairs=tuple(both), stranger=m.stranger,
     )  # fmt: skip
 
 
@@ -138,15 +142,19 @@ def _channel(name: str) -> str:
 
 def verdict_of(
     ranking: list[Ranked], calibration: Calibration, pair: tuple[str, ...] | None, gap: NoGap, *, left_sd: float = 0.0,
+    lawless: bool = False, logs: bool = True,
 ) -> tuple[str, tuple[str, ...], float]:  # fmt: skip
-    """What the first of the ranking is worth. Where the best effect leaves too much (left_sd, `Calibration.refuses`)
-    that is a verdict of its own: no effect of the catalogue is enough. A name that nothing speaks for but what it was
+    """What the first of the ranking is worth. Where the best effect leaves too much (left_sd, `Calibration.refuses`),
+    or the logs show what no law has (lawless), that is a verdict of its own: no effect of the catalogue is enough.
+    logs: they were looked at. A name that nothing speaks for but what it was
     fitted to is none (`Calibration.witnessed`), alone or first of a pair: what both gain is no witness of either.
     Where no cause is named, that there is no gap is a claim about its size (docs/concepts/measures.md), not about
     causes that hide below the floor."""
     first = ranking[0]
-    named = first.effect not in (NONE, UNKNOWN) and calibration.witnessed(first.gain, first.parity)
-    if first.effect == UNKNOWN and calibration.refuses(left_sd):
+    named = first.effect not in (NONE, UNKNOWN) and calibration.witnessed(
+        first.effect, first.gain, first.parity, first.marginal, logs=logs
+    )
+    if first.effect == UNKNOWN and (lawless or calibration.refuses(left_sd)):
         return "unknown", (), first.probability
     if named and pair is not None and first.effect in pair:
         p = of_first(ranking, pair)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from r2s2r_cli.stages.diagnose.parity.stranger import Stranger
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.before import Healthy, chronic
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
@@ -52,7 +53,7 @@ def compare_effects(
     arena: Arena, base: Fit, *, floor_m: float, kept: float = 1.0, calibration: Calibration,
     sizes: Mapping[str, Mapping[str, float]], told_by: Said | None = None,
     effects: Sequence[str] | None = None, seed: int = 0, told: Told,
-    strangers: bool = True, healthy: Healthy | None = None,
+    strangers: bool = True, healthy: Healthy | None = None, stranger: Stranger | None = None,
 ) -> Compared:  # fmt: skip
     """All effects against the refit nominal model `base` of this arena. floor_m: key-frame RMSE with nothing wrong, of
     the share `kept` of the intervals.
@@ -60,7 +61,8 @@ def compare_effects(
 
     sizes, told_by: of the parity stage: sizes to begin with, and the nats that it says for an effect at an element: the
     first SUSPECTED are fitted whatever the screening says. effects: only these. strangers: an error without a name is
-    possible; False in an ablation. Raises NumericalError where nothing can be simulated.
+    possible; False in an ablation. stranger: what the logs show that no effect has. Raises NumericalError where nothing
+    can be simulated.
     """
     calibration = calibration if healthy is not None else calibration.absolute()
     made = candidates(arena.model, sizes, touched(arena), arena.values(base.z[None])[0])
@@ -108,6 +110,7 @@ def compare_effects(
         unexplained=unexplained, groups=groups, calibration=calibration, chronic=old, marginal=said.counted,
         whole=said.whole,
         asked=None if effects is None else tuple(effects), parity=told_by or {},
+        stranger=stranger if strangers else None,
     )  # fmt: skip
     which = concluded(material)
     order = _in_order(which, fits, said.counted)

@@ -47,7 +47,7 @@ def _verdict(found: Diagnosis) -> str:
     if which.verdict == "unknown":
         where = "" if found.channel is None else f" It acts most like something in channel {found.channel}."
         if which.stranger is not None:
-            where = f" The sensors beside what the camera sees: {which.stranger.what}."
+            where = f" The logs show it: {which.stranger.what}."
         return (
             f"Something is wrong that none of the effects looked for explains (p = {which.probability:.2f}): "
             f"{refit:.1f} mm at the end of an interval after refitting{part}, floor {floor:.1f} mm.{where}"

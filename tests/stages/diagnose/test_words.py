@@ -59,6 +59,13 @@ def test_each_verdict_has_its_sentence(diagnosis: SimpleNamespace, begins: str, 
     assert holds in said
 
 
+def test_what_the_logs_show_is_said_in_place_of_a_channel() -> None:
+    """Of something that no effect explains."""
+    strange = SimpleNamespace(what="off against the camera are sensor 0 by +22 mm and others")
+    said = sentence(found("unknown", stranger=strange))  # type: ignore[arg-type]
+    assert "The logs show it: off against the camera are sensor 0 by +22 mm" in said and "acts most like" not in said
+
+
 def test_of_many_names_the_likeliest_are_said() -> None:
     """And how many there are."""
     names = ("payload", "none", "unknown", "backlash", "motor_lag")

@@ -53,7 +53,7 @@ def stranger(findings: Sequence[Finding], about: np.ndarray) -> Stranger | None:
         return None
     loud = [k for k in np.argsort(-np.abs(size / sd)) if np.abs(size[k] / sd[k]) >= LOUD_SD]
     each = ", ".join(f"sensor {cables[k]} by {1e3 * size[k]:+.0f} mm" for k in sorted(loud, key=lambda k: cables[k]))
-    what = f"neither one sensor nor all of them alike: off are {each}, as no effect of the catalogue has it"
+    what = f"off against the camera are {each}, neither one nor all alike: no effect of the catalogue is that"
     return Stranger("sensing", Element("sensor"), total, what)
 
 

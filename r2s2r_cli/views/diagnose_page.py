@@ -116,6 +116,8 @@ def _shrinkage(report: DiagnoseReport) -> PageTable:
 
 def _seat(found: str, report: DiagnoseReport) -> str:
     """Where the cause sits; of a verdict that names none it is no more than a suspicion, and says so."""
+    if report.verdict == "no_gap" and found:
+        return f"below the floor; likeliest: {found}"
     if report.verdict != "ambiguous":
         return found or "-"
     if not found:

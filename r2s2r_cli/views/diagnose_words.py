@@ -43,7 +43,8 @@ WHY_NONE = (
     "a gain is what these runs say, before what is known beforehand. none gains nothing by definition: sets of known "
     "truth taught how much an effect must gain to be likelier. unknown has the share of causes that the catalogue "
     "lacks, whatever it gains: in calibration sets that gain did not tell such causes from others. It has more only "
-    "where the best effect leaves far more than healthy runs do. So none may be likelier than unknown, which gains more"
+    "where the best effect leaves far more than healthy runs do, or sensors are off as in no effect. So none may be "
+    "likelier than unknown, which gains more"
 )
 
 

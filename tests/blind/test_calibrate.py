@@ -175,7 +175,12 @@ def test_what_is_learned_from_is_what_counts(
 ) -> None:
     """For the learning as for a diagnosis: the same verdict has the same probabilities."""
     label = next(each for each in blind_bank.bank() if each["kind"] == "single" and each["d"] > 8)
-    rows = {"payload": (marginal, parity), "dropout": (0.0, parity), "none": (0.0, 0.0)}
+    rows = {
+        "payload": (marginal, parity),
+        "sensor_gain": (marginal, parity),
+        "dropout": (0.0, parity),
+        "none": (0.0, 0.0),
+    }
     document = {
         "ranking": [*({"effect": name, "elpd_gain": left_out, "marginal_nats": m, "parity_nats": p}
                       for name, (m, p) in rows.items()), {"effect": "unknown", "elpd_gain": unexplained}],
@@ -188,8 +193,9 @@ def test_what_is_learned_from_is_what_counts(
     by = known(calibrated(sets, words="test"))
     told = by.probabilities({name: by.score(name, m, left_out=left_out, parity=p) for name, (m, p) in rows.items()})
     assert own.probabilities(one) == pytest.approx(by.with_unknown(told, unexplained, 2.0), rel=1e-9)
-    for name, nats in (("payload", parity), ("dropout", parity)):
-        assert one.may_name(name) == by.witnessed(name, left_out, nats, rows[name][0])
+    for name in ("payload", "sensor_gain", "dropout"):
+        assert one.logs == (parity > 0.0)
+        assert one.may_name(name) == by.witnessed(name, left_out, parity, rows[name][0], logs=one.logs)
 
 
 def test_too_few_sets_teach_nothing() -> None:

@@ -127,6 +127,7 @@ def test_a_gap_that_is_to_grow_was_predicted_all_the_same() -> None:
     ("verdict", "first", "channel", "element"),
     [
         ("effect", "payload", "mass", "rod 1"),
+        ("no_gap", "payload", "below the floor; likeliest: mass", "below the floor; likeliest: rod 1"),
         ("ambiguous", "payload", "undecided; most suspect so far: mass", "undecided; most suspect so far: rod 1"),
         ("ambiguous", "none", "undecided; were something wrong, likeliest: mass",
          "undecided; were something wrong, likeliest: rod 1"),
@@ -142,7 +143,7 @@ def test_where_a_cause_sits_is_said_as_surely_as_the_verdict(
     assert ["channel", channel] in rows and ["element", element] in rows
     nowhere = made.where.model_copy(update={"channel": None, "element": None})
     rows = [row for table in diagnose_tables(made.model_copy(update={"where": nowhere})) for row in table.rows]
-    assert ["element", "-" if verdict == "effect" else "undecided"] in rows
+    assert ["element", "undecided" if verdict == "ambiguous" else "-"] in rows
 
 
 @pytest.mark.parametrize(

@@ -53,9 +53,11 @@ class Case:
         if name in (NONE, UNKNOWN):
             return False
         i = self.names.index(name)
-        if self.left_out is None or self.parity[i] > 0.0:
+        if self.parity[i] > 0.0:
             return True
-        return bool(self.left_out[i] > 0.0 and self.said[i] > 0.0) and not (self.logs and name in LOGGED)
+        if self.logs and name in LOGGED:
+            return False
+        return self.left_out is None or bool(self.left_out[i] > 0.0 and self.said[i] > 0.0)
 
 
 def case(truth: Truth, document: dict[str, Any]) -> Case | None:
@@ -73,4 +75,5 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
     parity = np.array([max(float(row.get("parity_nats", 0.0)) - BY_CHANCE, 0.0) for row in rows])
     strange = float(np.log1p(max(float(stranger["elpd_gain"]), 0.0) / FEW))
     left = max(float(document.get("left_nats") or 0.0), 0.0) / float(document.get("left_sd_nats") or np.inf)
-    return Case(names, np.maximum(said, 0.0), parity, truth.right, strange, left, np.maximum(left_out, 0.0))
+    logs = any(float(row.get("parity_nats") or 0.0) > 0.0 for row in rows)
+    return Case(names, np.maximum(said, 0.0), parity, truth.right, strange, left, np.maximum(left_out, 0.0), logs=logs)

@@ -113,7 +113,7 @@ def _ece(p: np.ndarray, right: np.ndarray) -> float:
 
 
 def _claimed(s: Said) -> bool:
-    """Whether it says that there is a gap; `no_gap` says where none lies."""
+    """Whether it says that there is a gap."""
     return s.verdict != "no_gap"
 
 

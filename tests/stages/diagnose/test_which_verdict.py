@@ -80,6 +80,21 @@ def test_what_logs_show_by_themselves_they_must_show() -> None:
         assert bool(said) != left_out_is_enough and all(name in text for text in said)
 
 
+def test_a_pair_needs_the_logs_of_both_its_names() -> None:
+    """A sensor that the replay alone finds wrong is no second cause either; the first may be named for itself."""
+    by = replace(BY, by_chance=4.0)
+    names = ("payload", "sensor_gain")
+    first = Ranked("payload", 30.0, 0.5, marginal=30.0)
+    ranks = [first, Ranked("sensor_gain", 20.0, 0.4, marginal=20.0), Ranked("none", 0.0, 0.1)]
+    assert verdict_of(ranks, by, names, GAP) == ("ambiguous", (), 0.5)
+    assert verdict_of([replace(first, probability=0.7), *ranks[1:]], by, names, GAP) == ("effect", ("payload",), 0.7)
+    (said,) = unwitnessed(ranks, by, names)
+    assert said.startswith("sensor_gain is no second cause")
+    assert verdict_of(ranks, by, names, GAP, logs=False)[0] == "pair"
+    heard = [first, replace(ranks[1], parity=4.1), ranks[2]]
+    assert verdict_of(heard, by, names, GAP)[0] == "pair" and not unwitnessed(heard, by, names)
+
+
 def test_what_no_law_has_is_unknown() -> None:
     """However well an effect explains the rest; without strangers (an ablation) nothing is."""
     names = BY.probabilities({"sensor_bias": 100.0, "none": 0.0})

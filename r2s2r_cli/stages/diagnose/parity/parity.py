@@ -52,8 +52,7 @@ def parity(evidence: Evidence, *, level: float = 0.05) -> Parity:
         missing += [f"in healthy runs, {what}" for what in base.missing]
     findings = [one for key, value in first.of.items() if (one := finding_of(key, value, base, first)) is not None]
     findings.sort(key=lambda one: -abs(one.z))
-    # Sensors of a robot that was never compared with itself may each be off by what nobody ever calibrated.
-    strange = None if base is None else stranger(findings, first.about)
+    strange = stranger(findings, first.about)
     return Parity(tuple(findings), (), tuple(missing), base is not None, level, first.knock, strange)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
+from r2s2r_cli.stages.diagnose.which.candidates import LOGGED
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked
 from r2s2r_cli.stages.diagnose.which.material import Material
 
@@ -16,14 +17,27 @@ def of_first(ranking: Sequence[Ranked], pair: tuple[str, ...] | None) -> float:
     return sum(one.probability for one in ranking if one.effect in both)
 
 
+def unheard(
+    ranking: Sequence[Ranked], calibration: Calibration, pair: tuple[str, ...], *, logs: bool = True
+) -> tuple[str, ...]:  # fmt: skip
+    """Names of a pair that logs would show by themselves and do not: a pair needs them of both. logs: they were looked
+    at."""
+    said = {one.effect: one.parity for one in ranking}
+    return tuple(name for name in pair if logs and name in LOGGED and said.get(name, 0.0) <= calibration.by_chance)
+
+
 def unwitnessed(
     ranking: Sequence[Ranked], calibration: Calibration, pair: tuple[str, ...] | None, *, logs: bool = True
 ) -> tuple[str, ...]:  # fmt: skip
     """Why the likeliest name is no verdict, where it would be one with a witness. logs: they were looked at."""
     first = ranking[0]
     likely = first.effect not in (NONE, UNKNOWN) and calibration.commits(of_first(ranking, pair))
-    if not likely or calibration.witnessed(first.effect, first.gain, first.parity, first.marginal, logs=logs):
+    if not likely:
         return ()
+    if calibration.witnessed(first.effect, first.gain, first.parity, first.marginal, logs=logs):
+        silent = unheard(ranking, calibration, pair, logs=logs) if pair is not None and first.effect in pair else ()
+        return tuple(f"{name} is no second cause: the sensors beside what the camera sees do not show it"
+                     for name in silent)  # fmt: skip
     if first.gain > 0.0 and first.marginal > 0.0:
         text = (
             f"the replay speaks for {first.effect} ({first.gain:+.1f} nats on what was left out), but not the sensors "

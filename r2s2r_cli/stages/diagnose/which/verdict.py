@@ -12,7 +12,7 @@ from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH, ENOUGH_OF_TWO
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.confusable import confusable
-from r2s2r_cli.stages.diagnose.which.doubts import of_first, unwitnessed, warnings_of
+from r2s2r_cli.stages.diagnose.which.doubts import of_first, unheard, unwitnessed, warnings_of
 from r2s2r_cli.stages.diagnose.which.fit import strain
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked, Screened, Shift, Which
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
@@ -156,7 +156,7 @@ def verdict_of(
     )
     if first.effect == UNKNOWN and (lawless or calibration.refuses(left_sd)):
         return "unknown", (), first.probability
-    if named and pair is not None and first.effect in pair:
+    if named and pair is not None and first.effect in pair and not unheard(ranking, calibration, pair, logs=logs):
         p = of_first(ranking, pair)
         if calibration.commits(p):
             return "pair", pair, p

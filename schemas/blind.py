@@ -111,6 +111,7 @@ class PublishedDiagnosis(Frozen):
     gap_nats: float | None = None
     left_nats: float | None = None
     left_sd_nats: float | None = None
+    stranger_sd2: float | None = None
     refit_rmse_m: float | None = None
     refit_upper_m: float | None = None
     refit_floor_m: float | None = None

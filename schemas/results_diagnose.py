@@ -110,6 +110,9 @@ INDISTINCT = 3.0
 """[nats] Two effects that runs tell apart by less than this cannot be told apart."""
 IN_WORDS = {"none": "nothing wrong", "unknown": "something unnamed"}
 """Names of a ranking that are no effects, in a sentence."""
+LAWLESS = 0.875
+"""How probable a cause without a name is where the logs show what no law of the catalogue has: six of six such
+calibration sets had one (`calibration-3` to `-9`; Laplace's rule of succession)."""
 BY_CHANCE = 4.0
 """[nats] That the parity stage says for the best of a whole catalogue where nothing is wrong: less than that says
 nothing, and weighed like more it outdoes gains that are real."""
@@ -189,6 +192,9 @@ class DiagnoseReport(Frozen):
     """The same, each piece under the hypothesis that predicts it best: what no effect explains."""
     left_sd_nats: float | None = None
     """Sd of both, from how much pieces differ."""
+    stranger_sd2: float | None = None
+    """What any two laws of the catalogue leave of the offsets of the sensors, sum of squares over their errors; None:
+    nothing that stands out."""
     calibrated: str
     left_out: str
     segments: tuple[SegmentFound, ...]

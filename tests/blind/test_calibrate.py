@@ -11,6 +11,7 @@ from r2s2r_cli.blind.score.cases import FEW, HELD, Case, case
 from r2s2r_cli.blind.score.facts import truth_of
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
+from schemas.results_diagnose import LAWLESS
 from tests.guards.listing import ROOT
 from tests.support import blind_bank
 
@@ -193,6 +194,10 @@ def test_what_is_learned_from_is_what_counts(
     by = known(calibrated(sets, words="test"))
     told = by.probabilities({name: by.score(name, m, left_out=left_out, parity=p) for name, (m, p) in rows.items()})
     assert own.probabilities(one) == pytest.approx(by.with_unknown(told, unexplained, 2.0), rel=1e-9)
+    lawless = case(truth_of(label), {**document, "stranger_sd2": 60.0})
+    assert lawless is not None
+    told = by.with_unknown(told, unexplained, 2.0, lawless=True)
+    assert own.probabilities(lawless) == pytest.approx(told, rel=1e-9) and told["unknown"] >= LAWLESS
     for name in ("payload", "sensor_gain", "dropout"):
         assert one.logs == (parity > 0.0)
         assert one.may_name(name) == by.witnessed(name, left_out, parity, rows[name][0], logs=one.logs)

@@ -25,7 +25,7 @@ import numpy as np
 from r2s2r_cli.blind.score.cases import FEW, HELD, Case
 from r2s2r_cli.blind.score.facts import NONE, UNKNOWN
 from r2s2r_cli.errors import InputError
-from schemas.results_diagnose import BY_CHANCE
+from schemas.results_diagnose import BY_CHANCE, LAWLESS
 
 LEAST_SETS = 12
 LEARNED = ("sharpness", "parity", "none")
@@ -136,7 +136,9 @@ def _probabilities(one: Case, numbers: np.ndarray, strange: np.ndarray, *, least
     x = _design(one) @ numbers
     e = np.exp(x - x.max())
     p = (1.0 - LAPSE) * e / e.sum() + LAPSE / len(x)
-    share = max(float(1.0 / (1.0 + np.exp(-strange[0] - strange[1] * one.strange))), least)
+    share = max(
+        float(1.0 / (1.0 + np.exp(-strange[0] - strange[1] * one.strange))), least, LAWLESS if one.lawless else 0.0
+    )
     return dict(zip(one.names, ((1.0 - share) * p).tolist(), strict=True)) | {UNKNOWN: share}
 
 

@@ -25,7 +25,7 @@ class Case:
     BY_CHANCE. truth: the right name, not among `names` where the screening had lost it, or no catalogue has it
     (`unknown`). strange: ln(1 + x / FEW) of what a wider floor gains beside the best effect, x [nats]; left_sd: what
     that leaves, in sd of healthy pieces, 0 where that is less than in healthy runs. replayed: False, nothing but the
-    parity stage is asked; logs: False, it is not."""
+    parity stage is asked; logs: False, it is not. lawless: the logs show what no law has."""
 
     names: tuple[str, ...]
     said: np.ndarray
@@ -36,6 +36,7 @@ class Case:
     left_out: np.ndarray | None = None
     replayed: bool = True
     logs: bool = True
+    lawless: bool = False
 
     @property
     def gain(self) -> np.ndarray:
@@ -76,4 +77,5 @@ def case(truth: Truth, document: dict[str, Any]) -> Case | None:
     strange = float(np.log1p(max(float(stranger["elpd_gain"]), 0.0) / FEW))
     left = max(float(document.get("left_nats") or 0.0), 0.0) / float(document.get("left_sd_nats") or np.inf)
     logs = any(float(row.get("parity_nats") or 0.0) > 0.0 for row in rows)
-    return Case(names, np.maximum(said, 0.0), parity, truth.right, strange, left, np.maximum(left_out, 0.0), logs=logs)
+    return Case(names, np.maximum(said, 0.0), parity, truth.right, strange, left, np.maximum(left_out, 0.0), logs=logs,
+                lawless=document.get("stranger_sd2") is not None)  # fmt: skip

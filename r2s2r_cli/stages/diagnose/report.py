@@ -46,6 +46,7 @@ def diagnose_report(found: Diagnosis) -> DiagnoseReport:
         refit_rmse_m=which.no_gap.rmse, refit_upper_m=which.no_gap.upper, refit_floor_m=which.no_gap.floor,
         refit_kept=which.no_gap.kept, chance_nats=which.chance,
         gap_nats=_known(which.left.refit), left_nats=_known(which.left.best), left_sd_nats=_known(which.left.sd),
+        stranger_sd2=None if which.stranger is None else which.stranger.left,
         calibrated=which.calibrated, left_out=which.within, segments=_segments(found),
         hidden=tuple(shift.words for shift in which.shifts), parity=_parity(found), missing=_missing(found),
         refit=found.refit, refit_units={name: _unit(name) for name in found.refit}, rollouts=found.rollouts,

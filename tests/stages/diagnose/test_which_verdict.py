@@ -9,7 +9,7 @@ import pytest
 
 from r2s2r_cli.blind.score import facts
 from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
-from r2s2r_cli.stages.diagnose.which.calibration import LAWLESS, Calibration, calibration
+from r2s2r_cli.stages.diagnose.which.calibration import Calibration, calibration
 from r2s2r_cli.stages.diagnose.which.candidates import LOGGED, NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.doubts import unwitnessed
 from r2s2r_cli.stages.diagnose.which.found import Ranked
@@ -18,6 +18,7 @@ from r2s2r_cli.stages.diagnose.which.pair_share import LEAST, SHARE, TwoCauses, 
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.verdict import verdict_of
+from schemas.results_diagnose import LAWLESS
 
 BY = Calibration(commit=0.6, held=0.3)
 CHANCE = 5.0

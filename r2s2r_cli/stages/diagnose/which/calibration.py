@@ -12,10 +12,8 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
 from r2s2r_cli.stages.diagnose.which.candidates import LOGGED, NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN
+from schemas.results_diagnose import LAWLESS
 
-LAWLESS = 0.875
-"""How probable a stranger is where the logs show what no law of the catalogue has: six of six such calibration sets
-were one (`calibration-3` to `-9`; Laplace's rule of succession)."""
 FILE = "calibration.json"
 """Beside this module; made by the calibration run of the blind trials, and frozen before any blind set exists."""
 

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.effects import CATALOGUE
+from r2s2r_cli.stages.diagnose.parity.finding import Element
+from r2s2r_cli.stages.diagnose.parity.stranger import Stranger
 from r2s2r_cli.stages.diagnose.which import verdict as module
 from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
@@ -20,6 +22,7 @@ from r2s2r_cli.stages.diagnose.which.rivals import NoGap
 from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.screen import LEAST_RESPONSE, Response
 from r2s2r_cli.stages.diagnose.which.verdict import concluded
+from schemas.results_diagnose import LAWLESS
 from tests.support.linear_arena import STRETCHES, LinearArena, candidate
 
 BY = Calibration(temperature=7.5, held=0.25, none=30.0, commit=0.54, conformal=0.01, stranger=-2.0, wider=0.7,
@@ -42,11 +45,11 @@ def score(gain: float) -> Score:
 def said(
     by: Calibration, *, left_out: float = 20.0, left: float = 0.0, unexplained: float = 0.0, parity: float = 0.0,
     of_payload: float = 0.0, pair: tuple[float, float] | None = None, screened: tuple[Response, ...] = (),
-    asked: tuple[str, ...] | None = ("payload", "motor_lag"),
+    asked: tuple[str, ...] | None = ("payload", "motor_lag"), stranger: Stranger | None = None,
 ) -> Which:  # fmt: skip
     """Of a payload with 90 nats on all data and 20 left out, and a lag with 40 and 60. left_out: of the payload;
     parity: for the lag, of_payload: for the payload. pair: what both together gain left out, and on all data.
-    screened: other effects, of those `asked` for."""
+    screened: other effects, of those `asked` for. stranger: of the logs."""
     arena = LinearArena(1.0)
     zero = np.zeros((STRETCHES, 0))
     fits = [Fit(Hypothesis((candidate(name, k),)), np.zeros(2), np.ones(1), np.zeros(1), np.zeros((1, 3)), 0.0,
@@ -62,7 +65,7 @@ def said(
         responses=screened, chance=5.0, no_gap=NoGap(0.02, 0.03, 0.01, 0.0), wider=1.0, left=Left(50.0, left, 1.0),
         unexplained=unexplained, groups=arena.gait, calibration=by, chronic=np.zeros(len(fits)),
         marginal=np.array(marginal), whole=np.array(whole), asked=asked,
-        parity={"motor_lag": {None: parity}, "payload": {None: of_payload}},
+        parity={"motor_lag": {None: parity}, "payload": {None: of_payload}}, stranger=stranger,
     ))  # fmt: skip
 
 
@@ -102,6 +105,16 @@ def test_without_healthy_runs_the_lesser_gain_counts() -> None:
 def test_parity_speaks_beside_the_replay() -> None:
     """10 nats of it at 15 each outdo the 50 that the lag is short of."""
     assert said(BY, parity=10.0).effects == ("motor_lag",)
+
+
+def test_what_the_logs_show_and_no_law_has_is_the_verdict() -> None:
+    """However well a name explains the rest; where it sits, and by how much, goes on to the report."""
+    strange = Stranger("sensing", Element("sensor"), 60.0, "off are sensors 0, 7 and 8")
+    found = said(BY, stranger=strange)
+    assert (found.verdict, found.effects, found.probability) == ("unknown", (), LAWLESS)
+    assert found.ranking[0].effect == "unknown" and found.stranger is strange
+    assert sum(one.probability for one in found.ranking) == pytest.approx(1.0)
+    assert said(BY, stranger=strange, unexplained=-np.inf).ranking[0].effect == "payload"
 
 
 def test_a_stranger_takes_its_share_of_all_names() -> None:

@@ -110,6 +110,11 @@ INDISTINCT = 3.0
 """[nats] Two effects that runs tell apart by less than this cannot be told apart."""
 IN_WORDS = {"none": "nothing wrong", "unknown": "something unnamed"}
 """Names of a ranking that are no effects, in a sentence."""
+NO_REPLAY = ("camera_pose", "dropout")
+"""Effects that change no prediction, only what is seen or missing: intervals begin where the camera saw the robot, so
+that one which was moved is seen where it was. The parity stage sees both."""
+LOGGED = ("sensor_bias", "sensor_gain")
+"""Effects that logs show without a simulator: what a sensor says beside what the camera sees of its cable."""
 LAWLESS = 0.875
 """How probable a cause without a name is where the logs show what no law of the catalogue has: six of six such
 calibration sets had one (`calibration-3` to `-9`; Laplace's rule of succession)."""

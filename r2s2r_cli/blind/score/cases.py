@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from r2s2r_cli.blind.score.facts import LOGGED, NO_REPLAY, NONE, UNKNOWN, Truth
-from schemas.results_diagnose import BY_CHANCE
+from r2s2r_cli.blind.score.facts import NONE, UNKNOWN, Truth
+from schemas.results_diagnose import BY_CHANCE, LOGGED, NO_REPLAY
 
 HELD = 0.3
 """Of what an effect gains the share that left-out gaits say; the rest is what all data do, which rank better. They are

@@ -6,10 +6,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 NONE, UNKNOWN = "none", "unknown"
-NO_REPLAY = ("camera_pose", "dropout")
-"""Effects that change no prediction, only what is seen or missing (a test holds it to that of `diagnose`)."""
-LOGGED = ("sensor_bias", "sensor_gain")
-"""Effects that logs show without a simulator (the same test)."""
 WEAK, CLEAR = 3.0, 8.0
 """Bounds of d between what lies under the floor, weak, and clear."""
 

@@ -10,9 +10,10 @@ from r2s2r_cli.effects import CATALOGUE
 from r2s2r_cli.engine.flat import pack_parameters
 from r2s2r_cli.stages.diagnose.parity.expected import EXPECTED
 from r2s2r_cli.stages.diagnose.parity.suspects import suspicions
-from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY, candidates
+from r2s2r_cli.stages.diagnose.which.candidates import candidates
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.identified import nominal
+from schemas.results_diagnose import NO_REPLAY
 from tests.support.builders import robot
 
 

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from r2s2r_cli.blind.score import facts
+from r2s2r_cli.effects import CATALOGUE
 from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration, calibration
-from r2s2r_cli.stages.diagnose.which.candidates import LOGGED, NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.doubts import unwitnessed
 from r2s2r_cli.stages.diagnose.which.found import Ranked
 from r2s2r_cli.stages.diagnose.which.left import Left
@@ -18,7 +17,7 @@ from r2s2r_cli.stages.diagnose.which.pair_share import LEAST, SHARE, TwoCauses, 
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap, no_gap
 from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.verdict import verdict_of
-from schemas.results_diagnose import LAWLESS
+from schemas.results_diagnose import LAWLESS, LOGGED, NO_REPLAY
 
 BY = Calibration(commit=0.6, held=0.3)
 CHANCE = 5.0
@@ -258,7 +257,7 @@ def test_a_finding_that_the_replay_refutes_says_nothing() -> None:
     assert learned.score("motor_lag", 2.0, left_out=2.0, parity=21.0) == pytest.approx((1.0 + 4.5) * 2.0)
     assert learned.score("motor_lag", 9.0, left_out=9.0, parity=8.0) == pytest.approx(9.0 + 4.5 * 4.0)
     assert learned.score("dropout", parity=36.0) == pytest.approx(4.5 * 32.0)
-    assert facts.NO_REPLAY == NO_REPLAY and facts.LOGGED == LOGGED
+    assert {*NO_REPLAY, *LOGGED} <= {effect.name for effect in CATALOGUE}
 
 
 def _score(squared: np.ndarray) -> Score:

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from r2s2r_cli.stages.diagnose.parity.finding import Element
-from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
 from r2s2r_cli.stages.diagnose.words import ADVICE, sentence
+from schemas.results_diagnose import NO_REPLAY
 
 
 def found(verdict: str, **changes: object) -> SimpleNamespace:

@@ -43,15 +43,15 @@ def stranger(findings: Sequence[Finding], about: np.ndarray) -> Stranger | None:
     """Of the offsets of the sensors since the healthy runs (findings `sensor_bias`), taken at lengths `about` (cable,)
     [m]; None where two laws explain them, or too few are known. Those that no healthy run was compared with do not
     count: sensors that nobody calibrated are each off by their own."""
-    offsets = [
-        one for one in findings
-        if one.check == "sensor_bias" and one.element.index is not None and one.differential
-    ]  # fmt: skip
+    offsets = {
+        k: one for one in findings
+        if one.check == "sensor_bias" and (k := one.element.index) is not None and one.differential
+    }  # fmt: skip
     if len(offsets) < FEWEST:
         return None
-    size = np.array([one.value - one.expected for one in offsets])
-    sd = np.array([np.hypot(one.sd, one.expected_sd) for one in offsets])
-    cables = [one.element.index or 0 for one in offsets]
+    cables = list(offsets)
+    size = np.array([one.value - one.expected for one in offsets.values()])
+    sd = np.array([np.hypot(one.sd, one.expected_sd) for one in offsets.values()])
     laws = np.concatenate([np.eye(len(size)), np.ones((1, len(size))), np.nan_to_num(about[cables])[None]])
     left = _left(size / sd, laws / sd)
     total = float(left @ left)

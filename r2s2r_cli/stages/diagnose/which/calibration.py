@@ -10,9 +10,8 @@ from importlib import resources
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.parity.finding import ABSOLUTE
-from r2s2r_cli.stages.diagnose.which.candidates import LOGGED, NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN
-from schemas.results_diagnose import LAWLESS
+from schemas.results_diagnose import LAWLESS, LOGGED, NO_REPLAY
 
 FILE = "calibration.json"
 """Beside this module; made by the calibration run of the blind trials, and frozen before any blind set exists."""

@@ -11,6 +11,7 @@ import numpy as np
 from r2s2r_cli.engine.hooks import Hooks
 from r2s2r_cli.stages.diagnose.parity.finding import Element
 from r2s2r_cli.stages.diagnose.which.numbers import Model
+from schemas.results_diagnose import NO_REPLAY
 
 KIND = {"rod": "rod", "cap": "cap", "cable": "cable", "actuated": "motor", "sensor": "sensor"}
 """Kind of the element, by what a parameter is counted `per`."""
@@ -22,11 +23,6 @@ SAME_AS_NUISANCE = ("motor_speed_mismatch", "cap_friction", "tendon_stiffness", 
 """Effects that are a nuisance where all elements have them alike."""
 PASSIVE_ONLY = ("tendon_set",)
 """Effects that a winch makes up for: nobody sees what the rest length of a winched cable is off by."""
-NO_REPLAY = ("camera_pose", "dropout")
-"""Effects that change no prediction, only what is seen or missing: intervals begin where the camera saw the robot, so
-that one which was moved is seen where it was. The parity stage sees both."""
-LOGGED = ("sensor_bias", "sensor_gain")
-"""Effects that logs show without a simulator: what a sensor says beside what the camera sees of its cable."""
 PARTS = {
     "friction_field": (("gradient_x_per_m", "gradient_y_per_m"),
                        ("patch_factor", "patch_x_m", "patch_y_m", "patch_radius_m")),

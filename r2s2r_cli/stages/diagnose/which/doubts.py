@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
-from r2s2r_cli.stages.diagnose.which.candidates import LOGGED
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked
 from r2s2r_cli.stages.diagnose.which.material import Material
+from schemas.results_diagnose import LOGGED
 
 
 def of_first(ranking: Sequence[Ranked], pair: tuple[str, ...] | None) -> float:
@@ -29,7 +29,8 @@ def unheard(
 def unwitnessed(
     ranking: Sequence[Ranked], calibration: Calibration, pair: tuple[str, ...] | None, *, logs: bool = True
 ) -> tuple[str, ...]:  # fmt: skip
-    """Why the likeliest name is no verdict, where it would be one with a witness. logs: they were looked at."""
+    """Why the likeliest name is no verdict, where it would be one with a witness, or is not one of a pair. logs: they
+    were looked at."""
     first = ranking[0]
     likely = first.effect not in (NONE, UNKNOWN) and calibration.commits(of_first(ranking, pair))
     if not likely:

@@ -10,7 +10,6 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.parity.finding import Element
 from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH, ENOUGH_OF_TWO
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
-from r2s2r_cli.stages.diagnose.which.candidates import NO_REPLAY
 from r2s2r_cli.stages.diagnose.which.confusable import confusable
 from r2s2r_cli.stages.diagnose.which.doubts import of_first, unheard, unwitnessed, warnings_of
 from r2s2r_cli.stages.diagnose.which.fit import strain
@@ -21,6 +20,7 @@ from r2s2r_cli.stages.diagnose.which.pair_share import TwoCauses, with_pairs
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap
 from r2s2r_cli.stages.diagnose.which.score import Score, gain_sds, gains as gains_of
 from r2s2r_cli.stages.diagnose.which.screen import Response
+from schemas.results_diagnose import NO_REPLAY
 
 NINETY = 1.645
 LIKELY = 0.5
@@ -145,11 +145,11 @@ def verdict_of(
     lawless: bool = False, logs: bool = True,
 ) -> tuple[str, tuple[str, ...], float]:  # fmt: skip
     """What the first of the ranking is worth. Where the best effect leaves too much (left_sd, `Calibration.refuses`),
-    or the logs show what no law has (lawless), that is a verdict of its own: no effect of the catalogue is enough.
-    logs: they were looked at. A name that nothing speaks for but what it was
-    fitted to is none (`Calibration.witnessed`), alone or first of a pair: what both gain is no witness of either.
-    Where no cause is named, that there is no gap is a claim about its size (docs/concepts/measures.md), not about
-    causes that hide below the floor."""
+    or the logs show what no law has (lawless), that is a verdict of its own: no effect of the catalogue is enough. A
+    name that nothing speaks for but what it was fitted to is none (`Calibration.witnessed`), alone or first of a pair:
+    what both gain is no witness of either, and a pair needs what logs would show of both (`unheard`; logs: they were
+    looked at). Where no cause is named, that there is no gap is a claim about its size (docs/concepts/measures.md), not
+    about causes that hide below the floor."""
     first = ranking[0]
     named = first.effect not in (NONE, UNKNOWN) and calibration.witnessed(
         first.effect, first.gain, first.parity, first.marginal, logs=logs

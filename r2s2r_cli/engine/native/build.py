@@ -12,7 +12,7 @@ from typing import Any
 import torch
 
 from r2s2r_cli.engine.native import cache, machine
-from r2s2r_cli.engine.native.kernels import Texts, module_text
+from r2s2r_cli.engine.native.kernels import module_text
 from r2s2r_cli.engine.native.llvm_text import Target
 from r2s2r_cli.engine.native.packs import Twins
 from r2s2r_cli.engine.native.program import (
@@ -89,19 +89,17 @@ class Builder:
         stored = cache.read(path) if path else None
         times = {"trace_s": 0.0, "emit_s": 0.0, "compile_s": 0.0}
         if stored is None:
-            texts, operations = self._text(kernel, times)
+            text, operations = self._text(kernel, times)
             start = perf_counter()
-            codes = [machine.compiled(texts.kernel)]
-            if texts.called is not None:
-                codes.append(machine.compiled(texts.called))
+            code = machine.compiled(text)
             times["compile_s"] = perf_counter() - start
             if path:
-                cache.write(path, {"operations": operations}, codes)
+                cache.write(path, {"operations": operations}, code)
         else:
-            about, codes = stored
+            about, code = stored
             operations = about["operations"]
         start = perf_counter()
-        function = machine.loaded(codes, n_arrays)
+        function = machine.loaded(code, n_arrays)
         self.log.append(
             Build(
                 kernel.kind,
@@ -122,7 +120,7 @@ class Builder:
         parts: list[Any] = [self._key, self._sizes, kernel.kind, REAL[kernel.dtype], kernel.lanes, active, self._twins]
         return self._cache_dir / cache.file_name(*parts)
 
-    def _text(self, kernel: Kernel, times: dict[str, float]) -> tuple[Texts, int]:
+    def _text(self, kernel: Kernel, times: dict[str, float]) -> tuple[str, int]:
         start = perf_counter()
         forward = self.program(kernel.dtype)
         target = Target(REAL[kernel.dtype], kernel.lanes, dual=kernel.kind == "tangent")
@@ -133,6 +131,6 @@ class Builder:
             program = tangent_program(forward, kernel.active)
         times["trace_s"] = perf_counter() - start
         start = perf_counter()
-        texts = module_text(program, target, self._twins)
+        text = module_text(program, target, self._twins)
         times["emit_s"] = perf_counter() - start
-        return texts, program.operations()
+        return text, program.operations()

@@ -8,16 +8,14 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Sequence
 from functools import lru_cache
 from hashlib import sha256
-from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Any
 
 from r2s2r_cli.engine.native import machine
 
-_MAGIC = b"r2s2r kernel 1\n"
+_MAGIC = b"r2s2r kernel 2\n"
 
 
 @lru_cache(maxsize=1)
@@ -39,8 +37,8 @@ def file_name(*parts: Any) -> str:
     return sha256(json.dumps([source_hash(), *parts]).encode()).hexdigest() + ".kernel"
 
 
-def read(path: Path) -> tuple[dict[str, Any], list[bytes]] | None:
-    """What is known about the kernel, and its object codes; None if there is no whole file."""
+def read(path: Path) -> tuple[dict[str, Any], bytes] | None:
+    """What is known about the kernel, and its object code; None if there is no whole file."""
     try:
         content = path.read_bytes()
     except OSError:
@@ -48,16 +46,13 @@ def read(path: Path) -> tuple[dict[str, Any], list[bytes]] | None:
     head, _, rest = content[len(_MAGIC) :].partition(b"\n")
     if not content.startswith(_MAGIC) or head != sha256(rest).hexdigest().encode():
         return None
-    line, _, joined = rest.partition(b"\n")
-    about = json.loads(line)
-    ends = list(accumulate(about.pop("sizes"), initial=0))
-    return about, [joined[a:b] for a, b in pairwise(ends)]
+    line, _, code = rest.partition(b"\n")
+    return json.loads(line), code
 
 
-def write(path: Path, about: dict[str, Any], codes: Sequence[bytes]) -> None:
+def write(path: Path, about: dict[str, Any], code: bytes) -> None:
     """Write a kernel: whole under its name, or not at all."""
-    line = json.dumps({**about, "sizes": [len(code) for code in codes]})
-    rest = line.encode() + b"\n" + b"".join(codes)
+    rest = json.dumps(about).encode() + b"\n" + code
     temporary = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -187,9 +187,7 @@ class Body:
         for k, (value, w, wide) in enumerate(zip(given, waiting, wide_in, strict=True)):
             value = self.load(value, vector=self.vector(inputs[k])) if w else value
             self.store(value, self.element("%arguments", k, vector=True), vector=wide)
-        name = f"@subroutine{number}"
-        self.module.declared.setdefault(name, f"declare void {name}(ptr, ptr)")
-        self.do(f"call void {name}(ptr %arguments, ptr %results)")
+        self.do(f"call void @subroutine{number}(ptr %arguments, ptr %results)")
         results = []
         for k, (other, wide) in enumerate(zip(rest, wide_out, strict=True)):
             result = self.load(self.element("%results", k, vector=True), vector=wide)
@@ -223,5 +221,5 @@ def subroutine_text(module: Module, sub: Subroutine, number: int) -> None:
     for k, i in enumerate(sub.outputs):
         wide = body.vector(i) if not sub.dual else 2 * k >= len(sub.outputs)
         body.store(body.value(i, vector=wide), body.element("%results", k, vector=True), vector=wide)
-    head = f"define void @subroutine{number}(ptr noalias %arguments, ptr noalias %results) nounwind {{"
+    head = f"define internal void @subroutine{number}(ptr noalias %arguments, ptr noalias %results) nounwind {{"
     module.functions.append("\n".join([head, *body.lines, "ret void", "}"]))

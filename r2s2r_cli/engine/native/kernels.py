@@ -8,7 +8,6 @@ step t reads row t // hold of the inputs, and the state after it is frame (t + 1
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from r2s2r_cli.engine.native.emit import Body, Place, subroutine_text
 from r2s2r_cli.engine.native.graph import Graph
@@ -20,15 +19,6 @@ from r2s2r_cli.engine.native.passes import depths, live
 from r2s2r_cli.engine.native.program import Backward, Forward, Tangent
 
 STEPS = "i64 %begin, i64 %end, i64 %hold, i64 %every"
-
-
-@dataclass(frozen=True)
-class Texts:
-    """LLVM text of a kernel. called: module of its subroutines: rare for one environment, not for eight side by side, where
-    any of them may need one."""
-
-    kernel: str
-    called: str | None
 
 
 class _Kernel:
@@ -106,24 +96,23 @@ class _Kernel:
         self._at.block = "finish"
         return self._at
 
-    def text(self, *blocks: str) -> Texts:
-        """The modules."""
-        called = Module(self.module.target)
+    def text(self, *blocks: str) -> str:
+        """The module, with the subroutines that it calls."""
         for number in self._used:
-            subroutine_text(called, self.g.subroutines[number], number)
+            subroutine_text(self.module, self.g.subroutines[number], number)
         self.module.functions.append("\n".join([self.head, "entry:", *self.entry.lines, *blocks, "}"]))
-        return Texts(self.module.text(), called.text() if self._used else None)
+        return self.module.text()
 
 
-def module_text(program: Forward | Backward | Tangent, target: Target, twins: Twins = ()) -> Texts:
-    """Text of the modules with the program's kernel; twins: see `packs`."""
+def module_text(program: Forward | Backward | Tangent, target: Target, twins: Twins = ()) -> str:
+    """Text of the module with the program's kernel; twins: see `packs`."""
     if isinstance(program, Backward):
         return backward_text(program, target, twins)
     return forward_text(program, target, twins) if isinstance(program, Forward) else tangent_text(program, target)
 
 
-def forward_text(program: Forward, target: Target, twins: Twins = ()) -> Texts:
-    """Modules of the forward kernel: (S, F, U, P, H, steps). S: the state, replaced; F: frames."""
+def forward_text(program: Forward, target: Target, twins: Twins = ()) -> str:
+    """Module of the forward kernel: (S, F, U, P, H, steps). S: the state, replaced; F: frames."""
     kernel = _Kernel(target, program.graph, program.state, (), "S F U P H", twins)
     body = kernel.body({"s": "%S", "u": "%u"})
     kernel.run(body)
@@ -133,8 +122,8 @@ def forward_text(program: Forward, target: Target, twins: Twins = ()) -> Texts:
     )
 
 
-def tangent_text(program: Tangent, target: Target) -> Texts:
-    """Modules of the tangent kernel: (S, DS, F, DF, U, DU, P, DP, H, steps)."""
+def tangent_text(program: Tangent, target: Target) -> str:
+    """Module of the tangent kernel: (S, DS, F, DF, U, DU, P, DP, H, steps)."""
     kernel = _Kernel(target, program.graph, (*program.state, *program.tangents), (), "S DS F DF U DU P DP H")
     body = kernel.body({"s": "%S", "ds": "%DS", "u": "%u", "du": "%du"})
     body.run(kernel.split.inside)
@@ -145,8 +134,8 @@ def tangent_text(program: Tangent, target: Target) -> Texts:
     return kernel.text(_loop_head(body, rows), *body.lines, _frames(target, [("F", "S", n), ("DF", "DS", n)]))
 
 
-def backward_text(program: Backward, target: Target, twins: Twins = ()) -> Texts:
-    """Modules of the backward kernel: (S, U, P, H, A, GF, GU, GP, steps).
+def backward_text(program: Backward, target: Target, twins: Twins = ()) -> str:
+    """Module of the backward kernel: (S, U, P, H, A, GF, GU, GP, steps).
 
     S: states from `begin` on. A: adjoint of the last state, replaced by that of the first. GF: adjoints of frames. GU,
     GP: adjoints of inputs and parameters, added to. Adjoints of hoisted values gather in the loop and are taken back to

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -76,15 +76,14 @@ def compiled(text: str) -> bytes:
     return bytes(machine.emit_object(module))
 
 
-def loaded(codes: Sequence[bytes], n_arrays: int) -> Callable[..., None]:
-    """The function `kernel` of the object codes: n_arrays addresses, then four integers. It keeps its code alive."""
+def loaded(code: bytes, n_arrays: int) -> Callable[..., None]:
+    """The function `kernel` of object code: n_arrays addresses, then four integers. It keeps its code alive."""
     llvm = binding()
     empty = llvm.parse_assembly("")
     target = _machine()
     empty.triple = target.triple
     engine = llvm.create_mcjit_compiler(empty, target)
-    for code in codes:
-        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
     kind = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * n_arrays, *[ctypes.c_int64] * 4)
     function = kind(engine.get_function_address("kernel"))

@@ -89,7 +89,7 @@ def test_equal_parts_share_instructions(kind: str) -> None:
     texts = []
     for twins in ((), right_twins()):
         step = NativeStep(parts, 2 * PARTS, PARTS, 2 * PARTS + 1, key="", twins=twins)
-        texts.append(step._builder._text(Kernel(kind, torch.float64, 1), {})[0].kernel)
+        texts.append(step._builder._text(Kernel(kind, torch.float64, 1), {})[0])
     assert "<4 x double>" not in texts[0]
     assert "sqrt.v4f64" in texts[1]
     arithmetic = [

@@ -74,9 +74,7 @@ def compare(
     console = Console(json=json, quiet=quiet)
     here = Project.find(project)
     place = here.iteration(iteration, first="r2s2r plan   # then: execute, estimate")
-    kinds = ("recording", "estimate")
-    executed = any(place.artifact(kind, executed=True).exists() for kind in kinds) if of is None else of is Of.EXECUTE
-    asked = Asked(here, place, tuple(model or ()), "execute" if executed else "record", own)
+    asked = Asked(here, place, tuple(model or ()), None if of is None else of.value, own)
     run = StageRun(
         stage="compare", kind="comparison", project=here, iteration=place, find_inputs=asked.refs,
         report_model=CompareReport, flags=asked.flags(), dry_run=dry_run, force=force,

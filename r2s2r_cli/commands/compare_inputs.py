@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from r2s2r_cli.commands.compare_models import learned_names, require_current
 from r2s2r_cli.commands.outcome import require_input, require_model
 from r2s2r_cli.errors import InputError, UsageError, quoted
+from r2s2r_cli.store.again import GIVEN, SELECTED
 from r2s2r_cli.store.project import Iteration, Project, iteration_number
 from schemas.header import InputRef
 
@@ -30,34 +31,45 @@ TRAIN = 1
 @dataclass(frozen=True)
 class Asked:
     """The request of one command line. models: as typed, FILE or NAME=FILE; empty: robot.toml and every identification
-    up to this iteration. of: `record` or `execute`. own: without the executed runs of earlier iterations."""
+    up to this iteration. of: `record`, `execute`, or None: executed runs where there are any. own: without the executed
+    runs of earlier iterations."""
 
     project: Project
     iteration: Iteration
     models: tuple[str, ...]
-    of: str
+    of: str | None
     own: bool = False
 
     def flags(self) -> dict[str, Any]:
         """What else than settings and inputs decides the result, for the provenance."""
         models = {name: self.project.relative(path) for name, path in self.files.items()}
-        return {"models": models, "of": self.of, "own": self.own}
+        typed = {"models": bool(self.models), "of": self.of is not None}
+        given = [name for name in SELECTED["compare"] if typed[name]]
+        return {"models": models, "of": "execute" if self.executed else "record", "own": self.own, GIVEN: given}
+
+    @cached_property
+    def executed(self) -> bool:
+        """Whether executed runs are compared, not the recorded ones."""
+        if self.of is not None:
+            return self.of == "execute"
+        kinds = ("recording", "estimate")
+        return any(self.iteration.artifact(kind, executed=True).exists() for kind in kinds)
 
     @cached_property
     def places(self) -> tuple[Iteration, ...]:
         """Iterations whose runs are compared: this one, then earlier ones with executed runs, the first one first."""
-        if self.own or self.of != "execute":
+        if self.own or not self.executed:
             return (self.iteration,)
         earlier = [one for one in self.project.iterations() if one.number < self.iteration.number]
         return self.iteration, *(one for one in earlier if one.artifact("estimate", executed=True).exists())
 
     def estimate(self, place: Iteration) -> Path:
         """The states of the real runs."""
-        return place.artifact("estimate", executed=self.of == "execute")
+        return place.artifact("estimate", executed=self.executed)
 
     def recording(self, place: Iteration) -> Path:
         """What they were made of."""
-        return place.artifact("recording", executed=self.of == "execute")
+        return place.artifact("recording", executed=self.executed)
 
     def prefix(self, place: Iteration) -> str:
         """Before the names of its runs: those of other iterations may have the same."""
@@ -115,15 +127,17 @@ class Asked:
         number = self.iteration.number
         require_input(
             self.estimate(self.iteration),
-            f"r2s2r estimate --iteration {number}" + " --of execute" * (self.of == "execute"),
+            f"r2s2r estimate --iteration {number}" + " --of execute" * self.executed,
         )
         for path in self.files.values():
             require_model(self.project, path, "compare")
+        return [artifact_ref(self.project, path, whole_header(path)) for path in self.artifacts()]
+
+    def artifacts(self) -> list[Path]:
+        """What is read, each file once: one may be two simulators, by two names."""
         states = [self.estimate(place) for place in self.places]
         others = [path for path in (*map(self.recording, self.places), self.floor) if path.exists()]
-        # Once each: one file may be two simulators, by two names.
-        paths = {self.project.relative(path): path for path in (*states, *others, *self.files.values())}
-        return [artifact_ref(self.project, path, whole_header(path)) for path in paths.values()]
+        return [*{self.project.relative(path): path for path in (*states, *others, *self.files.values())}.values()]
 
     def runs(self) -> tuple[tuple[RealRun, ...], tuple[str, ...]]:
         """The real runs, those of this iteration first, and why others are left out. Raises ArtifactError, and
@@ -190,6 +204,15 @@ class Asked:
             return None
         group = read_artifact(self.floor, "floor")[1].groups.get("caps")
         return None if group is None else float(group.attributes["floor"])
+
+
+def asked_again(project: Project, iteration: Iteration, flags: Mapping[str, Any]) -> Asked:
+    """The request with these flags, once more: what was typed then is typed again, the rest selected anew. An artifact
+    from before it was noted what was typed is taken to have it all typed."""
+    given = flags.get(GIVEN, SELECTED["compare"])
+    named = flags.get("models", {}) if "models" in given else {}
+    models = tuple(f"{name}={project.root / path}" for name, path in named.items())
+    return Asked(project, iteration, models, flags.get("of") if "of" in given else None, flags.get("own", False))
 
 
 def _split(text: str) -> tuple[str | None, Path | None]:

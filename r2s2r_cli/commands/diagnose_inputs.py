@@ -79,13 +79,16 @@ class Asked:
         if self.model is not None:
             require_model(self.project, self.model, "diagnose")
         require_input(self.identification, self._identified_first())
-        paths = [*self.artifacts(), self.identification]
-        paths += [path for path in (self.floor_file, self.plan_file) if path.exists()]
+        paths = [*self.artifacts(), self.identification, *self.beside()]
         return [artifact_ref(self.project, path, whole_header(path)) for path in paths]
 
     def artifacts(self) -> list[Path]:
         """Recordings and estimates that are read, those of the main iteration first."""
         return [path for source in self.sources for path in (source.recording, source.estimate)]
+
+    def beside(self) -> list[Path]:
+        """What else is read where it is there."""
+        return [path for path in (self.floor_file, self.plan_file) if path.exists()]
 
     def _identified_first(self) -> str:
         """The command where the iteration has no identification: with that of an earlier one, made of other runs than

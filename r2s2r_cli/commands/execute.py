@@ -192,23 +192,27 @@ def _long(plan: Path) -> list[str]:
 
 def _require_fresh(project: Project, place: Iteration, plan: Path, console: Console) -> None:
     """Raises InputError where the plan was made for another robot.toml, model or settings than there are now; warns of
-    what it was made from where that is stale itself: its policies are still policies of this robot."""
+    what it was made from where that is stale itself, or where there are other states by now: its policies are still
+    policies of this robot."""
+    from r2s2r_cli.commands.asked_again import joined, unread
     from r2s2r_cli.commands.freshness import stale_inputs
     from r2s2r_cli.commands.wanted import wanted_again
     from r2s2r_cli.errors import InputError
     from r2s2r_cli.store.header import whole_header
-    from r2s2r_cli.store.staleness import joined, reasons
+    from r2s2r_cli.store.staleness import reasons
 
     header = whole_header(plan)
     found = reasons(project, header, wanted_again(project, place, header.provenance))
-    found += joined(project, place, header.provenance)
+    new = joined(project, place, header.provenance)
+    if project.relative(place.artifact("identification")) in unread(project, place, header.provenance):
+        found += new
     if found:
         raise InputError(
             "the plan is stale: it was made for another robot or simulator than there is now",
             where=project.relative(plan), expected="a fresh plan", received="; ".join(found),
             hint=_planned_anew(project, place, plan, header),
         )  # fmt: skip
-    for text in stale_inputs(project, header.provenance.inputs):
+    for text in (*new, *stale_inputs(project, header.provenance.inputs)):
         console.warn(f"{project.relative(plan)}: {text}; `r2s2r status` says more")
 
 

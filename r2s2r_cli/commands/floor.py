@@ -66,7 +66,7 @@ def floor(
     if not 0 <= numerics <= GAITS_MAX:
         raise UsageError("this is no number of gait steps", where="--numerics", expected=f"0 to {GAITS_MAX}",
                          received=str(numerics), hint="r2s2r floor --numerics 16")  # fmt: skip
-    places = [here.iteration(number) for number in iteration] if iteration else here.iterations()
+    places = wanted_places(here, iteration or ())
     run = StageRun(
         stage="floor", kind="floor", project=here, iteration=None, find_inputs=lambda: _refs(here, places, numerics),
         report_model=FloorReport, dry_run=dry_run, force=force,
@@ -86,12 +86,22 @@ def _sources(place: Iteration) -> Iterator[tuple[Path, Path, bool]]:
         yield place.artifact("recording", executed=executed), place.artifact("estimate", executed=executed), executed
 
 
+def wanted_places(project: Project, numbers: Sequence[int]) -> list[Iteration]:
+    """The iterations whose runs are measured, all without a number. Raises UsageError for one that does not exist."""
+    return [project.iteration(number) for number in numbers] if numbers else project.iterations()
+
+
+def read_of(places: Sequence[Iteration]) -> list[Path]:
+    """Recordings and estimates that are there."""
+    pairs = [pair[:2] for place in places for pair in _sources(place)]
+    return [path for pair in pairs for path in pair if path.exists()]
+
+
 def _refs(project: Project, places: Sequence[Iteration], numerics: int) -> list[InputRef]:
     from r2s2r_cli.store.header import whole_header
     from r2s2r_cli.store.staleness import artifact_ref
 
-    pairs = [pair[:2] for place in places for pair in _sources(place)]
-    found = [path for pair in pairs for path in pair if path.exists()]
+    found = read_of(places)
     if not found and not numerics:
         raise UsageError("there is nothing to measure a floor with", where="r2s2r floor", received="none",
                          expected="an iteration with 10-record.h5 or 20-estimate.h5, or executed runs",

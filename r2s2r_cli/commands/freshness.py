@@ -6,12 +6,13 @@ import functools
 from collections.abc import Sequence
 from pathlib import Path
 
+from r2s2r_cli.commands.asked_again import joined
 from r2s2r_cli.commands.wanted import wanted_again
 from r2s2r_cli.errors import R2S2RError
 from r2s2r_cli.store.brief import brief
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Iteration, Project
-from r2s2r_cli.store.staleness import joined, reasons
+from r2s2r_cli.store.staleness import reasons
 from schemas.header import Header, InputRef
 from schemas.versions import KINDS
 

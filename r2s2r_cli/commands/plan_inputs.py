@@ -49,9 +49,12 @@ class Asked:
         from r2s2r_cli.store.header import whole_header
         from r2s2r_cli.store.staleness import artifact_ref, source_ref
 
-        used = [path for path in (self.identified, self.seen) if path is not None]
-        found = [artifact_ref(self.project, path, whole_header(path)) for path in used]
+        found = [artifact_ref(self.project, path, whole_header(path)) for path in self.artifacts()]
         return found + [source_ref(self.project, path) for path in self.written]
+
+    def artifacts(self) -> list[Path]:
+        """The artifacts that are read, of those that are there."""
+        return [path for path in (self.identified, self.seen) if path is not None]
 
     @cached_property
     def written(self) -> list[Path]:

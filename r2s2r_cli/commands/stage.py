@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 from pydantic import BaseModel
 
+from r2s2r_cli.commands.asked_again import joined
 from r2s2r_cli.commands.freshness import same_inputs, stale_inputs
 from r2s2r_cli.commands.interrupts import whole_items
 from r2s2r_cli.commands.pictures import remove_pictures
@@ -22,7 +23,7 @@ from r2s2r_cli.store.atomic import sweep, write_bytes
 from r2s2r_cli.store.header import read_header, sealed_header
 from r2s2r_cli.store.lock import writing
 from r2s2r_cli.store.project import Iteration, Project
-from r2s2r_cli.store.staleness import joined, reasons
+from r2s2r_cli.store.staleness import reasons
 from schemas.header import Header, InputRef
 from schemas.results import StageResult
 

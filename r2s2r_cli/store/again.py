@@ -38,6 +38,12 @@ OPTIONS: dict[str, tuple[tuple[str, str, Any], ...]] = {
 """Of every stage the options that change its result: name, name among the flags that its provenance has, and the value
 that need not be typed. A list is an option for each entry, a table one NAME=VALUE for each."""
 
+SELECTED = {"compare": ("models", "of")}
+"""Of every stage the flags that it fills by what is there, unless they are typed."""
+GIVEN = "given"
+"""Name of a flag: which of those were typed. The others are selected anew; all count as typed where an artifact is from
+before this was noted."""
+
 MEASURED = ("record", "execute")
 """Stages whose artifacts are measurements: to make one again a robot must move."""
 
@@ -95,6 +101,9 @@ def _flags(made: Provenance, artifact: Path) -> dict[str, Any]:
         flags["of"] = "execute"
     if made.stage == "identify" and "drive" in flags:
         flags["drive"] = flags["drive"].replace(" ", "-")
+    if GIVEN in flags:
+        selected = {*SELECTED.get(made.stage, ())} - {*flags[GIVEN]}
+        flags = {key: value for key, value in flags.items() if key not in selected}
     if made.stage == "diagnose":
         own = f"{ITERATIONS}/{artifact.resolve().parent.name}/{KINDS['identification'].filename}"
         flags["model"] = next((r.path for r in made.inputs if r.kind == "identification" and r.path != own), None)

@@ -13,14 +13,12 @@ from typing import Any
 from r2s2r_cli.errors import InputError, R2S2RError
 from r2s2r_cli.store.canonical import source_sha256
 from r2s2r_cli.store.header import read_header
-from r2s2r_cli.store.project import Iteration, Project
-from schemas.header import Header, InputRef, Provenance
+from r2s2r_cli.store.project import Project
+from schemas.header import Header, InputRef
 from schemas.versions import KINDS
 
 _LISTED = 3
 """Values of a list that are told one by one."""
-OPTIONAL = {"plan": ("identification",), "compare": ("floor",), "diagnose": ("floor", "plan")}
-"""Of every stage the kinds that it reads where they are there, of the project or of its iteration."""
 
 
 BORROWED = "simulate"
@@ -69,17 +67,6 @@ def input_reasons(project: Project, ref: InputRef) -> list[str]:
     except OSError as error:
         return [f"input {ref.path} cannot be read: {error.strerror}"]
     return [f"input {ref.path} changed: its bytes are others"] if changed else []
-
-
-def joined(project: Project, iteration: Iteration | None, made: Provenance) -> list[str]:
-    """Optional inputs that are there now and were not read: the stage would read them, so it would say another thing.
-
-    Found without running the stage, which alone knows all inputs that it would have."""
-    read = {ref.path for ref in made.inputs}
-    kinds = [kind for kind in OPTIONAL.get(made.stage, ()) if iteration is not None or KINDS[kind].level == "project"]
-    paths = [project.artifact(kind, iteration) for kind in kinds]
-    names = [project.relative(path) for path in paths if path.exists()]
-    return [f"input {name} is new: this was made without it" for name in names if name not in read]
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any], prefix: str = "") -> list[str]:

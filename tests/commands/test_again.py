@@ -6,7 +6,7 @@ import shlex
 import shutil
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -154,10 +154,16 @@ def test_what_is_usual_is_not_typed(sample: Path, stage: str) -> None:
     one = asked(stage, *needed)
     words = [word for word in again(one) if word not in needed]
     latest = ["--iteration", "2"] if one.target.parent.name == "002" else []
-    model = ["--model", "iterations/002/30-identify.h5"]
-    own = {"compare": ["--model", f"iteration 1={MODEL}", "--model", f"iteration 2={model[1]}", "--of", "execute"],
-           "execute": model}.get(stage, [])  # fmt: skip
+    own = {"execute": ["--model", "iterations/002/30-identify.h5"]}.get(stage, [])
     assert words == [stage, *own, *latest]
+
+
+def test_what_an_older_comparison_selected_is_typed(sample: Path) -> None:
+    """It does not say what was typed: all of it is, so that the same is made again."""
+    one = asked("compare", "--iteration", "1")
+    older = {name: value for name, value in one.flags.items() if name != "given"}
+    words = ["compare", "--model", f"iteration 1={MODEL}", "--of", "execute", "--iteration", "1"]
+    assert again(replace(one, flags=older)) == words
 
 
 def test_settings_keep_their_types(sample: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.commands.asked_again import would_read
 from r2s2r_cli.commands.mend import MOVES
 from r2s2r_cli.commands.wanted import wanted
 from r2s2r_cli.store.header import read_header
@@ -35,12 +36,16 @@ def ref(root: Path, name: str) -> InputRef:
 
 
 def put(root: Path, name: str, data: ArtifactData, stage: str, **made: Any) -> None:
-    """An artifact of iteration 1, fresh but for what is said of how it was made."""
-    folder = root / "iterations" / "001"
+    """An artifact of iteration 1, fresh but for what is said of how it was made: of all that its stage would read."""
+    folder, here = root / "iterations" / "001", Project.find(root)
     folder.mkdir(parents=True, exist_ok=True)
-    use = wanted(Project.find(root), None, stage, {}, {})
+    use = wanted(here, None, stage, {}, {})
     fresh = {"stage_version": use.stage_version, "settings": use.settings, "robot": use.robot, "inputs": ()}
-    write_artifact(folder / name, data, builders.provenance(stage=stage, **{**fresh, **made}))
+    asked = builders.provenance(stage=stage, **{**fresh, **made})
+    known = {one.path for one in asked.inputs}
+    more = [path for path in would_read(here, here.iteration(1), asked) if here.relative(path) not in known]
+    refs = [artifact_ref(here, path, read_header(path)) for path in more]
+    write_artifact(folder / name, data, asked.model_copy(update={"inputs": (*asked.inputs, *refs)}))
 
 
 def without_pictures(root: Path, stage: str) -> None:

@@ -15,10 +15,10 @@ from r2s2r_cli.stages.init.robots import robot_toml
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.provenance import config_sha256
-from r2s2r_cli.store.staleness import Wanted, artifact_ref, differences, joined, reasons, source_ref
+from r2s2r_cli.store.staleness import Wanted, artifact_ref, differences, reasons, source_ref
 from r2s2r_cli.store.write import write_artifact
 from schemas.header import Header, MigrationNote
-from tests.support.builders import estimate, floor, identification, plan, provenance, recording
+from tests.support.builders import estimate, provenance, recording
 
 SETTINGS = 'schema_version = 1\nname = "t"\n\n[estimate]\n{}\n'
 
@@ -167,25 +167,6 @@ def test_a_source_counts_by_its_bytes_and_may_be_gone(project: Project) -> None:
     assert reasons(project, header, now) == ["input walk.csv changed: its bytes are others"]
     source.unlink()
     assert reasons(project, header, now) == []
-
-
-def test_an_optional_input_that_came_later_is_named(project: Project) -> None:
-    """A floor for compare and diagnose, a plan for diagnose, an identification for plan; nothing that was read."""
-    place = project.iteration(1)
-    diagnosis = provenance(stage="diagnose", inputs=())
-    assert joined(project, place, diagnosis) == []
-    header = write_artifact(project.artifact("floor", None), floor(), provenance(stage="floor", inputs=()))
-    write_artifact(project.artifact("plan", place), plan(), provenance(stage="plan", inputs=()))
-    new = [f"input {name} is new: this was made without it" for name in ("floor.h5", "iterations/001/40-plan.h5")]
-    assert joined(project, place, diagnosis) == new
-    assert joined(project, place, provenance(stage="compare", inputs=())) == new[:1]
-    assert joined(project, place, provenance(stage="plan", inputs=())) == []
-    write_artifact(project.artifact("identification", place), identification(), provenance(stage="identify", inputs=()))
-    later = ["input iterations/001/30-identify.h5 is new: this was made without it"]
-    assert joined(project, place, provenance(stage="plan", inputs=())) == later
-    assert joined(project, place, provenance(stage="identify", inputs=())) == []
-    read = artifact_ref(project, project.artifact("floor", None), header)
-    assert joined(project, place, provenance(stage="compare", inputs=(read,))) == []
 
 
 def test_all_reasons_are_given_at_once(project: Project) -> None:

@@ -27,8 +27,9 @@ class Outcomes:
     """What came of gaits, one a row, in the frame of their start: x along the principal axis, y forward, z up.
 
     com: displacement of the centre of mass [m], (B, 3). turn: of the principal axis about the vertical [rad], counter-
-    clockwise positive, (B,). element: symmetry that the robot has undergone, (B,). error: distance of the last pose
-    from the rest pose [m], (B,). duration: [s], (B,). switched: cables that a target changes, summed, (B,).
+    clockwise positive, (B,); more than half a turn only of a gait whose ends lie about that. element: symmetry that the
+    robot has undergone, (B,). error: distance of the last pose from the rest pose [m], (B,). duration: [s], (B,).
+    switched: cables that a target changes, summed, (B,).
     """
 
     com: np.ndarray

@@ -8,7 +8,7 @@ the brink does, is not fit for long policies: `Primitive.same_element` says it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -124,11 +124,15 @@ def together(moves: np.ndarray) -> np.ndarray:
 
 def earned(reward: Reward, came: Outcomes, good: np.ndarray) -> np.ndarray:
     """Rewards (B,), 0 where the gait did not come back to rest, or on another triangle than it mostly does: what
-    follows it would then go astray."""
+    follows it would then go astray. Turns of 179 and -179 degrees are rewarded as 179 and 181: they are nearly one."""
     _, good = steady(came, good)
     value = np.zeros(len(came))
     if good.any():
-        value[good] = reward(came.take(np.flatnonzero(good)))
+        of = came.take(np.flatnonzero(good))
+        moves = np.column_stack([of.com[:, :2], of.turn])
+        usual = usual_ends(moves)  # of ends all over the place there is no turn that they lie about
+        moves[usual] = together(moves[usual])
+        value[good] = reward(replace(of, turn=moves[:, 2]))
     return value
 
 

@@ -146,6 +146,27 @@ def test_a_gait_of_half_a_turn_turns_by_half_a_turn(degrees: list[float]) -> Non
         assert made.move[2] == turn.mean()
 
 
+@pytest.mark.parametrize(
+    ("degrees", "mean", "sd"),
+    [
+        ([179, -179, 180, 178], 179.5, 1.118),
+        ([90, 92, 88], 90, 1.633),
+        ([170, -160, 20], -110, 92.74),  # most turn by 185, which is -175: by -190 and -160
+        ([100, -100], 0, 100),
+    ],
+)
+def test_a_gait_is_rewarded_for_half_a_turn(degrees: list[float], mean: float, sd: float) -> None:
+    """Ends on both sides of half a turn are one turn, whichever way it is rewarded, where they lie together; ends all
+    over the place are rewarded as they are."""
+    turn = np.radians(np.array(degrees, dtype=float))
+    came, everywhere = outcome(turn=turn.tolist()), np.ones(len(turn), dtype=bool)
+    for behaviour, sign in (("counterclockwise", 1.0), ("clockwise", -1.0)):
+        reward = BEHAVIOURS[behaviour]
+        made = primitive("a", behaviour, reward, Gait(np.ones((1, 6))), came, everywhere, spread=1.0)
+        assert np.allclose(np.degrees([made.mean, made.sd]), [sign * mean, sd], atol=0.1)
+        assert np.isclose(made.score, made.mean - made.sd)
+
+
 def sideways(came: Outcomes) -> np.ndarray:
     """A user's reward: along the principal axis."""
     return came.com[:, 0]

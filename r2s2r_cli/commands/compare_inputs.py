@@ -129,9 +129,8 @@ class Asked:
             self.estimate(self.iteration),
             f"r2s2r estimate --iteration {number}" + " --of execute" * self.executed,
         )
-        for path in self.files.values():
-            require_model(self.project, path, "compare")
-        return [artifact_ref(self.project, path, whole_header(path)) for path in self.artifacts()]
+        known = {path: require_model(self.project, path, "compare") for path in dict.fromkeys(self.files.values())}
+        return [artifact_ref(self.project, path, known.get(path) or whole_header(path)) for path in self.artifacts()]
 
     def artifacts(self) -> list[Path]:
         """What is read, each file once: one may be two simulators, by two names."""

@@ -76,11 +76,10 @@ class Asked:
         from r2s2r_cli.store.header import whole_header
         from r2s2r_cli.store.staleness import artifact_ref
 
-        if self.model is not None:
-            require_model(self.project, self.model, "diagnose")
+        known = {} if self.model is None else {self.model: require_model(self.project, self.model, "diagnose")}
         require_input(self.identification, self._identified_first())
         paths = [*self.artifacts(), self.identification, *self.beside()]
-        return [artifact_ref(self.project, path, whole_header(path)) for path in paths]
+        return [artifact_ref(self.project, path, known.get(path) or whole_header(path)) for path in paths]
 
     def artifacts(self) -> list[Path]:
         """Recordings and estimates that are read, those of the main iteration first."""

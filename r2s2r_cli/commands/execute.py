@@ -82,7 +82,6 @@ def execute(
     from r2s2r_cli.commands.outcome import require_model
     from r2s2r_cli.commands.record_run import Wish, carry_out, look, tell_of_no_camera
     from r2s2r_cli.stages.record import plans
-    from r2s2r_cli.store.header import whole_header
     from r2s2r_cli.store.staleness import artifact_ref
 
     console = Console(json=json, quiet=quiet)
@@ -96,8 +95,7 @@ def execute(
     own = place.artifact("identification")
     numbers = model if model is not None else own if own.exists() else None
     if numbers is not None:
-        require_model(here, numbers, "execute")
-        inputs = [*inputs, artifact_ref(here, numbers, whole_header(numbers))]
+        inputs = [*inputs, artifact_ref(here, numbers, require_model(here, numbers, "execute"))]
     wish = Wish(
         project=here, iteration=place, robot=robot, runs=runs, settings=settings, port=link.port or "",
         protocol=link.protocol, camera=camera, simulated=simulated, overrides=overrides,

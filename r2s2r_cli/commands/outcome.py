@@ -11,6 +11,7 @@ from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError
 from r2s2r_cli.store.brief import brief
 from r2s2r_cli.store.project import Project
+from schemas.header import Header
 from schemas.results import StageResult
 
 
@@ -48,16 +49,17 @@ def require_input(path: Path, command: str) -> None:
         )
 
 
-def require_model(project: Project, path: Path, command: str) -> None:
-    """Raises ArtifactError where an identification that was named with --model is not there, or is something else.
-    command: of the option."""
+def require_model(project: Project, path: Path, command: str) -> Header:
+    """The head of an identification that was named with --model. Raises ArtifactError where it is not there, or is
+    something else. command: of the option."""
     from r2s2r_cli.commands.typed import typed_instead
     from r2s2r_cli.store.header import whole_header
     from r2s2r_cli.store.read import check_kind_and_version
 
     if path.is_file():
-        check_kind_and_version(path, whole_header(path), "identification")
-        return
+        header = whole_header(path)
+        check_kind_and_version(path, header, "identification")
+        return header
     places = [place.artifact("identification") for place in project.iterations()]
     there = [os.path.relpath(one) for one in places if one.exists()]
     raise ArtifactError(

@@ -65,8 +65,7 @@ class Asked:
                                  hint="r2s2r simulate --random 15") from error  # fmt: skip
             refs[ref.path] = ref
         if self.model is not None:
-            require_model(self.project, self.model, "simulate")
-            ref = artifact_ref(self.project, self.model, whole_header(self.model))
+            ref = artifact_ref(self.project, self.model, require_model(self.project, self.model, "simulate"))
             refs[ref.path] = ref
         if self._recorded is not None:
             ref = artifact_ref(self.project, self._recorded, whole_header(self._recorded))

@@ -144,7 +144,7 @@ def _as_typed(new: Option, replaced: Sequence[Option], error: R2S2RError) -> Opt
     """With the plus of --free +SPEC, where what it replaces had one; and where a name alone was wrong, with the numbers
     that stood behind it."""
     name, value = new
-    if value is None:
+    if value is None or name in ("--train", "--test"):  # their hints have the numbers already, maybe others
         return new
     for _, text in replaced:
         wrong = _about(text)

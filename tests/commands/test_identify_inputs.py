@@ -201,6 +201,25 @@ def test_a_dry_run_checks_what_is_asked_for(estimated: Path) -> None:
     assert invoke("identify", "--test", "sample:99", "--dry-run").exit_code == 2
 
 
+@pytest.mark.parametrize(
+    "typed",
+    [
+        "--train smaple:1-2 --test smaple:3",
+        "--train smaple --test sampel:2",
+        "--train sample:1-3 --test sample:2-40",
+        "--train sample --test sample --seed 4",
+    ],
+)
+def test_the_hint_of_both_sides_can_be_pasted(estimated: Path, typed: str) -> None:
+    """Whatever is wrong with each of them: one hint, whose command is accepted."""
+    result = invoke("identify", *typed.split(), "--dry-run")
+    assert result.exit_code == 2
+    pasted = shlex.split(result.stderr.splitlines()[-1].removeprefix("hint: r2s2r "))
+    again = invoke(*pasted)
+    assert again.exit_code == 0, (pasted, again.stderr)
+    assert ("--seed" in pasted) == ("--seed" in typed)
+
+
 def refusal(hint: str, where: str = "--free", received: str = "") -> R2S2RError:
     """An error with that hint."""
     return UsageError("what", where=where, received=received, hint=hint)

@@ -9,6 +9,7 @@ from difflib import get_close_matches
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.load import require_two_intervals
+from r2s2r_cli.stages.identify.selection_hints import mended, run_of, worded
 from r2s2r_cli.stages.measures.upright import fallen, not_at_rest
 from schemas.robot import Robot
 
@@ -58,6 +59,16 @@ def split(
     if not train and not test:
         both = [default_split(run, train_share) for run in runs]
         return tuple(a for a, _ in both if a.intervals), tuple(b for _, b in both if b.intervals)
+    try:
+        return _sides(runs, train, test)
+    except UsageError as error:
+        raise mended(error, train, test, lambda first, then: _sides(runs, first, then)) from None
+
+
+def _sides(
+    runs: Sequence[RunData], train: Sequence[str], test: Sequence[str]
+) -> tuple[tuple[Selection, ...], tuple[Selection, ...]]:
+    """`split` where a side is named. Its hints mend what is met first."""
     trained = {one.run: one.intervals for one in parse_selection(train, runs, "--train", test)}
     tested = {one.run: one.intervals for one in parse_selection(test, runs, "--test", train)}
     have = {run.name: complete(run) for run in runs}
@@ -93,12 +104,13 @@ def parse_selection(
     by_name = {run.name: run for run in runs}
     found: dict[str, tuple[int, ...]] = {}
     for text in texts:
-        name, _, spans = text.partition(":")
+        name = run_of(text)
         if name not in by_name:
             near = get_close_matches(name, by_name, 1, 0.0)
+            meant = [near[0] + one[len(name) :].rstrip(":") for one in texts if run_of(one) == name] if near else []
             raise UsageError(
-                "there is no such run", where=option, expected=" | ".join(by_name), received=name or "nothing",
-                hint=f"{option} {near[0]}{':' + spans if spans else ''}" if near else "r2s2r status",
+                "there is no such run", where=option, expected=" | ".join(by_name), received=name or text or "nothing",
+                hint=" ".join(worded(option, one) for one in meant) or "r2s2r status",
             )  # fmt: skip
         run = by_name[name]
         have = complete(run)
@@ -153,7 +165,7 @@ def _asked(text: str, run: RunData) -> tuple[int, ...]:
 
 def _of_run(texts: Sequence[str], run: RunData) -> tuple[int, ...]:
     """The complete intervals of `run` that any of the texts names."""
-    named = {number for text in texts if text.partition(":")[0] == run.name for number in _asked(text, run)}
+    named = {number for text in texts if run_of(text) == run.name for number in _asked(text, run)}
     return tuple(number for number in complete(run) if number in named)
 
 

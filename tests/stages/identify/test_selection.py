@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from r2s2r_cli.commands.identify_hints import completed, options_of, typed_options
 from r2s2r_cli.errors import ExitCode, InputError, UsageError
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.identify.selection import complete, default_split, in_words, parse_selection, split, upright
@@ -38,7 +40,7 @@ def test_selections_are_read(texts: list[str], expected: dict[str, tuple[int, ..
     ("text", "expected", "received", "hint"),
     [
         ("crawk:1-7", "crawl | turn", "crawk", "--test crawl:1-7"),
-        (":1-7", "crawl | turn", "nothing", None),
+        (":1-7", "crawl | turn", ":1-7", None),
         ("crawl:", "RUN:1-7 or RUN:1,3,5-7, of crawl:1-11", "crawl:", "--test crawl:1-11"),
         ("crawl:1-", "RUN:1-7 or RUN:1,3,5-7, of crawl:1-11", "crawl:1-", "--test crawl:1-11"),
         ("crawl:7-1", "RUN:1-7 or RUN:1,3,5-7, of crawl:1-11", "crawl:7-1", "--test crawl:1-11"),
@@ -110,6 +112,33 @@ def test_the_hint_leaves_the_other_side_its_intervals(train: str, test: str, hin
     words = hint.split()
     sides.update(zip(words[::2], words[1::2], strict=True))
     trained, tested = split(RUNS, [sides["--train"]], [sides["--test"]])
+    assert trained and tested
+
+
+@pytest.mark.parametrize(
+    ("train", "test", "hint", "where"),
+    [
+        (["crawk:1-7"], ["crawk:8-11"], "--train crawl:1-7 --test crawl:8-11", "--train, --test"),
+        (["crawk:1-7"], ["tunr:1"], "--train crawl:1-7 --test turn:1", "--train, --test"),
+        (["crawk"], ["crawk"], "--train crawl:1-7 --test crawl:8-11", "--train, --test"),
+        (["crawk:1-7"], ["crawl:5-9"], "--train crawl:1-4", "--train"),
+        (["crawl:1-99"], ["turn:9"], "--train crawl:1-11 --test turn:1-3", "--train, --test"),
+        (["crawl", "turn"], ["crawl:1-2", "turn:1"], "--train crawl:3-11 --train turn:2-3", "--train"),
+        (["crawk:1-2", "crawk:4", "tunr:1"], ["crawl:8"],
+         "--train crawl:1-2 --train crawl:4 --train turn:1", "--train"),
+        ([":1-3"], [":4"], "--train turn:1-2 --test turn:3", "--train, --test"),
+    ],
+)  # fmt: skip
+def test_a_hint_mends_all_that_is_wrong(train: list[str], test: list[str], hint: str, where: str) -> None:
+    """Runs that do not exist, intervals that do not, those on both sides, of both options and of every run: the command
+    of the hint is accepted, whatever of it was typed wrong."""
+    with pytest.raises(UsageError) as error:
+        split(RUNS, train, test)
+    assert (error.value.hint, error.value.where) == (hint, where)
+    words = typed_options(train=train, test=test)
+    asked = options_of(shlex.split(completed(error.value, words))[2:])
+    sides = [[text for name, text in asked if name == option and text] for option in ("--train", "--test")]
+    trained, tested = split(RUNS, *sides)
     assert trained and tested
 
 

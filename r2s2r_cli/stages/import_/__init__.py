@@ -11,7 +11,7 @@ from r2s2r_cli.errors import InputError, UsageError, quoted
 from r2s2r_cli.stages.import_.authors_folder import import_authors_folder
 from r2s2r_cli.stages.import_.checks import ROD_TOLERANCE
 from r2s2r_cli.stages.import_.files import MAX_CSV_BYTES, file_size, list_folder, read_source, shown
-from r2s2r_cli.stages.import_.run import ImportedRun, run_name
+from r2s2r_cli.stages.import_.run import ImportedRun, renamed, run_name
 from r2s2r_cli.stages.import_.sidecar import read_sidecar, sidecar_path
 from r2s2r_cli.stages.import_.trajectory import import_trajectory
 from r2s2r_cli.stages.import_.tum import DEPTH, RGB, import_tum
@@ -34,7 +34,7 @@ def import_source(
     rod_length_tolerance: float = ROD_TOLERANCE,
     known_rods: Mapping[str, Sequence[float]] | None = None,
 ) -> ImportedRun:
-    """One run from one file or folder, named by its stem.
+    """One run from one file or folder, named by its stem: of what cannot stand in the name of a run `-` is made.
 
     robot: the project's. sidecar: what the source says; None reads `<stem>.toml` beside it. depth_scale: [m] a depth
     count, where a folder does not give it. rod_length_tolerance: relative. known_rods: rod lengths [m] of other
@@ -43,7 +43,7 @@ def import_source(
     """
     chosen = check_source(path, format)
     data = read_source(path, "the CSV", limit=MAX_CSV_BYTES) if chosen == "trajectory_csv" else b""
-    name = run_name(path)
+    name, said = run_name(path)
     files = (path,) if sidecar is not None else (path, sidecar_path(path))
     stated = read_sidecar(path) if sidecar is None else sidecar
     known = tuple(known_rods or ())
@@ -65,6 +65,7 @@ def import_source(
         groups, report = import_tum(
             path, name, robot=robot, sidecar=stated, depth_scale=depth_scale, known_robots=known
         )
+    report = report.model_copy(update={"warnings": (*said, *report.warnings)})
     return ImportedRun(name=name, groups=groups, report=report, files=files)
 
 
@@ -127,7 +128,7 @@ def merge_runs(runs: Sequence[ImportedRun]) -> ArtifactData:
                 where=str(run.files[0]),
                 expected="another stem for each file",
                 received=f"{run.name} twice",
-                hint=f"rename one: mv {quoted(run.files[0])} {quoted(run.files[0].with_stem(run.name + '-2'))}",
+                hint=renamed(run),
             )
         groups |= {f"{root}/{stream}" if stream else root: group for stream, group in run.groups.items()}
     return ArtifactData(kind="recording", groups=groups)

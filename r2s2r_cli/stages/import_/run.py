@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -36,21 +37,30 @@ class ImportedRun:
     """What was read: the log or folder, and its sidecar where there is one."""
 
 
-def run_name(source: Path) -> str:
-    """Name of the run: stem of a file, name of a folder. Raises InputError where it cannot name a group."""
+def run_name(source: Path) -> tuple[str, list[str]]:
+    """Name of the run: stem of a file, name of a folder, as far as it can name a group; and a warning where it is
+    another for that. The file keeps its own, and its sidecar lies beside it."""
     absolute = source.absolute()
-    name = absolute.stem if absolute.is_file() else absolute.name
-    if re.fullmatch(RUN_NAME, name) is None:
-        simple = re.sub(r"[^\w.+-]+", "-", name).lstrip("_.+-") or "run"
-        simple += source.suffix if absolute.is_file() else ""
-        raise InputError(
-            f"the name {shown(name)} cannot name a run",
-            where=str(source),
-            expected="a letter or digit, then letters, digits, '.', '+', '-', '_'",
-            received=shown(name),
-            hint=f"mv {quoted(source)} {quoted(source.parent / simple)}",
-        )
-    return name
+    stem = absolute.stem if absolute.is_file() else absolute.name
+    if re.fullmatch(RUN_NAME, stem):
+        return stem, []
+    name = re.sub(r"[^\w.+-]+", "-", stem).strip("_.+-") or "run"
+    name = name if re.fullmatch(RUN_NAME, name) else f"run-{name}"
+    return name, [f"called {name}, since {shown(stem)} cannot name a run: only letters, digits, '.', '+', '-', '_' can"]
+
+
+def renamed(run: ImportedRun) -> str:
+    """The command that gives a source of a run another free name of the same beginning, and its sidecar with it."""
+    source = run.files[0] if run.files[0].name else run.files[0].absolute()
+    ending = source.suffix if source.is_file() else ""
+    for number in count(2):
+        name = f"{run.name}-{number}"
+        ways = [(source, source.with_name(name + ending))]
+        ways += [(sidecar, sidecar.with_name(f"{name}.toml")) for sidecar in run.files[1:]]
+        if not any(target.exists() for _, target in ways):
+            break
+    moves = " && ".join(f"mv -- {quoted(one)} {quoted(target)}" for one, target in ways)
+    return f"{moves}   # then import {quoted(ways[0][1])}"
 
 
 def dropped_frames(reason: np.ndarray) -> DroppedFrames:

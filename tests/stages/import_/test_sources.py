@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -65,8 +66,6 @@ def test_a_log_without_sidecar_is_refused_and_shown_one(tmp_path: Path) -> None:
 
 def test_the_hint_for_a_missing_sidecar_writes_a_valid_one(tmp_path: Path) -> None:
     """The pasted command makes the file; only its source is still to be written."""
-    import subprocess
-
     path = log(tmp_path)
     (tmp_path / "log.toml").unlink()
     subprocess.run(["sh", "-c", refusal(path).hint], check=True)
@@ -175,12 +174,34 @@ def test_a_huge_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
     assert "too large" in refusal(path).what
 
 
-@pytest.mark.parametrize("name", ["my run", "-x", "a*b", ".hidden"])
-def test_a_name_that_cannot_be_a_run_is_refused(tmp_path: Path, name: str) -> None:
-    """Names with blanks or signs cannot name a group; the hint renames the file."""
-    error = refusal(log(tmp_path, name))
-    assert "cannot name a run" in error.what
-    assert error.hint.startswith("mv ")
+@pytest.mark.parametrize(
+    ("name", "run"),
+    [("my run", "my-run"), ("-x", "x"), ("a*b", "a-b"), (".hidden", "hidden"), ("über", "run-über"), ("* *", "run")],
+)
+def test_a_name_that_cannot_be_a_run_gives_a_like_one(tmp_path: Path, name: str, run: str) -> None:
+    """Names with blanks or signs cannot name a group: the run is called otherwise, which is said; file and sidecar keep
+    theirs, in a folder with a blank as well."""
+    (tmp_path / "the logs").mkdir()
+    made = import_source(log(tmp_path / "the logs", name), robot=ROBOT)
+    assert made.name == made.report.run == run
+    assert made.report.warnings[0].startswith(f"called {run}, since {name!r} cannot name a run")
+    assert [path.name for path in made.files] == [f"{name}.csv", f"{name}.toml"]
+    plain = import_source(log(tmp_path, "plain-1"), robot=ROBOT)
+    assert plain.name == "plain-1" and not any("cannot name" in text for text in plain.report.warnings)
+
+
+def test_two_sources_of_one_run_are_told_apart_with_their_sidecars(tmp_path: Path) -> None:
+    """The hint, pasted, gives one of them another name that is free, and its sidecar with it."""
+    log(tmp_path, "a-b-2")  # what would be the first name
+    sources = [log(tmp_path, "a-b"), log(tmp_path, "a b")]
+    with pytest.raises(UsageError, match="two sources") as caught:
+        merge_runs([import_source(path, robot=ROBOT) for path in sources])
+    subprocess.run(["sh", "-c", caught.value.hint], check=True)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        f"{stem}.{ending}" for stem in ("a-b", "a-b-2", "a-b-3") for ending in ("csv", "toml")
+    }
+    made = merge_runs([import_source(tmp_path / f"{name}.csv", robot=ROBOT) for name in ("a-b", "a-b-3")])
+    assert made.runs() == ["a-b", "a-b-3"]
 
 
 @pytest.mark.parametrize("path", ["a\0b.csv", "x" * 5000 + ".csv"])

@@ -174,4 +174,7 @@ class CompareReport(Frozen):
     floor: CompareFloor
     srcc: dict[str, float | None] = Field(default_factory=dict)
     """`srcc_com` by simulator; None: too few gaits."""
+    stale: tuple[str, ...] = ()
+    """What simulators were stale by when they were compared, in words. The terminal has it of their files, among the
+    stale inputs of every stage; the page says nothing of inputs."""
     warnings: tuple[str, ...] = ()

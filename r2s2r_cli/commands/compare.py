@@ -20,7 +20,7 @@ from r2s2r_cli.options import (
 from r2s2r_cli.store.project import Project
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from r2s2r_cli.artifact import ArtifactData
     from r2s2r_cli.commands.compare_inputs import Asked
@@ -84,7 +84,7 @@ def compare(
     )
     show_outcome(result, console)
     if report is not None:
-        _show(report, (*result.reasons, *result.stale_inputs), console)
+        _show(report, console)
 
 
 def _compute(asked: Asked, console: Console) -> tuple[ArtifactData, CompareReport]:
@@ -98,7 +98,7 @@ def _compute(asked: Asked, console: Console) -> tuple[ArtifactData, CompareRepor
             runs, models, settings, keyframe_floor_m=asked.keyframe_floor(), cache_dir=asked.project.cache,
             done=lambda: advance(1),
         )  # fmt: skip
-    return data, report.model_copy(update={"warnings": (*left_out, *stale, *report.warnings)})
+    return data, report.model_copy(update={"stale": stale, "warnings": (*left_out, *report.warnings)})
 
 
 def _draw(data: ArtifactData, report: CompareReport, robot: Robot) -> Iterator[tuple[str, bytes]]:
@@ -118,13 +118,12 @@ def _draw(data: ArtifactData, report: CompareReport, robot: Robot) -> Iterator[t
     yield ".html", comparison_page(report, data, robot, pictures, strips, history)
 
 
-def _show(report: CompareReport, told: Sequence[str], console: Console) -> None:
-    from r2s2r_cli.commands.compare_models import not_told
+def _show(report: CompareReport, console: Console) -> None:
     from r2s2r_cli.views.compare_tables import comparison_tables
     from r2s2r_cli.views.compare_verdict import verdict
 
     for table in comparison_tables(report):
         console.table(table.title, table.columns, table.rows)
     console.data(verdict(report))
-    for text in not_told(report.warnings, told):
+    for text in report.warnings:
         console.warn(text)

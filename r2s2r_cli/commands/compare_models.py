@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from r2s2r_cli.commands.wanted import robot_part
@@ -35,17 +34,6 @@ def require_current(project: Project, name: str, path: Path, header: Header) -> 
     if not path.resolve().is_relative_to(project.root):
         return []  # of another project: its inputs are not here
     return [text for ref in made.inputs for text in input_reasons(project, ref)]
-
-
-def not_told(warnings: Sequence[str], told: Sequence[str]) -> list[str]:
-    """Warnings of a comparison without what a simulator is stale by where that was `told` of its file, an input. The
-    report keeps them: its page says nothing of inputs."""
-
-    def again(text: str) -> bool:
-        cause = text.partition(": ")[2] if text.startswith("simulator ") else ""
-        return bool(cause) and any(cause in one for one in told)
-
-    return [text for text in warnings if not again(text)]
 
 
 def learned_names(project: Project, model: Path, header: Header) -> dict[tuple[str, str], str]:

@@ -19,7 +19,7 @@ def comparison_page(
 ) -> bytes:  # fmt: skip
     """HTML. pictures, strips: PNG by run. history: PNG, None with one simulator."""
     page = Page(
-        title=f"Real and simulated: {robot.title}", sentence=verdict(report), labels=list(report.warnings),
+        title=f"Real and simulated: {robot.title}", sentence=verdict(report), labels=[*report.stale, *report.warnings],
         tables=list(comparison_tables(report)),
         pictures=[] if history is None else [Picture("Errors over the iterations, beside their floor", history)],
     )  # fmt: skip

@@ -207,6 +207,8 @@ class DiagnoseReport(Frozen):
     """What refitting had been hiding, in words."""
     parity: tuple[str, ...]
     """What the logs say against each other, strongest first, in words."""
+    parity_sd: tuple[float, ...] = ()
+    """How far each of these stands out [sd]; none before this was noted."""
     missing: tuple[str, ...]
     refit: dict[str, tuple[float, float]]
     """Nuisances of the refit nominal model: value and sd."""

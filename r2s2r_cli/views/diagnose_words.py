@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.views.figure import RED
@@ -28,8 +27,6 @@ _MEANS = {
 }
 LOUD_SD = 4.0
 """Beyond which a finding of the logs is said beside a verdict that does not name it."""
-_SD = re.compile(r"\(([+-]\d+(?:\.\d+)?) sd\)$")
-"""How findings of the logs end."""
 LEFT_OUT = "left-out error"
 """Of fitted intervals, each predicted by a fit without it."""
 HELD_OUT = "held-out error"
@@ -56,7 +53,8 @@ def verdict_words(report: DiagnoseReport) -> str:
 
 def loud_words(report: DiagnoseReport) -> str:
     """What the logs say beyond LOUD_SD where the verdict names no cause and so does not speak of it; else empty."""
-    loud = [text for text in report.parity if (sd := _SD.search(text)) and abs(float(sd[1])) > LOUD_SD]
+    # Nothing of a diagnosis from before they were noted.
+    loud = [text for text, sd in zip(report.parity, report.parity_sd, strict=False) if abs(sd) > LOUD_SD]
     if report.verdict not in ("ambiguous", "no_gap") or not loud:
         return ""
     return f"Yet the logs by themselves stand out by more than {LOUD_SD:g} sd: {'; '.join(loud)}."

@@ -148,12 +148,12 @@ def test_where_a_cause_sits_is_said_as_surely_as_the_verdict(
 
 @pytest.mark.parametrize(
     ("verdict", "sd", "said"),
-    [("ambiguous", "+6.0", True), ("no_gap", "-6.0", True), ("ambiguous", "+3.8", False), ("effect", "+6.0", False)],
+    [("ambiguous", 6.0, True), ("no_gap", -6.0, True), ("ambiguous", 3.8, False), ("effect", 6.0, False)],
 )
-def test_what_the_logs_shout_is_beneath_a_sentence_that_names_nothing(verdict: str, sd: str, said: bool) -> None:
-    """Beyond 4 sd, either way; a verdict with a name speaks for itself."""
-    parity = (f"sensor 0 reads 13 mm too long, 0 mm as built ({sd} sd)", "something else (+2.9 sd)")
-    made = report().model_copy(update={"verdict": verdict, "parity": parity})
+def test_what_the_logs_shout_is_beneath_a_sentence_that_names_nothing(verdict: str, sd: float, said: bool) -> None:
+    """Beyond 4 sd, either way, by the number and not by the words; a verdict with a name speaks for itself."""
+    parity = ("sensor 0 reads 13 mm too long, 0 mm as built", "something else (+9.0 sd)")
+    made = report().model_copy(update={"verdict": verdict, "parity": parity, "parity_sd": (sd, 2.9)})
     page = diagnose_page(made, []).decode()
     assert ("<p>Yet the logs by themselves" in page) == said
     loud = loud_words(made)

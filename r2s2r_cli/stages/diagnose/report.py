@@ -27,11 +27,14 @@ from schemas.results_diagnose import (
 
 FINDINGS = 8
 """Findings of the parity stage that are told."""
+MOST_SD = 1e6
+"""Farther than this nothing stands out: an error of 0 is no number that a report can hold."""
 
 
 def diagnose_report(found: Diagnosis) -> DiagnoseReport:
     """Of a diagnosis; wall time and files are added by the command."""
     which = found.which
+    told = _parity(found)
     return DiagnoseReport(
         verdict=which.verdict, sentence=sentence(found), effects=which.effects, probability=which.probability,  # type: ignore[arg-type]
         set90=which.set90, ranking=tuple(_ranked(one) for one in which.ranking),
@@ -48,7 +51,8 @@ def diagnose_report(found: Diagnosis) -> DiagnoseReport:
         gap_nats=_known(which.left.refit), left_nats=_known(which.left.best), left_sd_nats=_known(which.left.sd),
         stranger_sd2=None if which.stranger is None else which.stranger.left,
         calibrated=which.calibrated, left_out=which.within, segments=_segments(found),
-        hidden=tuple(shift.words for shift in which.shifts), parity=_parity(found), missing=_missing(found),
+        hidden=tuple(shift.words for shift in which.shifts), parity=tuple(words for words, _ in told),
+        parity_sd=tuple(sd for _, sd in told), missing=_missing(found),
         refit=found.refit, refit_units={name: _unit(name) for name in found.refit}, rollouts=found.rollouts,
         within_run=found.within_run, warnings=found.warnings,
     )  # fmt: skip
@@ -116,10 +120,10 @@ def _segments(found: Diagnosis) -> tuple[SegmentFound, ...]:
     )  # fmt: skip
 
 
-def _parity(found: Diagnosis) -> tuple[str, ...]:
-    if found.parity is None:
-        return ()
-    return tuple(f"{one.what} ({one.z:+.1f} sd)" for one in found.parity.significant[:FINDINGS])
+def _parity(found: Diagnosis) -> list[tuple[str, float]]:
+    """The findings that are told: in words, and how far each stands out [sd]."""
+    told = () if found.parity is None else found.parity.significant[:FINDINGS]
+    return [(f"{one.what} ({one.z:+.1f} sd)", float(np.clip(one.z, -MOST_SD, MOST_SD))) for one in told]
 
 
 def _missing(found: Diagnosis) -> tuple[str, ...]:

@@ -55,6 +55,8 @@ class BlindRow(Frozen):
     """By the point estimate; None: no target, or nothing to count."""
     shown: bool | None
     """Whether all of the interval is on the right side of the target, or all on the wrong."""
+    unsaid: int = 0
+    """Of the n, those for which no place was said: infinitely far, so that value or bounds may be None."""
 
 
 class BlindBin(Frozen):

@@ -19,7 +19,7 @@ def blind_tables(result: BlindScoreResult) -> Iterator[PageTable]:
     yield PageTable(
         f"tier {result.tier}, {result.bank} bank: {result.scored} of {result.sets} sets ({strata})",
         ["figure", "value", "95 %", "n", "target", "verdict"],
-        [[row.what, _number(row, row.value), _interval(row), str(row.n), _target(row), _verdict(row)]
+        [[row.what, _value(row), _interval(row), str(row.n), _target(row), _verdict(row)]
          for row in result.rows],
     )  # fmt: skip
     if result.recall:
@@ -56,7 +56,7 @@ def _worth(result: BlindScoreResult) -> PageTable:
     return PageTable(
         "what a figure is worth: the same of diagnosers that look at nothing",
         ["figure", "found", *(one.name for one in result.baselines)],
-        [[row.what, _number(row, row.value),
+        [[row.what, _value(row),
           *(_number(row, one.values[row.name]) if row.name in one.values else "" for one in result.baselines)]
          for row in told],
     )  # fmt: skip
@@ -128,6 +128,13 @@ def _calibration(result: BlindScoreResult) -> bytes:
     return png_bytes(figure)
 
 
+def _value(row: BlindRow) -> str:
+    """The figure; where it is infinitely far, what was not said."""
+    if row.value is None and row.unsaid:
+        return f"no place said in {row.unsaid} of {row.n}"
+    return _number(row, row.value)
+
+
 def _number(row: BlindRow, value: float | None) -> str:
     if value is None:
         return "none" if not row.n else "not finite"
@@ -136,7 +143,10 @@ def _number(row: BlindRow, value: float | None) -> str:
 
 def _interval(row: BlindRow) -> str:
     if not row.n or row.low is row.high is None:
-        return "" if not row.n else "not finite" if row.value is None else "too few"
+        told = not row.n or (row.value is None and row.unsaid)  # the value says all there is
+        return "" if told else "not finite" if row.value is None else "too few"
+    if row.unsaid and row.high is None:
+        return f"{_number(row, row.low)} to no place said"
     return f"{_number(row, row.low)} to {_number(row, row.high)}"
 
 

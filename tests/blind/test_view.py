@@ -1,5 +1,7 @@
 """The page of a score says what the table says."""
 
+from typing import Any
+
 import numpy as np
 
 from r2s2r_cli.blind.score import score_of
@@ -38,6 +40,28 @@ def test_an_interval_that_is_not_finite_says_so_once() -> None:
     assert _interval(row) == "not finite"
     assert _interval(row.model_copy(update={"low": 1.0})) == "1.0 to not finite"
     assert _interval(row.model_copy(update={"value": 2.0})) == "too few"
+
+
+def test_a_place_that_was_not_said_is_told_in_words() -> None:
+    """Half of the sets without a place have no finite median: in table, Markdown and page stands how many say none,
+    and the target is missed all the same."""
+    label = next(one for one in blind_bank.bank(60) if one["effects"] and one["effects"][0]["id"] == "friction_field")
+    clear = {**label, "kind": "single", "effects": label["effects"][:1], "d": 20.0, "d_each": [20.0], "outside": None}
+
+    def some(label: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+        found = blind_bank.always(label, rng)
+        return found if label["says"] else {**found, "where": {"channel": "contact"}}
+
+    for say, silent, value, interval in (
+        (2, 2, "no place said in 2 of 4", ""), (4, 4, "no place said in 4 of 8", "30.0 cm to no place said"),
+        (3, 1, "30.0 cm", "too few"),
+    ):  # fmt: skip
+        answered = blind_bank.answered([{**clear, "says": i < say} for i in range(say + silent)], some)
+        result = score_of(answered, tier="B", bank="test", sets=len(answered), index="0")
+        rows = [row for row in next(blind_tables(result)).rows if row[0].startswith("distance")]
+        assert [row[1:3] for row in rows] == [[value, interval]] and rows[0][5].startswith("missed")
+        text = blind_markdown(result)
+        assert f"| {value} | {interval} | {say + silent} |" in text and "not finite" not in text
 
 
 def test_confusion_counts_every_decided_set_once() -> None:

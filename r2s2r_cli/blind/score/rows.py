@@ -21,7 +21,8 @@ BINS = 10
 
 @dataclass(frozen=True)
 class Metric:
-    """value: of the sets that `chosen` gives, True or False each, or a number, or None where it does not apply."""
+    """value: of the sets that `chosen` gives, True or False each, or a number (infinite where a place was asked for and
+    none said), or None where it does not apply."""
 
     name: str
     what: str
@@ -43,7 +44,8 @@ def row(metric: Metric, pairs: Sequence[Pair], tier: Tier) -> BlindRow:
         return _row(metric, target, right / len(values), len(values), wilson(right, len(values)))
     numbers = np.array(values, dtype=float)
     if metric.of == "median":
-        return _row(metric, target, float(np.median(numbers)), len(numbers), of_median(numbers))
+        found = _row(metric, target, float(np.median(numbers)), len(numbers), of_median(numbers))
+        return found.model_copy(update={"unsaid": int(np.isinf(numbers).sum())})
     return _row(metric, target, float(numbers.mean()), len(numbers), bootstrap(numbers))
 
 

@@ -7,7 +7,7 @@ the grown sets diagnosed as `blind run` does, watched. It knows no label: whethe
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -102,7 +102,7 @@ def jobs(whole: Trial, out: Path) -> tuple[blind_run.Job, ...]:
     )
 
 
-def run(whole: Trial, out: Path, todo: tuple[blind_run.Job, ...], **how: Any) -> Iterator[dict[str, Any]]:
+def run(whole: Trial, out: Path, todo: tuple[blind_run.Job, ...], **how: Any) -> Generator[dict[str, Any]]:
     """Verdicts as they come; what was said of a set is written as soon as both are there. how: as `blind run`. Raises
     as that does."""
     sets = {one.name: one for one in whole.open}

@@ -11,7 +11,7 @@ import json
 import os
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -61,9 +61,9 @@ def left(all_jobs: tuple[Job, ...]) -> tuple[Job, ...]:
     return tuple(job for job in all_jobs if not _is_done(job))
 
 
-def run(todo: tuple[Job, ...], *, executor: str = "local", workers: int = 1) -> Iterator[dict[str, Any]]:
-    """Verdicts as they come, each written before it is handed over. Raises Peeked where a diagnoser reached for the
-    truth, InputError where logs are not those of the bank's list."""
+def run(todo: tuple[Job, ...], *, executor: str = "local", workers: int = 1) -> Generator[dict[str, Any]]:
+    """Verdicts as they come, each written before it is handed over; closed, it ends what is under way. Raises Peeked
+    where a diagnoser reached for the truth, InputError where logs are not those of the bank's list."""
     with open_executor(executor, workers) as pool:
         for _, verdict in each(pool, one, todo, at_once=workers):
             yield verdict

@@ -8,35 +8,41 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing.connection import wait
+from multiprocessing.connection import Connection, wait
 from typing import TypeVar
 
 from r2s2r_cli.errors import HardwareError, R2S2RError, UsageError, install_extra
 
 LOCAL, DASK = "local", "dask://"
+WHOLE = threading.Lock()
+"""Held while a file is written and named: a worker ends before or after that, never in between."""
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
 @contextmanager
 def open_executor(spec: str, workers: int) -> Iterator[Executor]:
-    """An executor, shut down at the end; what has not begun is given up where an exception leaves the block.
+    """An executor, shut down at the end; where an exception leaves the block, an interrupt for instance, what has not
+    begun is given up, and what is under way on this machine is ended at once.
 
     Raises UsageError for another kind of address or where dask is not installed, HardwareError where no scheduler
     answers.
     """
-    close: Callable[[], object] = lambda: None  # noqa: E731 - what an executor of somebody else's needs beside shutdown
     if spec == LOCAL:
         # Fresh interpreters: nothing of this process (loaded modules, threads of torch) goes along.
         fresh = multiprocessing.get_context("spawn")
-        executor: Executor = ProcessPoolExecutor(workers, mp_context=fresh, initializer=_end_with_parent)
+        # A pipe on which nothing is sent: its end closes with this process, and is closed where work is given up.
+        heard, said = fresh.Pipe(duplex=False)
+        executor: Executor = ProcessPoolExecutor(workers, mp_context=fresh, initializer=_listen, initargs=(heard,))
+        own, close = True, said.close
     elif spec.startswith(DASK):
-        executor, close = _dask(spec)
+        own, (executor, close) = False, _dask(spec)
     else:
         raise UsageError(
             "there is no such executor", where="--executor", expected="local, or dask://host:port", received=spec,
@@ -45,7 +51,9 @@ def open_executor(spec: str, workers: int) -> Iterator[Executor]:
     try:
         yield executor
     except BaseException:
-        executor.shutdown(wait=False, cancel_futures=True)
+        if own:
+            close()
+        executor.shutdown(wait=own, cancel_futures=True)
         raise
     else:
         executor.shutdown()
@@ -53,16 +61,18 @@ def open_executor(spec: str, workers: int) -> Iterator[Executor]:
         close()
 
 
-def _end_with_parent() -> None:
-    """In a worker: nobody waits for what it computes once who asked for it is gone, killed for instance."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_until_gone, args=(parent.sentinel,), daemon=True).start()
+def _listen(heard: Connection) -> None:
+    """In a worker: nobody waits for what it computes once who asked for it has given it up, or is gone, killed for
+    instance."""
+    # The pool sends this to all workers as soon as one has ended: to one that writes a file, too.
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    threading.Thread(target=_until_closed, args=(heard,), daemon=True).start()
 
 
-def _until_gone(sentinel: int) -> None:
-    wait([sentinel])
-    os._exit(1)
+def _until_closed(heard: Connection) -> None:
+    wait([heard])
+    with WHOLE:
+        os._exit(1)
 
 
 def each(
@@ -74,12 +84,24 @@ def each(
     while waiting or under_way:
         while waiting and len(under_way) < at_once:
             item = waiting.pop()
-            under_way[executor.submit(_held, work, item)] = item
+            with _deaf():
+                under_way[executor.submit(_held, work, item)] = item
         done = next(as_completed(under_way))
         found = done.result()
         if isinstance(found, _Broken):
             raise found.error()
         yield under_way.pop(done), found
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Processes that begin meanwhile never hear Ctrl-C, which a terminal sends to all of them: who asked them ends
+    them, and they would say where they were. This one hears it afterwards."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @dataclass(frozen=True)
@@ -101,7 +123,7 @@ def _held(work: Callable[[Item], Result], item: Item) -> Result | _Broken:
         return _Broken(type(error), {name: getattr(error, name) for name in names})
 
 
-def _dask(spec: str) -> tuple[Executor, Callable[[], object]]:
+def _dask(spec: str) -> tuple[Executor, Callable[[], None]]:
     try:
         from distributed import Client
     except ImportError as error:

@@ -8,6 +8,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from r2s2r_cli.blind.seam import WHOLE
 from r2s2r_cli.errors import InputError
 
 FORMAT = "r2s2r blind verdict 1"
@@ -17,8 +18,10 @@ def write_document(path: Path, document: dict[str, Any]) -> None:
     """The file, whole or not at all; its folder is made."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_suffix(f".part{os.getpid()}")
-    part.write_text(json.dumps(document, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-    part.replace(path)
+    text = json.dumps(document, indent=1, sort_keys=True) + "\n"
+    with WHOLE:
+        part.write_text(text, encoding="utf-8")
+        part.replace(path)
 
 
 def read_verdict(path: Path, index: str | None = None) -> dict[str, Any]:

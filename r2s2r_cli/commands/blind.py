@@ -150,6 +150,7 @@ def run(
     Example: r2s2r blind run bank --out verdicts --workers 2
     """
     import statistics
+    from contextlib import closing
 
     from r2s2r_cli.blind import run as blind_run
     from schemas.results_blind import BlindRunResult
@@ -161,9 +162,12 @@ def run(
     jobs = blind_run.jobs(bank.resolve(), out.resolve(), settings=chosen, shuffled=shuffled)
     todo = blind_run.left(jobs)
     failed, spent = [], []
-    with console.progress("verdicts", len(jobs)) as advance:
+    with (
+        console.progress("verdicts", len(jobs)) as advance,
+        closing(blind_run.run(todo, executor=executor, workers=workers)) as verdicts,
+    ):
         advance(len(jobs) - len(todo))
-        for verdict in blind_run.run(todo, executor=executor, workers=workers):
+        for verdict in verdicts:
             advance(1)
             spent.append(float(verdict["cpu_s"]))
             if verdict["failed"]:

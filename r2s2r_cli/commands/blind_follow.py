@@ -39,6 +39,8 @@ def follow(
 
     Example: r2s2r blind follow bank --verdicts verdicts --key labels.key --out follow --workers 2
     """
+    from contextlib import closing
+
     from r2s2r_cli.blind import follow as blind_follow, run as blind_run
 
     console = Console(json=json, quiet=quiet)
@@ -57,9 +59,12 @@ def follow(
             make_sets(["follow", "--bank", str(whole.bank), "--key", str(key.resolve()), "--asked", str(asked),
                        "--out", str(home), "--executor", executor, "--workers", str(workers)], advance)  # fmt: skip
     todo = blind_run.left(blind_follow.jobs(whole, home))
-    with console.progress("verdicts", runs) as advance:
+    with (
+        console.progress("verdicts", runs) as advance,
+        closing(blind_follow.run(whole, home, todo, executor=executor, workers=workers)) as found,
+    ):
         advance(runs - len(todo))
-        for verdict in blind_follow.run(whole, home, todo, executor=executor, workers=workers):
+        for verdict in found:
             advance(1)
             if verdict["failed"]:
                 console.warn(f"{verdict['set']}: {verdict['failed'].splitlines()[0]}")

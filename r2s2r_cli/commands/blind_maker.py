@@ -25,12 +25,16 @@ def make_sets(asked: Sequence[str], advance: Callable[[int], None]) -> None:
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as maker:
         assert maker.stdout is not None and maker.stderr is not None  # noqa: S101 - both are pipes
         done = 0
-        for line in maker.stdout:
-            now = int(json.loads(line)["done"])
-            advance(now - done)
-            done = now
-        words = maker.stderr.read().strip()
-        code = maker.wait()
+        try:
+            for line in maker.stdout:
+                now = int(json.loads(line)["done"])
+                advance(now - done)
+                done = now
+            words = maker.stderr.read().strip()
+            code = maker.wait()
+        except KeyboardInterrupt:
+            maker.terminate()  # a terminal interrupts it too, `kill -INT` this process alone
+            raise
     if code == 130:
         raise KeyboardInterrupt
     if code:

@@ -1,6 +1,9 @@
 """Independent work through one seam, whoever does it."""
 
+import itertools
+import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -11,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from r2s2r_cli.blind.seam import each, open_executor
+from r2s2r_cli.blind.verdict import write_document
 from r2s2r_cli.errors import InputError, UsageError
 
 ROOT = Path(__file__).parents[2]
@@ -84,6 +88,54 @@ def gone(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
     except OSError:
         return True
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are looked up in /proc")
+@pytest.mark.parametrize("all_of_them", [False, True])
+def test_an_interrupt_ends_what_is_under_way(tmp_path: Path, all_of_them: bool) -> None:
+    """Told alone, or with its workers as a terminal tells them: who asked ends at once, they do before it, and nobody
+    says where it was; what they wrote is whole."""
+    script = f"from tests.blind.test_seam import hand_out_scribbling; hand_out_scribbling({str(tmp_path)!r})"
+    with subprocess.Popen(
+        [sys.executable, "-c", script], cwd=ROOT, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as asker:
+        assert asker.stderr is not None
+        assert until(lambda: len(list(tmp_path.glob("*-1.json"))) == 2)
+        begun = time.monotonic()
+        if all_of_them:
+            os.killpg(asker.pid, signal.SIGINT)
+        else:
+            asker.send_signal(signal.SIGINT)
+        said = asker.stderr.read()  # to its end, so that no worker can say anything later
+        assert asker.wait(60) == 130 and time.monotonic() - begun < 10
+    workers = {int(path.name.split("-")[0]) for path in tmp_path.iterdir()}
+    assert len(workers) == 2 and all(map(gone, workers)) and said == ""
+    assert not [path for path in tmp_path.iterdir() if path.suffix != ".json"]
+    assert all(f"-{json.loads(path.read_text())['number']}.json" in path.name for path in tmp_path.iterdir())
+
+
+def hand_out_scribbling(folder: str) -> None:
+    """Two pieces of work that write without end, to two workers; what a process of the test above runs."""
+    try:
+        with open_executor("local", 2) as pool:
+            list(each(pool, scribble, [folder, folder], at_once=2))
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+def scribble(folder: str) -> None:
+    """Verdicts to a disk so slow that an interrupt falls between writing one and giving it its name."""
+    named = Path.replace
+
+    def slow(part: Path, path: Path) -> Path:
+        time.sleep(0.3)
+        return named(part, path)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Path, "replace", slow)
+        for i in itertools.count():
+            write_document(Path(folder) / f"{os.getpid()}-{i}.json", {"number": i})
+            time.sleep(0.05)  # a diagnosis
 
 
 def test_another_address_is_refused() -> None:

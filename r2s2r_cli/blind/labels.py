@@ -1,7 +1,8 @@
 """Sealed labels: salted, committed to by SHA-256 before anything is diagnosed, encrypted, opened by `score` alone.
 
 A bank: `index.json` (names of the sets, the commitment of every label, a digest of every set's logs), `sets/<name>/`,
-`labels/<name>.sealed`. The key is a file that lies elsewhere. Encryption is Fernet of `cryptography` (ADR 13).
+`labels/<name>.sealed`, and what it was begun with, sealed too (`make/begun.py`). The key is a file that lies elsewhere.
+Encryption is Fernet of `cryptography` (ADR 13).
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from r2s2r_cli.errors import InputError, UsageError
 
 INDEX, SETS, LABELS = "index.json", "sets", "labels"
 _SALT_BYTES = 32
-_KEYS = "find . -name '*.key'   # --key takes the one that `r2s2r blind make --key` wrote"
+FIND_KEY = "find . -name '*.key'   # --key takes the one that `r2s2r blind make --key` wrote"
 
 
 def new_key(path: Path) -> bytes:
@@ -47,7 +48,7 @@ def read_key(path: Path) -> bytes:
     except (OSError, ValueError) as error:
         raise InputError(
             "the key of the labels cannot be read", where=str(path), expected="the file that `blind make --key` wrote",
-            received=str(error), hint=_KEYS,
+            received=str(error), hint=FIND_KEY,
         ) from error  # fmt: skip
     return key
 
@@ -66,8 +67,8 @@ def seal(label: dict[str, Any], key: bytes) -> tuple[bytes, str]:
     """The encrypted label, and the commitment: SHA-256 of the label with its salt."""
     from cryptography.fernet import Fernet
 
-    plain = plain_text(label, secrets.token_hex(_SALT_BYTES))
-    return Fernet(key).encrypt(plain), sha256(plain).hexdigest()
+    text = plain_text(label, secrets.token_hex(_SALT_BYTES))
+    return Fernet(key).encrypt(text), sha256(text).hexdigest()
 
 
 def opened(sealed: bytes, key: bytes, commitment: str, *, where: str) -> dict[str, Any]:
@@ -77,18 +78,23 @@ def opened(sealed: bytes, key: bytes, commitment: str, *, where: str) -> dict[st
 
 def unsealed(sealed: bytes, key: bytes, commitment: str, *, where: str) -> tuple[dict[str, Any], str]:
     """The label and its salt. Raises as `opened`."""
+    text = plain(sealed, key, where=where)
+    check(text, commitment, where=where)
+    found = json.loads(text)
+    return found["label"], found["salt"]
+
+
+def plain(sealed: bytes, key: bytes, *, where: str) -> bytes:
+    """What was sealed, not yet compared with a commitment. Raises InputError where the key is another."""
     from cryptography.fernet import Fernet, InvalidToken
 
     try:
-        plain = Fernet(key).decrypt(sealed)
+        return Fernet(key).decrypt(sealed)
     except InvalidToken as error:
         raise InputError(
             "a label cannot be opened with this key", where=where, expected="the key that sealed it",
-            received="another key, or a damaged file", hint=_KEYS,
+            received="another key, or a damaged file", hint=FIND_KEY,
         ) from error  # fmt: skip
-    check(plain, commitment, where=where)
-    found = json.loads(plain)
-    return found["label"], found["salt"]
 
 
 def plain_text(label: dict[str, Any], salt: str) -> bytes:
@@ -96,9 +102,9 @@ def plain_text(label: dict[str, Any], salt: str) -> bytes:
     return json.dumps({"salt": salt, "label": label}, sort_keys=True).encode()
 
 
-def check(plain: bytes, commitment: str, *, where: str) -> None:
+def check(text: bytes, commitment: str, *, where: str) -> None:
     """Raises InputError where the text of a label is not the one that was committed to."""
-    found = sha256(plain).hexdigest()
+    found = sha256(text).hexdigest()
     if found != commitment:
         raise InputError(
             "a label is not the one that was committed to", where=where, expected=commitment, received=found,

@@ -10,6 +10,7 @@ from cryptography.fernet import Fernet
 from r2s2r_cli.blind import labels
 from r2s2r_cli.blind.index import read_index
 from r2s2r_cli.blind.make.bank import Asked, make, sealed, worlds
+from r2s2r_cli.blind.make.begun import RECORD
 from r2s2r_cli.blind.split import Bank
 from r2s2r_cli.errors import UsageError
 
@@ -49,6 +50,7 @@ def test_two_shards_never_lie_in_one_folder(tmp_path: Path) -> None:
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(labels.seal({"seed": world.seed, "observed": 0}, KEY)[0])
     assert len(list(make(shard))) == len(read_index(tmp_path / labels.INDEX)[0]["sets"]) == 2
+    (tmp_path / RECORD).unlink()  # as a version before left it
     with pytest.raises(UsageError, match="another bank"):
         list(make(asked(tmp_path, 0, count=2)))
     with pytest.raises(UsageError, match="another bank"):

@@ -141,5 +141,5 @@ def test_a_key_that_is_none_ends_it(tmp_path: Path) -> None:
     """The maker says so; nothing is diagnosed, and no new key is written."""
     bank, verdicts = bank_of(tmp_path, {"a": wants(TARGETS)})
     code, found = asked(bank, verdicts, tmp_path / "out")
-    assert code == 4 and "key of the labels" in found["received"]
+    assert code == 4 and "key of the labels" in found["what"]
     assert not (tmp_path / "a.key").exists() and not (tmp_path / "out" / "verdicts").exists()

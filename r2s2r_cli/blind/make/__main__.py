@@ -11,6 +11,7 @@ from pathlib import Path
 
 from r2s2r_cli.blind.labels import new_key, read_key
 from r2s2r_cli.blind.make.bank import Asked, make
+from r2s2r_cli.blind.make.begun import check_key
 from r2s2r_cli.blind.make.effects import STARRED
 from r2s2r_cli.blind.make.follow import NUMBERS, Followed, follow
 from r2s2r_cli.blind.split import Bank
@@ -18,7 +19,8 @@ from r2s2r_cli.errors import R2S2RError
 
 
 def main(arguments: list[str]) -> int:
-    """Make the bank, or what follows on its verdicts; a JSON line a set on stdout. Gives the exit code."""
+    """Make the bank, or what follows on its verdicts; a JSON line a set on stdout, and one of an error of ours.
+    Gives the exit code."""
     return _follow(arguments[1:]) if arguments[:1] == ["follow"] else _make(arguments)
 
 
@@ -42,10 +44,11 @@ def _make(arguments: list[str]) -> int:
 
     def names() -> Iterator[str]:
         # A key that is there belongs to a bank that was begun: go on with it.
+        check_key(given.out, given.key)
         key = read_key(given.key) if given.key.exists() else new_key(given.key)
         asked = Asked(given.bank, given.count, given.out, key, given.first, given.commissioning, given.observed,
                       given.effect, given.gaits, given.tier, not given.no_oracle,
-                      given.camera)  # fmt: skip
+                      given.camera, str(given.key))  # fmt: skip
         return make(asked, executor=given.executor, workers=given.workers)
 
     return _told(names, given.count)
@@ -75,7 +78,9 @@ def _told(names: Callable[[], Iterator[str]], count: int) -> int:
             sys.stdout.write(json.dumps({"done": done, "of": count, "set": name}) + "\n")
             sys.stdout.flush()
     except R2S2RError as error:
-        sys.stderr.write("\n".join(error.lines()) + "\n")
+        # Whoever started this process says it in its own name.
+        facts = {name: getattr(error, name) for name in ("what", "where", "expected", "received", "hint")}
+        sys.stdout.write(json.dumps({"error": facts}) + "\n")
         return int(error.exit_code)
     except KeyboardInterrupt:
         return 130

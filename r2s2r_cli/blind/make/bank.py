@@ -14,6 +14,7 @@ import numpy as np
 from r2s2r_cli import __version__
 from r2s2r_cli.blind import labels
 from r2s2r_cli.blind.index import digest, index_text
+from r2s2r_cli.blind.make.begun import begin, check_labels, check_options
 from r2s2r_cli.blind.make.one import make_set
 from r2s2r_cli.blind.make.worlds import Hidden, hidden
 from r2s2r_cli.blind.seam import each, open_executor
@@ -27,6 +28,7 @@ class Asked:
     nobody can make its worlds again who has not the key. commissioning: runs of the healthy robot a set. observed:
     which draw of the camera's noise. effect: its single sets all have this effect; None: any of the first release.
     gaits: of every set; None: 3, 5 or 8 by chance. tier: A, our engine; B, the rig. camera: sets have pictures.
+    key_file: where the key lies, for people.
     """
 
     bank: Bank
@@ -41,6 +43,17 @@ class Asked:
     tier: Literal["A", "B"] = "B"
     oracle: bool = True
     camera: bool = False
+    key_file: str = "labels.key"
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What decides which sets these are, as it is typed."""
+        first = self.first if self.bank is Bank.BLIND else self.first or 0
+        return {
+            "--bank": self.bank.value, "--tier": self.tier, "--count": self.count, "--first": first,
+            "--commissioning": self.commissioning, "--observed": self.observed, "--effect": self.effect,
+            "--gaits": self.gaits, "--no-oracle": not self.oracle, "--camera": self.camera,
+        }  # fmt: skip
 
 
 def worlds(asked: Asked) -> tuple[Hidden, ...]:
@@ -62,16 +75,20 @@ def worlds(asked: Asked) -> tuple[Hidden, ...]:
 def make(asked: Asked, *, executor: str = "local", workers: int = 1) -> Iterator[str]:
     """Names of the sets as they are done; those that are there already are passed over. The list is written last.
 
-    Raises NumericalError where MuJoCo breaks down, UsageError where a set that is there is of another world.
+    Raises NumericalError where MuJoCo breaks down, UsageError where the bank was begun with other options or a set that
+    is there is of another world, InputError where the key is another.
     """
-    todo = []
-    for number, world in enumerate(worlds(asked)):
-        job = (asked, world, labels.set_name(asked.key, number))
-        if sealed(asked.out, job[2]).exists():
-            _check_world(asked, world, job[2])
-            yield job[2]
-        else:
-            todo.append(job)
+    recorded = check_options(asked.out, asked.key, asked.options, key_file=asked.key_file)
+    all_jobs = [(asked, world, labels.set_name(asked.key, number)) for number, world in enumerate(worlds(asked))]
+    there = {name: world for _, world, name in all_jobs if sealed(asked.out, name).exists()}
+    for name, world in there.items():
+        _check_world(asked, world, name)
+    if not recorded:
+        found = [(world, sealed(asked.out, name)) for name, world in there.items()]
+        check_labels(asked.out, asked.key, asked.options, found, [name for _, _, name in all_jobs])
+        begin(asked.out, asked.key, asked.options)
+    yield from there
+    todo = [job for job in all_jobs if job[2] not in there]
     if todo:
         with open_executor(executor, workers) as pool:
             for (_, _, name), _ in each(pool, _one, todo, at_once=workers):

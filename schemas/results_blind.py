@@ -107,6 +107,8 @@ class BlindShard(Frozen):
     commits: tuple[str, ...]
     """Of the code that judged it, as far as it is known."""
     sources_sha256: tuple[str, ...]
+    makers_sha256: tuple[str, ...] = ()
+    """Of the sources that made its logs and labels; empty: not known."""
     calibrated: tuple[str, ...]
     """Where its probabilities come from."""
 

@@ -1,4 +1,4 @@
-"""Which code judged: commit, and a digest of the sources that a diagnosis can import."""
+"""Which code judged, or made a bank: commit, and a digest of the sources that a diagnosis, or the maker, can import."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ LIMIT_S = 30
 
 
 @cache
-def code(root: Path | None = None) -> dict[str, Any]:
-    """Facts of a checkout (`schemas.blind.PublishedCode`). root: its folder; None: where this code lies. Looked at once
-    a process, which has loaded what it judges with.
+def code(root: Path | None = None, begin: tuple[str, ...] = BEGIN) -> dict[str, Any]:
+    """Facts of a checkout (`schemas.blind.PublishedCode`). root: its folder; None: where this code lies. begin: modules
+    whose imports count. Looked at once a process, which has loaded what it judges with.
 
     Two commits with the same digest judge alike: what differs between them cannot be reached by a diagnosis. Raises
     InputError where the folder holds no r2s2r.
@@ -33,16 +33,16 @@ def code(root: Path | None = None) -> dict[str, Any]:
     commit = _git(home, "rev-parse", "HEAD") if (home / ".git").exists() else None
     changes = _git(home, "status", "--porcelain", "--untracked-files=no", "--", "r2s2r_cli", "schemas")
     whole = sha256()
-    for path in sorted(_reached(home)):
+    for path in sorted(_reached(home, begin)):
         whole.update(f"{path.relative_to(home).as_posix()}\n".encode())
         whole.update(sha256(path.read_bytes()).digest())
     return {"version": __version__, "commit": commit, "changed": bool(commit and changes),
             "sources_sha256": whole.hexdigest()}  # fmt: skip
 
 
-def _reached(home: Path) -> set[Path]:
-    """Files that the modules of BEGIN import, directly or through others, at the top or inside functions."""
-    todo = [path for name in BEGIN for path in _files(home, name)]
+def _reached(home: Path, begin: tuple[str, ...]) -> set[Path]:
+    """Files that these modules import, directly or through others, at the top or inside functions."""
+    todo = [path for name in begin for path in _files(home, name)]
     found: set[Path] = set()
     while todo:
         path = todo.pop()

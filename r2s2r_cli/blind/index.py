@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -21,10 +22,13 @@ def digest(folder: Path) -> str:
     return whole.hexdigest()
 
 
-def index_text(tier: str, bank: str, sets: dict[str, dict[str, str]], made_by: str) -> str:
-    """The text of `index.json`. sets: {"label": commitment, "logs": digest} by name."""
-    return json.dumps({"format": FORMAT, "tier": tier, "bank": bank, "made_by": made_by, "sets": sets}, indent=1,
-                      sort_keys=True) + "\n"  # fmt: skip
+def index_text(
+    tier: str, bank: str, sets: dict[str, dict[str, str]], made_by: str, makers: Sequence[dict[str, Any]] = ()
+) -> str:
+    """The text of `index.json`. sets: {"label": commitment, "logs": digest} by name. makers: all code that made it
+    (`code`); none: not known, as in the lists of versions before."""
+    found = {"format": FORMAT, "tier": tier, "bank": bank, "made_by": made_by, "sets": sets}
+    return json.dumps({**found, **({"makers": list(makers)} if makers else {})}, indent=1, sort_keys=True) + "\n"
 
 
 def read_index(path: Path) -> tuple[dict[str, Any], str]:
@@ -42,6 +46,9 @@ def index_of(data: bytes, *, where: str) -> tuple[dict[str, Any], str]:
         found = json.loads(data)
         if found["format"] != FORMAT:
             raise ValueError(f"format {found['format']!r}")
+        for one in found.get("makers", ()):
+            if not isinstance(one["sources_sha256"], str) or not isinstance(one["commit"], str | None):
+                raise ValueError("makers of the bank are no digests")
     except (ValueError, KeyError, TypeError) as error:
         raise _no_index(where, error) from error
     return found, sha256(data).hexdigest()

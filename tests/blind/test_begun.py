@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,13 +13,16 @@ import pytest
 from cryptography.fernet import Fernet
 
 from r2s2r_cli.blind import labels
+from r2s2r_cli.blind.code import code
 from r2s2r_cli.blind.index import read_index
+from r2s2r_cli.blind.make import bank as maker
 from r2s2r_cli.blind.make.bank import Asked, make, sealed, worlds
 from r2s2r_cli.blind.make.begun import RECORD
 from r2s2r_cli.blind.make.one import label
 from r2s2r_cli.blind.split import Bank
 from r2s2r_cli.errors import InputError, UsageError
 from tests.commands.conftest import invoke
+from tests.support.blind_folder import CODE
 
 OTHERS: list[tuple[dict[str, Any], str]] = [
     ({"count": 13}, "--count"), ({"count": 8}, "--count"), ({"bank": Bank.REGRESSION}, "--bank"),
@@ -110,3 +114,70 @@ def test_the_command_says_so_and_its_hint_goes_on(asked: Asked) -> None:
     assert again.exit_code == 0 and json.loads(again.stdout)["index_sha256"] == index
     none = invoke("blind", "make", str(asked.out), "--key", f"{asked.key_file}.2", "--count", "12", "--json")
     assert none.exit_code == 2 and not Path(f"{asked.key_file}.2").exists()
+
+
+@pytest.fixture
+def made_by(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Sets are nothing but a label here; gives what says which code makes them from now on."""
+
+    def one(job: tuple[Asked, Any, str]) -> None:
+        asked, world, name = job
+        path = sealed(asked.out, name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(labels.seal(label(world, [], None, 0), asked.key)[0])
+
+    monkeypatch.setattr(maker, "open_executor", lambda spec, workers: ThreadPoolExecutor(1))
+    monkeypatch.setattr(maker, "_one", one)
+    return lambda digest: monkeypatch.setattr(maker, "maker", lambda: CODE | {"sources_sha256": digest})
+
+
+def index_of_bank(asked: Asked) -> dict[str, Any]:
+    """The list that was written."""
+    return read_index(asked.out / labels.INDEX)[0]
+
+
+def test_the_list_says_which_code_made_the_bank(tmp_path: Path, made_by: Any) -> None:
+    """All of it where a bank was gone on with by other code, each once; a list that was closed stays as it is."""
+    asked = Asked(Bank.CALIBRATION, 6, tmp_path, Fernet.generate_key(), oracle=False)
+    made_by("f00")
+    half = make(asked)
+    assert [next(half) for _ in range(3)]
+    half.close()
+    for digest in ("f01", "f01", "f02"):
+        made_by(digest)
+        all_of(asked)
+    makers = index_of_bank(asked)["makers"]
+    assert [one["sources_sha256"] for one in makers] == ["f00", "f01"] and makers[0]["commit"] == CODE["commit"]
+
+
+def test_of_a_bank_of_before_nothing_is_claimed(asked: Asked, made_by: Any) -> None:
+    """What made half of it is not known; and its list, which was committed to, is not written anew."""
+    made_by("f00")
+    sealed(asked.out, labels.set_name(asked.key, 3)).unlink()
+    all_of(replace(asked, oracle=True))
+    text = (asked.out / labels.INDEX).read_text()
+    assert "makers" not in text
+    (asked.out / labels.INDEX).write_text(text + " ")
+    all_of(asked)
+    assert (asked.out / labels.INDEX).read_text() == text + " "
+
+
+def test_the_digest_is_of_all_that_makes_a_bank(tmp_path: Path) -> None:
+    """The rig and what computes d change it; what only judges does not."""
+    for name in ("__init__", "blind/make/__main__", "blind/make/oracle", "rig/world", "blind/score/rows"):
+        path = tmp_path / "r2s2r_cli" / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    home = tmp_path / "r2s2r_cli"
+    (home / "blind/make/__main__.py").write_text("from r2s2r_cli.blind.make.oracle import detectability\n")
+    (home / "blind/make/oracle.py").write_text("def f():\n    from r2s2r_cli.rig import world\n")
+    changed = {}
+    for name in ("blind/make/oracle", "rig/world", "blind/score/rows"):
+        code.cache_clear()
+        before = code(tmp_path, maker.BEGIN)["sources_sha256"]
+        with (home / f"{name}.py").open("a") as file:
+            file.write("x = 1\n")
+        code.cache_clear()
+        changed[name] = code(tmp_path, maker.BEGIN)["sources_sha256"] != before
+    assert changed == {"blind/make/oracle": True, "rig/world": True, "blind/score/rows": False}
+    assert maker.maker()["sources_sha256"] != code()["sources_sha256"]

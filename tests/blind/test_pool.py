@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from r2s2r_cli.blind.index import FORMAT, index_of
 from r2s2r_cli.blind.score import calibration_published, score, score_published
 from r2s2r_cli.blind.score.published import published
 from r2s2r_cli.blind.score.shard import opened
@@ -92,6 +94,29 @@ def test_other_code_and_another_calibration_are_told(tmp_path: Path) -> None:
     d = tmp_path / "d.json"
     d.write_bytes(published(opened(made.bank, made.verdicts, made.key), CODE))
     assert any("2 calibrations" in one for one in score_published([a, d]).warnings)
+
+
+def test_banks_that_other_code_made_are_told(tmp_path: Path) -> None:
+    """Their labels may mean something else: two digests are remarked on, of files as of a bank; one, or one that is not
+    known beside it, is not. The published file carries them in its list."""
+    a = shard(tmp_path / "a", slice(0, 15), makers=[CODE])
+    b = shard(tmp_path / "b", slice(15, 30), makers=[CODE | {"commit": "c1"}])
+    c = shard(tmp_path / "c", slice(30, 45), makers=[CODE | {"commit": "c2", "sources_sha256": "f01"}])
+    before = shard(tmp_path / "before", slice(45, 60))
+    assert score_published([a, b, before]).warnings == ()
+    found = score_published([a, c, before])
+    assert len(found.warnings) == 1 and all(word in found.warnings[0] for word in ("labels", "c0de", "c2"))
+    assert sorted(one.makers_sha256 for one in found.shards) == [(), ("f00",), ("f01",)]
+    made = Folder(tmp_path / "d", LABELS[:20], knows_by_number, makers=[CODE, CODE | {"sources_sha256": "f01"}])
+    assert "different code made" in score(made.bank, made.verdicts, made.key).warnings[0]
+
+
+@pytest.mark.parametrize("makers", [[{}], [7], 7, [CODE | {"sources_sha256": None}], [CODE | {"commit": 7}]])
+def test_makers_that_are_none_are_refused(makers: Any, tmp_path: Path) -> None:
+    """A list that was written by hand: said so, no traceback."""
+    found = {"format": FORMAT, "tier": "B", "bank": "blind", "made_by": "x", "sets": {}, "makers": makers}
+    with pytest.raises(InputError, match="list of the blind sets"):
+        index_of(json.dumps(found).encode(), where="x")
 
 
 def test_only_a_calibration_bank_teaches(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ class Folder:
 
     def __init__(
         self, home: Path, truths: Sequence[dict[str, Any]], answer: Answer, *, names: Sequence[str] = (),
-        tier: str = "B", bank: str = "calibration", seed: int = 1, **asked: Any,
+        tier: str = "B", bank: str = "calibration", seed: int = 1, makers: Sequence[dict[str, Any]] = (), **asked: Any,
     ) -> None:  # fmt: skip
         self.bank, self.verdicts, self.key = home / "bank", home / "verdicts", Fernet.generate_key()
         facts = {}
@@ -35,7 +35,7 @@ class Folder:
             path.parent.mkdir(exist_ok=True)
             path.write_bytes(sealed)
             facts[name] = {"label": commitment, "logs": digest(folder)}
-        text = index_text(tier, bank, facts, "test")
+        text = index_text(tier, bank, facts, "test", makers)
         (self.bank / labels.INDEX).write_text(text)
         self.own = labels.sha256(text.encode()).hexdigest()
         rng = np.random.default_rng(seed)

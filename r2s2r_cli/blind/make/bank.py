@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 
 from r2s2r_cli import __version__
 from r2s2r_cli.blind import labels
+from r2s2r_cli.blind.code import code
 from r2s2r_cli.blind.index import digest, index_text
 from r2s2r_cli.blind.make.begun import begin, check_labels, check_options
 from r2s2r_cli.blind.make.one import make_set
@@ -20,6 +21,9 @@ from r2s2r_cli.blind.make.worlds import Hidden, hidden
 from r2s2r_cli.blind.seam import each, open_executor
 from r2s2r_cli.blind.split import RANGES, Bank, kinds, seeds
 from r2s2r_cli.errors import UsageError
+
+BEGIN = ("r2s2r_cli.blind.make.__main__",)
+"""What makes a bank; the rig and all else that decides of logs and labels follows from its imports."""
 
 
 @dataclass(frozen=True)
@@ -78,22 +82,38 @@ def make(asked: Asked, *, executor: str = "local", workers: int = 1) -> Iterator
     Raises NumericalError where MuJoCo breaks down, UsageError where the bank was begun with other options or a set that
     is there is of another world, InputError where the key is another.
     """
-    recorded = check_options(asked.out, asked.key, asked.options, key_file=asked.key_file)
+    record = check_options(asked.out, asked.key, asked.options, key_file=asked.key_file)
     all_jobs = [(asked, world, labels.set_name(asked.key, number)) for number, world in enumerate(worlds(asked))]
     there = {name: world for _, world, name in all_jobs if sealed(asked.out, name).exists()}
     for name, world in there.items():
         _check_world(asked, world, name)
-    if not recorded:
+    if record is None:
         found = [(world, sealed(asked.out, name)) for name, world in there.items()]
         check_labels(asked.out, asked.key, asked.options, found, [name for _, _, name in all_jobs])
-        begin(asked.out, asked.key, asked.options)
-    yield from there
     todo = [job for job in all_jobs if job[2] not in there]
+    makers = list(record["makers"]) if record else []
+    # What made the sets of a bank without a record is not known, whatever makes the rest.
+    if todo and (makers or not there) and not any(_same(one, maker()) for one in makers):
+        makers.append(maker())
+    if record is None or makers != record["makers"]:
+        begin(asked.out, asked.key, asked.options, makers)
+    yield from there
     if todo:
         with open_executor(executor, workers) as pool:
             for (_, _, name), _ in each(pool, _one, todo, at_once=workers):
                 yield name
-    close(asked)
+    # A list that was closed is what was committed to, and stays so byte for byte.
+    if todo or not (asked.out / labels.INDEX).exists():
+        close(asked, makers)
+
+
+def maker() -> dict[str, Any]:
+    """The code that makes sets here (`blind.code`)."""
+    return code(begin=BEGIN)
+
+
+def _same(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    return bool(one["sources_sha256"] == other["sources_sha256"])
 
 
 def _check_world(asked: Asked, world: Hidden, name: str) -> None:
@@ -113,13 +133,15 @@ def _check_world(asked: Asked, world: Hidden, name: str) -> None:
         )  # fmt: skip
 
 
-def close(asked: Asked) -> None:
-    """Write the list of the bank, in the order of the names, which says nothing."""
+def close(asked: Asked, makers: Sequence[dict[str, Any]] = ()) -> None:
+    """Write the list of the bank, in the order of the names, which says nothing. makers: all code that made it."""
     names = [labels.set_name(asked.key, number) for number in range(asked.count)]
-    write_list(asked.out, asked.key, names, tier=asked.tier, bank=asked.bank.value)
+    write_list(asked.out, asked.key, names, tier=asked.tier, bank=asked.bank.value, makers=makers)
 
 
-def write_list(out: Path, key: bytes, names: Iterable[str], *, tier: str, bank: str) -> None:
+def write_list(
+    out: Path, key: bytes, names: Iterable[str], *, tier: str, bank: str, makers: Sequence[dict[str, Any]] = ()
+) -> None:
     """Write `index.json` of the bank `out`: what every set's label was committed to with, and a digest of its logs."""
     sets = {
         name: {
@@ -128,7 +150,7 @@ def write_list(out: Path, key: bytes, names: Iterable[str], *, tier: str, bank: 
         }
         for name in names
     }
-    text = index_text(tier, bank, sets, f"r2s2r {__version__}")
+    text = index_text(tier, bank, sets, f"r2s2r {__version__}", makers)
     (out / labels.INDEX).write_text(text, encoding="utf-8")
 
 

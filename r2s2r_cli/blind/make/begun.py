@@ -1,4 +1,5 @@
-"""What a bank was begun with, sealed in it: going on with other options is refused, since it would mix compositions.
+"""What a bank was begun with, sealed in it: going on with other options is refused, since it would mix compositions;
+which code made it is kept, since it goes into its list.
 
 Sealed, because `--effect` and `--first` tell what is in the sets. Of a bank that an earlier version began, without this
 record, its labels tell most of it; it is written for such a bank as soon as these agree.
@@ -18,6 +19,8 @@ from r2s2r_cli.blind.make.worlds import Hidden
 from r2s2r_cli.errors import UsageError, quoted
 
 RECORD = "begun.sealed"
+Record = dict[str, Any]
+"""`options` and `makers`, as `begin` writes them."""
 Options = Mapping[str, Any]
 """Of `blind make` by their names, those that decide what the sets are; None and False: not given."""
 _WHAT = "this bank was begun with other options, and one bank has one composition"
@@ -37,26 +40,28 @@ def check_key(out: Path, key: Path) -> None:
         )  # fmt: skip
 
 
-def check_options(out: Path, key: bytes, options: Options, *, key_file: str) -> bool:
-    """Whether the bank has a record, which says the same. Raises UsageError where it says something else, InputError
-    where the key is another. key_file: for people."""
+def check_options(out: Path, key: bytes, options: Options, *, key_file: str) -> Record | None:
+    """The record of the bank, which says the same; None where it has none. Raises UsageError where it says something
+    else, InputError where the key is another. key_file: for people."""
     path = out / RECORD
     if not path.exists():
-        return False
-    was = json.loads(labels.plain(path.read_bytes(), key, where=str(path)))["label"]["options"]
+        return None
+    found: Record = json.loads(labels.plain(path.read_bytes(), key, where=str(path)))["label"]
+    was = found["options"]
     differ = [name for name in {**was, **options} if was.get(name) != options.get(name)]
     if differ:
         raise UsageError(_WHAT, where=str(path), expected=_told(was, differ), received=_told(options, differ),
                          hint=shlex.join(["r2s2r", "blind", "make", *_words(was), "--key", key_file, str(out)]),
                          )  # fmt: skip
-    return True
+    return found
 
 
-def begin(out: Path, key: bytes, options: Options) -> None:
-    """Write the record, whole or not at all."""
+def begin(out: Path, key: bytes, options: Options, makers: Sequence[dict[str, Any]]) -> None:
+    """Write the record, whole or not at all. makers: all code that made sets of the bank; none: some that is not known
+    made one."""
     out.mkdir(parents=True, exist_ok=True)
     part = (out / RECORD).with_suffix(".part")
-    part.write_bytes(labels.seal({"options": dict(options)}, key)[0])
+    part.write_bytes(labels.seal({"options": dict(options), "makers": list(makers)}, key)[0])
     part.replace(out / RECORD)
 
 

@@ -92,7 +92,13 @@ def _facts(shard: Shard) -> BlindShard:
     return BlindShard(where=shard.where, index_sha256=shard.own, sets=len(shard.index["sets"]), scored=len(shard.sets),
                       commits=tuple(dict.fromkeys(str(one["commit"]) for one in shard.code if one["commit"])),
                       sources_sha256=tuple(dict.fromkeys(str(one["sources_sha256"]) for one in shard.code)),
+                      makers_sha256=tuple(str(one["sources_sha256"]) for one in _makers(shard)),
                       calibrated=shard.calibrated)  # fmt: skip
+
+
+def _makers(shard: Shard) -> list[dict[str, Any]]:
+    """What made the bank, as its list says; those of versions before say nothing."""
+    return list(shard.index.get("makers", ()))
 
 
 def _warnings(shards: Sequence[Shard]) -> list[str]:
@@ -106,6 +112,11 @@ def _warnings(shards: Sequence[Shard]) -> list[str]:
         found.append(f"different code judged these sets ({', '.join(commits)}): one figure mixes it")
     if any(one["changed"] for one in judges):
         found.append("sets were judged from a checkout with changes that were not committed")
+    makers = [one for shard in shards for one in _makers(shard)]
+    if len({one["sources_sha256"] for one in makers}) > 1:
+        commits = dict.fromkeys(str(one["commit"] or "no checkout")[:12] for one in makers)
+        found.append(f"different code made these banks ({', '.join(commits)}): logs, and labels such as d, may be "
+                     "defined otherwise")  # fmt: skip
     silent = [one.where for one in shards if not one.code]
     if silent and len(silent) < len(shards):
         found.append(f"which code judged is not known of {', '.join(silent)}")

@@ -92,7 +92,7 @@ class Console:
 
         Without a terminal a line now and then; silent with --quiet, or where R2S2R_NO_PROGRESS is set.
         """
-        with self.parts() as show:
+        with self.parts(several=False) as show:
             done = 0
 
             def advance(more: int) -> None:
@@ -104,17 +104,18 @@ class Console:
             yield advance
 
     @contextmanager
-    def parts(self) -> Iterator[Callable[[str, int, int, str], None]]:
+    def parts(self, *, several: bool = True) -> Iterator[Callable[[str, int, int, str], None]]:
         """The same for work of several parts: yields a function of part, items done and in all, and a word beside them.
 
         A part gets its bar when it is first named; parts that were done stay until all are. Where stderr is no terminal
         a line every LINE_S seconds says how far it is: a log of minutes without a word looks like one that hangs.
+        several: more parts may follow, so that the time left is of this one.
         """
         if self.quiet or os.environ.get(NO_PROGRESS):
             yield lambda part, done, total, word: None
             return
         if not sys.stderr.isatty():
-            yield _Lines(self.say).show
+            yield _Lines(self.say, several=several).show
             return
         from rich.console import Console as RichConsole
         from rich.progress import (
@@ -163,8 +164,9 @@ class Console:
 class _Lines:
     """Progress as lines, for files and pipes: none of work that is done within LINE_S."""
 
-    def __init__(self, say: Callable[[str], None]) -> None:
+    def __init__(self, say: Callable[[str], None], *, several: bool) -> None:
         self.say = say
+        self.whose = " of this part" if several else ""
         self.begun = self.last = time.monotonic()
         self.since: dict[str, tuple[float, int]] = {}
         """When a part was first named, and how far it was then: one that is resumed begins in its middle."""
@@ -177,7 +179,7 @@ class _Lines:
             return
         self.last = now
         more = done - from_
-        left = f", about {(now - began) * (total - done) / more:.0f} s left" if more > 0 else ""
+        left = f", about {(now - began) * (total - done) / more:.0f} s left{self.whose}" if more > 0 else ""
         beside = f", {word}" if word else ""
         self.say(f"{part}: {done} of {total} after {now - self.begun:.0f} s{left}{beside}")
 

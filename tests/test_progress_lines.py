@@ -37,7 +37,15 @@ def test_a_line_now_and_then_says_how_far_it_is(clock: Clock, capsys: pytest.Cap
         show("search", 100, 100, "")
     told = capsys.readouterr()
     assert told.out == ""
-    assert told.err == "search: 60 of 100 after 31 s, about 62 s left, cost 3\n"
+    assert told.err == "search: 60 of 100 after 31 s, about 62 s left of this part, cost 3\n"
+
+
+def test_the_time_left_of_one_part_alone_is_that_of_all(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:
+    """Where nothing else can follow it is not called that of a part."""
+    with Console().progress("sets", 4) as advance:
+        clock.now += LINE_S + 1
+        advance(1)
+    assert capsys.readouterr().err == "sets: 1 of 4 after 31 s, about 93 s left\n"
 
 
 @pytest.mark.parametrize("silenced", ["quiet", "environment"])

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 _WIDTH, _HEIGHT = 11.0, 3.0
 _DOT, _LINE, _NOISE = BLUE, RED, "#999999"
+SIDE_BY_SIDE = 0.06
+"""Of the way to the next phase, between the repeats of one."""
 
 
 def draw_floor(data: ArtifactData) -> bytes:
@@ -30,16 +32,29 @@ def draw_floor(data: ArtifactData) -> bytes:
 
 
 def _caps(axes: Axes, group: Group) -> None:
-    x, floor = group["phase"], 1e3 * float(group.attributes["floor"])
-    axes.plot(x, 1e3 * group["deviation"], "o", color=_DOT, ms=5, label="a repeat")
+    phase, floor = group["phase"], 1e3 * float(group.attributes["floor"])
+    x, off = repeats_drawn(phase, 1e3 * group["deviation"])
+    axes.plot(x, off, "o", color=_DOT, ms=5, label="a repeat: about the mean of its n, times √(n / (n − 1))")
     axes.axhline(floor, color=_LINE, label=f"floor {floor:.1f} mm")
     if "lower" in group.attributes:
         low, high = 1e3 * float(group.attributes["lower"]), 1e3 * float(group.attributes["upper"])
         axes.axhspan(low, high, color=_LINE, alpha=0.15, lw=0, label=f"{float(group.attributes['level']):.0%} interval")
     axes.axhline(1e3 * float(group.attributes["sensor"]), color=_NOISE, ls="--", label="noise of the caps")
-    axes.set(xlabel="phase of the gait", ylabel="end caps about the mean\nof their phase [mm]", ylim=(0, None))
-    axes.set_xticks(np.unique(x))
+    axes.set(xlabel="phase of the gait", ylabel="end caps of a repeat\n[mm]", ylim=(0, None))
+    axes.set_xticks(np.unique(phase) + 1)
     axes.legend(fontsize=8)
+
+
+def repeats_drawn(phase: np.ndarray, deviation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where repeats (repeat,) of phases are drawn: side by side about the phase's number, from 1 on, as two of one
+    phase lie equally far off; and how far off, so that their mean square is the floor's: n of them lie nearer to their
+    own mean than to that of many."""
+    x, off = phase + 1.0, np.array(deviation, dtype=float)
+    for one in np.unique(phase):
+        own = np.flatnonzero(phase == one)
+        x[own] += SIDE_BY_SIDE * (np.arange(len(own)) - (len(own) - 1) / 2)
+        off[own] *= np.sqrt(len(own) / max(len(own) - 1, 1))
+    return x, off
 
 
 def _lengths(axes: Axes, group: Group) -> None:

@@ -43,7 +43,7 @@ def draw_identification(data: ArtifactData) -> Iterator[tuple[str, str, bytes]]:
         if f"runs/{run}/free_run" in data.groups:
             yield f"free-{run}", f"Run {run}: free run over the test segments", draw_free_run(data, run)
     if "trace" in data.groups or "profiles" in data.groups:
-        yield "search", "Loss of every start, and profile likelihood of the weakest", draw_search(data)
+        yield "search", "Loss on the way of the fit, and profile likelihood of the weakest", draw_search(data)
     if "history" in data.groups:
         yield "history", "Estimates as runs arrived", draw_history(data)
 

@@ -20,6 +20,7 @@ _DARK = 0.6
 """Correlations whose colour hides black signs."""
 _SPREAD = 0.7
 """Of the distance between segments: marks stand side by side over it, so that none hides another."""
+_FULL, _PALE = "#303842", "#8a929b"
 _MARKS = ("_", "x", "+", "^", "v", "d", "s", "*")
 
 
@@ -51,8 +52,12 @@ def errors_with_repeats(segments: Group, repeats: Group | None) -> np.ndarray | 
 
 
 def _bars(axes: Axes, segments: Group, measures: Group, repeats: Group | None = None) -> None:
+    from matplotlib.patheffects import withStroke
+
     x = np.arange(len(segments["interval"]))
     roles = segments["role"].tolist()
+    # Some marks lie on bars, which are as dark.
+    edge = [withStroke(linewidth=4, foreground="white")]
     axes.bar(x, 1e3 * segments["keyframe_cap_rmse"], color=[ROLE_COLORS[role] for role in roles], width=0.6)
     for role in sorted(set(roles)):
         axes.bar([0], [0], color=ROLE_COLORS[role], label=f"identified, {ROLE_WORDS[role]}")
@@ -63,7 +68,8 @@ def _bars(axes: Axes, segments: Group, measures: Group, repeats: Group | None = 
     aside = _SPREAD * (np.arange(len(marked) + 1) - 0.5 * len(marked)) / max(len(marked), 1)
     for (k, name), beside in zip(marked, aside, strict=False):
         error, mark = 1e3 * segments["baseline_cap_rmse"][:, k], _MARKS[k % len(_MARKS)]
-        axes.plot(x + beside, error, mark, ms=9, mew=1.8, color="#303842", alpha=0.35 + 0.5 * (k % 2), label=name)
+        color = _PALE if k % 2 else _FULL
+        axes.plot(x + beside, error, mark, ms=9, mew=1.8, color=color, label=name, path_effects=edge)
     if repeating is not None:
         axes.plot(
             x + aside[-1], 1e3 * repeating, "P", ms=10, mec="black", color="#f5c518", label="identified + what repeats"
@@ -89,4 +95,5 @@ def _whiteness(figure: Figure, axes: Axes, segments: Group) -> None:
     axes.set_yticks(range(len(lag1)), [f"cap {cap}" for cap in range(len(lag1))], fontsize=8)
     axes.set_xticks(range(lag1.shape[1]), segment_names(segments), fontsize=8)
     axes.set_title(_WHITENESS, fontsize=9)
+    axes.set_xlabel("target interval")
     figure.colorbar(image, ax=axes, fraction=0.03, pad=0.01)

@@ -1,4 +1,4 @@
-"""How the numbers were found: loss of every start, paths of the parameters, profiles, online estimates."""
+"""How the numbers were found: loss on the way, paths of the parameters, profiles, online estimates."""
 
 from __future__ import annotations
 

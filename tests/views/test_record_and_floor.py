@@ -8,7 +8,7 @@ import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.stages.floor import Numerics, floor
-from r2s2r_cli.views.floor import draw_floor, floor_page, floor_tables
+from r2s2r_cli.views.floor import draw_floor, floor_page, floor_tables, repeats_drawn
 from r2s2r_cli.views.record_page import plan_table, record_page, report_tables
 from schemas.results_record import CameraCounts, RecordReport, RecordRun
 from tests.support.builders import floor as built_floor, png, robot
@@ -70,3 +70,19 @@ def test_the_page_of_a_floor_says_its_numbers() -> None:
     assert dict(table.rows)["floor"].startswith("3.54 mm") and dict(table.rows)["the caps move"].startswith("40 mm")
     page = floor_page(report, draw_floor(data)).decode()
     assert "numerics 3.54 mm" in page and "no floor of the end caps" in page
+
+
+def test_repeats_are_drawn_as_far_off_as_the_floor_says() -> None:
+    """Two of one phase do not hide each other, and the mean square of all, each phase counted by its contrasts, is the
+    square of the floor."""
+    rng = np.random.default_rng(0)
+    sizes = [2, 2, 3, 5]
+    phase = np.repeat(np.arange(4), sizes)
+    drawn = [rng.standard_normal(n) for n in sizes]
+    deviation = np.concatenate([np.abs(one - one.mean()) for one in drawn])
+    x, off = repeats_drawn(phase, deviation)
+    assert len(np.unique(x)) == len(x)
+    assert np.round(x).tolist() == (phase + 1).tolist()
+    weight = np.concatenate([np.full(n, (n - 1) / n) for n in sizes])
+    floor2 = sum(np.sum((one - one.mean()) ** 2) for one in drawn) / sum(n - 1 for n in sizes)
+    assert np.isclose(np.sum(weight * off**2) / weight.sum(), floor2)

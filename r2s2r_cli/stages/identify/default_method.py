@@ -77,7 +77,7 @@ def first_fit(task: Task, predictor: Predictor, kept: Kept) -> Fit:
         if kept.held:
             kept.save_with_trace(rollouts=predictor.rollouts)
         done = (number + one.fraction) / rounds
-        task.progress(Step("fit", int(1000 * done), 1000, one.cost))
+        task.progress(Step.share("fit", done, one.cost))
 
     def hold(number: int, values: np.ndarray, one: SolverCheckpoint | None) -> None:
         kept.hold(round=number, values=values.tolist(), solver=None if one is None else one.to_dict())
@@ -109,7 +109,7 @@ def _other_starts(task: Task, fitted: Fit) -> tuple[tuple[StartFound, ...], np.n
         return (own,), fitted.solution.z[None, :n]
 
     def told(one: SolverProgress) -> None:
-        task.progress(Step("starts", int(1000 * one.fraction), 1000, one.cost))
+        task.progress(Step.share("starts", one.fraction, one.cost))
 
     others = more_starts(fitted, task.recipe, settings.starts - 1, task.request.seed, told)
     found = [own]

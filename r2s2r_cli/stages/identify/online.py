@@ -221,7 +221,7 @@ def _progress(
     def told(number: int, rounds: int, one: SolverProgress) -> None:
         trace.append(TraceStep(0, f"{order[k].run}, round {number + 1}, {one.stage_name}", one.iteration, one.cost))
         share = (k + (number + one.fraction) / rounds) / len(order)
-        task.progress(Step("fit", int(1000 * share), 1000, one.cost))
+        task.progress(Step.share("fit", share, one.cost))
 
     return told
 

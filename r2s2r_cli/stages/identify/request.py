@@ -40,6 +40,9 @@ class Request:
     left_out: tuple[str, ...] = ()
 
 
+PERCENT = 100
+
+
 @dataclass(frozen=True)
 class Step:
     """A word on the way: `done` of `total` steps of one part (`fit`, `starts`, `ranges` ...) and the cost now."""
@@ -48,6 +51,11 @@ class Step:
     done: int
     total: int
     cost: float | None = None
+
+    @classmethod
+    def share(cls, part: str, done: float, cost: float | None = None) -> Step:
+        """Of a part that has no items: `done`, 0 to 1, in percent."""
+        return cls(part, int(PERCENT * done), PERCENT, cost)
 
 
 Progress = Callable[[Step], None]

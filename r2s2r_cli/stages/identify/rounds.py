@@ -86,9 +86,10 @@ def first_round(
         cooling = Cooling(members=members_for(problem))
         led = Begin(solution.z, solution.normal, min(smooth, len(stages) - 1))
         anew = Begin(started(problem, values), wide_about(problem, cooling), min(1, len(stages) - 1))
-        hear = None if progress is None else partial(_heard, progress, names, cooling.generations)
+        begins = [led, anew]
+        hear = None if progress is None else partial(_heard, progress, names, cooling.generations, len(begins))
         chances = CHANCES if problem.offsets == 0 else MANY_CHANCES
-        ways = cool_growing(stages, [led, anew], loss=loss, seed=seed, cooling=cooling, chances=chances, told=hear)
+        ways = cool_growing(stages, begins, loss=loss, seed=seed, cooling=cooling, chances=chances, told=hear)
         return _settled(problem, ways.best, recipe, seed, cooling.generations, ways.others)
     if problem.misfit(solution.z) < EXACT:
         # The model explains the data to their noise: no filter knows these start states as well as the fit does.
@@ -152,7 +153,7 @@ def more_starts(
     )
     for number, z0 in enumerate(z0s):
         wide = wide_about(problem, cooling, FIRST)
-        hear = partial(_heard, progress, ("all",), cooling.generations, number, 0)
+        hear = partial(_heard, progress, ("all",), cooling.generations, len(z0s), number, 0)
         end = cool(problem, z0, wide, loss=loss, seed=seed + number + 1, cooling=cooling, told=hear)
         found.append((z0, solution_at(problem, end.z, end, loss, cooling.generations)))
     return found
@@ -184,11 +185,11 @@ def _settled(
 
 
 def _heard(
-    progress: Callable[[Progress], None], names: Sequence[str], generations: int, way: int, stage: int, generation: int,
-    cost: float,
+    progress: Callable[[Progress], None], names: Sequence[str], generations: int, ways: int, way: int, stage: int,
+    generation: int, cost: float,
 ) -> None:  # fmt: skip
     name = f"{names[stage]}, population" + (f", way {way + 1}" if way else "")
-    progress(Progress(generation, generations, cost, 0.0, 0.0, Counts(), stage, len(names), name, way, way + 1))
+    progress(Progress(generation, generations, cost, 0.0, 0.0, Counts(), stage, len(names), name, way, ways))
 
 
 def _heard_later(

@@ -38,8 +38,10 @@ def _planned(project: Project, place: Iteration, kinds: Sequence[str]) -> str:
             return f"r2s2r estimate --of execute --iteration {place.number}"
         if not place.artifact("comparison").exists():
             return f"r2s2r compare --iteration {place.number}"
-    elif place.artifact("plan").exists() and _moved_by_us(project):
+    elif _moved_by_us(project):
         return f"r2s2r execute --iteration {place.number} --dry-run"
+    elif place.artifact("estimate").exists() and not place.artifact("comparison").exists():
+        return f"r2s2r compare --iteration {place.number}"  # a log cannot be asked for more: with what it has
     return ""
 
 

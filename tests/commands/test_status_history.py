@@ -64,11 +64,23 @@ def test_without_a_report_nothing_is_told(project: Path, broken: bool) -> None:
     assert document("status")["history"] == []
 
 
-@pytest.mark.parametrize(("stage", "hint"), [("record", "r2s2r execute --iteration 1 --dry-run"), ("import", "")])
+@pytest.mark.parametrize(
+    ("stage", "hint"),
+    [("record", "r2s2r execute --iteration 1 --dry-run"), ("import", "r2s2r compare --iteration 1")],
+)
 def test_a_plan_is_executed_where_there_is_a_robot(tmp_path: Path, stage: str, hint: str) -> None:
-    """After the plan its execution is proposed, in a project whose runs came from a robot and not from a log."""
+    """After the plan its execution is proposed, in a project whose runs came from a robot; simulators are compared on
+    the runs of a log, which cannot be asked for more."""
     project = _planned(tmp_path, stage)
     assert forward(project) == hint  # type: ignore[arg-type]
+
+
+def test_a_log_is_compared_once(tmp_path: Path) -> None:
+    """Then there is nothing left that leads to the next iteration."""
+    project = _planned(tmp_path, "import")
+    made = builders.provenance(stage="compare", inputs=())
+    write_artifact(project.iterations()[0].artifact("comparison"), builders.comparison(), made)
+    assert forward(project) == ""  # type: ignore[arg-type]
 
 
 def test_what_is_left_to_do_is_a_diagnosis(tmp_path: Path) -> None:

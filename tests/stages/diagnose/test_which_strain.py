@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from r2s2r_cli.stages.diagnose.which.fit import Fits, strain
+from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Hypothesis
+from r2s2r_cli.stages.diagnose.which.prior import strain
 from tests.support.linear_arena import LinearArena
 
 

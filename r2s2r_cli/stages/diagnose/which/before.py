@@ -14,9 +14,10 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH
-from r2s2r_cli.stages.diagnose.which.fit import Fits, unlikely
+from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
+from r2s2r_cli.stages.diagnose.which.prior import unlikely
 from r2s2r_cli.stages.diagnose.which.rough import DRAWS, around, root_of
 from r2s2r_cli.stages.diagnose.which.score import Score, groups_of, scores
 

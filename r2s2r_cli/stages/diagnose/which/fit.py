@@ -13,6 +13,7 @@ import numpy as np
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log, weight
+from r2s2r_cli.stages.diagnose.which.prior import unlikely
 from r2s2r_cli.stages.diagnose.which.white import whitened
 
 ITERATIONS = 6
@@ -241,17 +242,3 @@ class Fits:
         for (fit, i, by), residual in zip(where, residuals, strict=True):
             column = (residual - fit.residual) / by
             fit.jacobian[:, len(fit.z) + i] = np.where(np.isfinite(column), column, 0.0)
-
-
-def strain(arena: Arena, fit: Fit) -> float:
-    """What it costs that the nuisances of a fit that all runs share are not where they were known to be [nats]: where
-    no effect that is fitted is the cause, they make up for it."""
-    n = arena.shared
-    away = (fit.z - arena.mean)[:n]
-    return float(0.5 * away @ arena.precision[:n, :n] @ away)
-
-
-def unlikely(arena: Arena, z: np.ndarray) -> np.ndarray:
-    """-log prior density of nuisances z (k, p + q), up to a constant, (k,) [nats]."""
-    away = z - arena.mean
-    return np.asarray(0.5 * np.einsum("ki,ij,kj->k", away, arena.precision, away))

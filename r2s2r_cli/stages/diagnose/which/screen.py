@@ -9,9 +9,10 @@ import numpy as np
 
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.candidates import Candidate
-from r2s2r_cli.stages.diagnose.which.fit import Fits, unlikely
+from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.mixture import minus_log
+from r2s2r_cli.stages.diagnose.which.prior import unlikely
 
 LEAST_RESPONSE = 1.0
 """Whitened length below which a response is nothing: the effect cannot be seen in these gaits."""

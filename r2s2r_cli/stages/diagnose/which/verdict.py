@@ -12,11 +12,11 @@ from r2s2r_cli.stages.diagnose.which.bounded import ENOUGH, ENOUGH_OF_TWO
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.confusable import confusable
 from r2s2r_cli.stages.diagnose.which.doubts import of_first, unheard, unwitnessed, warnings_of
-from r2s2r_cli.stages.diagnose.which.fit import strain
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked, Screened, Shift, Which
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.material import Material
 from r2s2r_cli.stages.diagnose.which.pair_share import TwoCauses, with_pairs
+from r2s2r_cli.stages.diagnose.which.prior import strain
 from r2s2r_cli.stages.diagnose.which.rivals import NoGap
 from r2s2r_cli.stages.diagnose.which.score import Score, gain_sds, gains as gains_of
 from r2s2r_cli.stages.diagnose.which.screen import Response

@@ -89,6 +89,7 @@ class PublishedNext(Frozen):
     name: str
     nats: float
     now: float | None = None
+    narrows: int | None = None
 
 
 class PublishedDiagnosis(Frozen):

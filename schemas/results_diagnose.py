@@ -137,6 +137,9 @@ class NextGaitFound(Frozen):
     """The same of the gaits that were run, were the best of them run again."""
     candidates: tuple[str, ...] = ()
     """Names that it would tell apart, most probable first; `none`: nothing wrong."""
+    narrows: int | None = None
+    """Target intervals by which it narrows the bound that `no_gap` is judged by: no gait tells candidates apart, and
+    this one is suggested for that."""
 
 
 class SegmentFound(Frozen):

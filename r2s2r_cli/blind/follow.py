@@ -21,7 +21,7 @@ FORMAT = "r2s2r blind follow 1"
 BANKS = ("suggested", "random")
 """What the maker writes for every set: the gait that was suggested, and as many targets by chance."""
 TARGETS = 8
-"""Of a longer suggestion the first are run: by these `diagnose` judged it (`next_gait.LONGEST`)."""
+"""Of a longer suggestion the first are run: by these `diagnose` judged it (`imagined.LONGEST`)."""
 COMMITS = ("effect", "pair", "no_gap", "unknown")
 """Verdicts that are not `ambiguous`."""
 ASKED, VERDICTS = "asked.json", "verdicts"

@@ -54,9 +54,10 @@ def _policy(report: DiagnoseReport) -> bytes:
     one = report.next_gait
     assert one is not None  # noqa: S101 - asked by the caller
     names = ", ".join(IN_WORDS.get(name, name) for name in one.candidates)
+    what_for = f"to tell apart what diagnose could not ({names})" if names else "to narrow the bound of no_gap"
     head = {
         "schema_version": 1, "robot": report.robot, "name": "next-gait",
-        "description": f"{one.name}: to tell apart what diagnose could not ({names})",
+        "description": f"{one.name}: {what_for}",
         "steps": [{"target": list(target)} for target in one.targets],
     }  # fmt: skip
     return tomlkit.dumps(head).encode()

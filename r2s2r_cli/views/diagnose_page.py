@@ -165,6 +165,11 @@ def _any(report: DiagnoseReport) -> str:
 def _next(one: NextGaitFound, probability: Mapping[str, float]) -> str:
     """What to run, between how likely candidates, and what it is worth beside the runs so far."""
     how = BELOW if one.file else ""
+    if one.narrows is not None:
+        more = counted(one.narrows, "target interval")
+        return (
+            f"{one.name}: no gait tells candidates apart; {more} of it narrow the bound that `no_gap` is judged by{how}"
+        )
     if one.now is not None and one.nats <= NO_BETTER * one.now:
         return f"nothing separates the candidates better than these runs; the best of the library is {one.name}{how}"
     beside = "" if one.now is None else f", these runs again {one.now:.1f}"

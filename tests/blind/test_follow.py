@@ -20,7 +20,7 @@ SURE = document("effect", ["payload"], {"payload": 0.9, "none": 0.1})
 
 def test_what_is_ambiguous_is_followed(tmp_path: Path) -> None:
     """Neither what is settled nor what broke off; of a long suggestion what `diagnose` judged it by."""
-    from r2s2r_cli.stages.diagnose.next_gait import LONGEST
+    from r2s2r_cli.stages.diagnose.imagined import LONGEST
 
     many = {"a": wants([[1.0, k / 20] for k in range(20)]), "b": SURE, "c": {}, "d": wants(None), "e": wants(TARGETS)}
     whole = follow.trial(*bank_of(tmp_path, many))

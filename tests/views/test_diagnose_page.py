@@ -105,6 +105,16 @@ def test_what_would_be_told_apart_is_named_nothing_wrong_among_it() -> None:
     ] in rows
 
 
+def test_a_gait_that_narrows_a_bound_is_not_said_to_tell_candidates_apart() -> None:
+    """How many target intervals it adds is what it is worth."""
+    one = NextGaitFound(name="ramps", file=None, targets=((1.0,),), nats=0.0, now=None, narrows=7)
+    rows = [row for table in diagnose_tables(report().model_copy(update={"next_gait": one})) for row in table.rows]
+    assert [
+        "run next",
+        "ramps: no gait tells candidates apart; 7 target intervals of it narrow the bound that `no_gap` is judged by",
+    ] in rows
+
+
 def test_more_runs_are_asked_for_where_the_bound_of_no_gap_is_what_is_open() -> None:
     """Nothing wrong is the likeliest, and no gait tells it from effects: any run narrows the bound."""
     nothing = report().ranking[0].model_copy(update={"effect": "none", "size": {}})

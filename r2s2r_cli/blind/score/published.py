@@ -17,7 +17,14 @@ from r2s2r_cli.blind.index import index_of
 from r2s2r_cli.blind.score.lines import text_of
 from r2s2r_cli.blind.score.shard import Judged, Shard
 from r2s2r_cli.errors import InputError, nearest_folder, quoted
-from schemas.blind import BlindPublished, PublishedDiagnosis, PublishedFollow, PublishedRank, PublishedShrinkage
+from schemas.blind import (
+    BlindPublished,
+    PublishedDiagnosis,
+    PublishedFollow,
+    PublishedNext,
+    PublishedRank,
+    PublishedShrinkage,
+)
 
 FORMAT = "r2s2r blind published 1"
 FINDINGS = 3
@@ -128,7 +135,7 @@ def _diagnosis(document: Mapping[str, Any]) -> dict[str, Any]:
     if (shrinkage := document.get("shrinkage")) is not None:
         found["shrinkage"] = _part(shrinkage, PublishedShrinkage)
     if (one := document.get("next_gait")) is not None:
-        found["next_gait"] = {name: one[name] for name in ("name", "nats", "now") if one.get(name) is not None}
+        found["next_gait"] = {name: one[name] for name in PublishedNext.model_fields if one.get(name) is not None}
     found["pairs"] = [{**one, "elpd_gain": _short(one["elpd_gain"])} for one in document.get("pairs") or ()]
     found["confusable"] = [[a, b, _short(nats)] for a, b, nats in document.get("confusable") or ()]
     found["parity"] = list(document.get("parity") or ())[:FINDINGS]

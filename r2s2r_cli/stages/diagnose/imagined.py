@@ -22,6 +22,8 @@ Targets = tuple[tuple[float, ...], ...]
 SETTLE_S = 0.3
 """After the last cable of a target is there."""
 RATE_HZ = 10.0
+LONGEST = 8
+"""Targets of a policy that are simulated: a longer one goes on as it began."""
 
 
 def targets_of(targets: np.ndarray) -> Targets:

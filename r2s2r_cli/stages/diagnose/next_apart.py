@@ -36,7 +36,7 @@ def apart(arena: Arena, whole: Stretch, fits: Sequence[Fit]) -> np.ndarray:
     `whole`, whose frames alone count. fits: most probable first; the refit nominal model, where it is one of them, is
     where derivatives by the nuisances are taken."""
     solver = Fits(arena)
-    p, drawn = len(arena.engine), _drawn(arena)
+    p, drawn = len(arena.engine), drawn_nuisances(arena)
     middle = next((fit for fit in fits if not fit.hypothesis.parts), fits[0])
     by = SECANT * np.array([arena.model.numbers[k].sd for k in arena.engine])
     moved = np.clip(middle.z[:p] + np.where(middle.z[:p] + by > arena.upper[:p], -by, by), arena.lower[:p], None)
@@ -91,7 +91,7 @@ def left(difference: Sequence[np.ndarray], columns: Sequence[np.ndarray], prior:
     return best
 
 
-def _drawn(arena: Arena) -> np.ndarray:
+def drawn_nuisances(arena: Arena) -> np.ndarray:
     """What nuisances of the engine are off by, (draw, p): SECANT of what is known of them before today's runs.
     The same ones for all policies, which are compared."""
     p = len(arena.engine)
@@ -108,11 +108,15 @@ def _sizes(fit: Fit) -> np.ndarray:
 
 
 def _pieces(arena: Arena, whole: Stretch, values: np.ndarray) -> list[Stretch]:
-    """The policy in pieces, each from the state in which the robot with these values is there."""
-    run = whole.window.run
+    """The policy in pieces as long as those that are fitted."""
     frames = len(whole.t)
-    count = max(1, round(float(whole.t[-1] - whole.window.start) / length_of(run)))
-    edges = sorted({0, *(round(frames * k / count) for k in range(1, count)), frames})
+    count = max(1, round(float(whole.t[-1] - whole.window.start) / length_of(whole.window.run)))
+    return pieces_at(arena, whole, values, sorted({0, *(round(frames * k / count) for k in range(1, count)), frames}))
+
+
+def pieces_at(arena: Arena, whole: Stretch, values: np.ndarray, edges: Sequence[int]) -> list[Stretch]:
+    """The policy in pieces between frames `edges`, each from the state in which the robot with these values is
+    there."""
     before = [part(whole, 0, edge) for edge in edges[1:-1]]
     states = arena.replayer.finals(before, values) if before else None
     found = []

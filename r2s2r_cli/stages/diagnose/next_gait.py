@@ -3,7 +3,8 @@
 Candidates are the names that remain, nothing wrong among them, each as probable as the ranking says and each in turn
 taken as the truth (`next_settled.py`); how far a gait tells them apart is counted as the ranking counts
 (`next_apart.py`). Commands are those of an ideal controller, the same for all candidates, as in the replay of a
-recorded run.
+recorded run. Where no gait tells them apart and nothing wrong is the likeliest, one is chosen by what it does for the
+claim that there is no gap (`next_narrow.py`).
 """
 
 from __future__ import annotations
@@ -14,16 +15,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.evidence import Evidence
-from r2s2r_cli.stages.diagnose.imagined import Targets, imagined, targets_of
+from r2s2r_cli.stages.diagnose.imagined import LONGEST, Targets, imagined, targets_of
 from r2s2r_cli.stages.diagnose.next_apart import apart
+from r2s2r_cli.stages.diagnose.next_narrow import narrowest
 from r2s2r_cli.stages.diagnose.next_settled import settled, unsettled, worth
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
 from r2s2r_cli.stages.diagnose.which.found import NONE
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.which import Compared
 
-LONGEST = 8
-"""Targets of a policy that are simulated: a longer one goes on as it began."""
 REMAINING = 3
 """Effects that are told from each other and from nothing wrong: simulations, and so seconds, go with their number."""
 WORTH_IT = 0.02
@@ -45,7 +45,8 @@ class NextGait:
     """name, targets: the policy. separates: the most probable candidate, taken as the truth, with every other one and
     the nats that it is told from that by; `none` is the refit nominal model. nats: what the gait is worth
     (`next_settled.worth`); now: the best of the gaits that were run, were it run again. typical: median over the
-    library, which is what a gait taken at random is worth."""
+    library, which is what a gait taken at random is worth. narrows: target intervals by which it narrows the bound of
+    `no_gap`, where it was chosen for that; then it separates nothing."""
 
     name: str
     targets: Targets
@@ -53,6 +54,7 @@ class NextGait:
     nats: float
     now: float | None
     typical: float
+    narrows: int | None = None
 
 
 def next_gait(
@@ -60,16 +62,25 @@ def next_gait(
     told: Callable[[str, int, int], None],
 ) -> NextGait | None:  # fmt: skip
     """None where there is no gait to choose from, or none is worth a run. calibration: of the ranking."""
-    fits, p = _remaining(compared)
-    if len(fits) < 2 or not library.gaits:
+    if not library.gaits:
         return None
     told("next gait", 0, 1)
+    found = _separating(evidence, compared, library, calibration) or _narrowing(evidence, compared, library)
+    told("next gait", 1, 1)
+    return found
+
+
+def _separating(
+    evidence: Evidence, compared: Compared, library: GaitLibrary, calibration: Calibration
+) -> NextGait | None:
+    fits, p = _remaining(compared)
+    if len(fits) < 2:
+        return None
     own = {f"as run: {run.name}": targets_of(run.caps.intervals.target) for run in evidence.only(evidence.fit)}
     nats = {
         name: apart(compared.arena, imagined(compared.arena, targets[:LONGEST], name=name), fits)
         for name, targets in {**library.gaits, **own}.items()
     }
-    told("next gait", 1, 1)
     names = [_name(fit) for fit in fits]
     sure = {
         name: settled(p, own_nats, calibration.temperature, none=names.index(NONE),
@@ -86,6 +97,15 @@ def next_gait(
         value[best], max((value[name] for name in own if name in value), default=None),
         float(np.median([value[name] for name in library.gaits if name in value])),
     )  # fmt: skip
+
+
+def _narrowing(evidence: Evidence, compared: Compared, library: GaitLibrary) -> NextGait | None:
+    """Where the verdict is open for nothing but the bound. Without healthy runs these do more: the floor is a guess."""
+    which = compared.which
+    if which.verdict != "ambiguous" or which.ranking[0].effect != NONE or not evidence.healthy:
+        return None
+    best = narrowest(compared.arena, compared.base, library.gaits, which.no_gap.floor)
+    return None if best is None else NextGait(best[0], library.gaits[best[0]], (), 0.0, None, 0.0, narrows=best[1])
 
 
 def chosen(before: float, sure: Mapping[str, float]) -> str | None:

@@ -103,9 +103,15 @@ def _next(found: Diagnosis) -> NextGaitFound | None:
     one = found.next_gait
     if one is None:
         return None
-    candidates = (one.separates[0][0], *(other for _, other, _ in one.separates))
+    candidates = (one.separates[0][0], *(other for _, other, _ in one.separates)) if one.separates else ()
     return NextGaitFound(
-        name=one.name, file=None, targets=one.targets, nats=one.nats, now=one.now, candidates=candidates
+        name=one.name,
+        file=None,
+        targets=one.targets,
+        nats=one.nats,
+        now=one.now,
+        candidates=candidates,
+        narrows=one.narrows,
     )
 
 

@@ -9,12 +9,15 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+from r2s2r_cli.stopping import STOP
+
 SOON_S = 0.02
 """After which a swallowed interrupt comes again."""
 
 
 def main() -> None:
-    """Load the app and run it. Ctrl-C counts as an interrupt from the first moment to the last, without a traceback.
+    """Load the app and run it. Ctrl-C and SIGTERM count as an interrupt from the first moment to the last, without
+    a traceback.
 
     Matrices are small here: threads of BLAS cost more than they bring (48 s of processor time instead of 39 s for one
     diagnosis, and ten times as long where other programs want the cores too). The engine has its own.
@@ -23,10 +26,12 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         early: list[int] = []
-        usual = signal.signal(signal.SIGINT, lambda number, _: early.append(number))
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if number == signal.SIGINT or signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, lambda told, _: early.append(told))
         from r2s2r_cli.app import app  # compiled modules do not take an exception out of the blue while they load
 
-        signal.signal(signal.SIGINT, usual or signal.default_int_handler)
+        STOP.listen()
         if early:
             raise KeyboardInterrupt
         app()

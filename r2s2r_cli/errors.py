@@ -28,7 +28,7 @@ EXIT_CODE_MEANING: dict[ExitCode, str] = {
     ExitCode.INPUT: "artifact, project or input missing, unreadable, damaged, or of the wrong kind or version",
     ExitCode.HARDWARE: "hardware or link failure, emergency stop",
     ExitCode.NUMERICAL: "numerical failure: not finite, not converged, not identifiable",
-    ExitCode.INTERRUPTED: "interrupted; nothing is half-written, long work can be resumed",
+    ExitCode.INTERRUPTED: "interrupted (Ctrl-C, SIGTERM); nothing is half-written, long work can be resumed",
 }
 
 

@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from types import FrameType
 from typing import Any
 
+from r2s2r_cli.stopping import STOP
+
 ENDING = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP") if hasattr(signal, name)
 )  # fmt: skip
@@ -49,11 +51,11 @@ class Heard:
         if self.told or self._stands:
             self.late = True
             return
-        self.told = True
+        self.told = STOP.told = True
         raise KeyboardInterrupt(signal.Signals(number).name)
 
     def _press(self, number: int, frame: FrameType | None) -> None:
-        self.told = True
+        self.told = STOP.told = True
         signal.default_int_handler(number, frame)
 
 

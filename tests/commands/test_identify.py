@@ -123,7 +123,8 @@ def test_one_interval_is_too_few(identified: Path) -> None:
     assert "one target interval is not enough" in result.stderr or "the targets never change" in result.stderr
 
 
-def test_ctrl_c_leaves_a_checkpoint_and_resume_ends_the_same(identified: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_leaves_a_checkpoint_and_resume_ends_the_same(identified: Path, number: signal.Signals) -> None:
     """Interrupted it leaves with 130, the artifact as it was; taken up, it leaves the artifact of the whole fit."""
     before = read_header(identified / IDENTIFY).content_sha256
     whole = read_artifact(identified / IDENTIFY, "identification")[1]
@@ -134,7 +135,7 @@ def test_ctrl_c_leaves_a_checkpoint_and_resume_ends_the_same(identified: Path) -
     deadline = time.monotonic() + 120
     while not checkpoint.exists() and child.poll() is None and time.monotonic() < deadline:
         time.sleep(0.02)
-    child.send_signal(signal.SIGINT)
+    child.send_signal(number)
     _, stderr = child.communicate(timeout=120)
     assert child.returncode == 130, stderr
     assert "--resume" in stderr and "Traceback" not in stderr

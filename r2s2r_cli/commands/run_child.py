@@ -12,23 +12,21 @@ from types import FrameType
 from typing import Any
 
 from r2s2r_cli.hardware.signals import ENDING
+from r2s2r_cli.stopping import STOP
 
 STOPPED = (signal.SIGINT, *ENDING)
 """Signals by which somebody stops a command; a child that another one ended has failed."""
-_ALONE = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
-"""Those that `run` may get alone."""
+_KEYS = ("SIGQUIT", "SIGTSTP")
+"""Those that a stage that only computes answers as every program does: it dies, or is frozen and goes on."""
 
 
 def ended(words: Sequence[str], *, robot: bool, **streams: Any) -> tuple[int, bool]:
     """Exit code of one command in a process of its own, so that its memory is given back; and whether somebody stopped
     it. robot: it moves one. streams: of the process, as `Popen` takes them."""
-    with _passing_on(STOPPED if robot else _ALONE) as passing:
+    with _passing_on([number for number in STOPPED if robot or number.name not in _KEYS]) as passing:
         with subprocess.Popen([sys.executable, "-m", "r2s2r_cli", *words], **streams) as child:
             passing.to(child)
-            try:
-                code = child.wait()
-            except KeyboardInterrupt:
-                code = child.wait()  # it had the same signal, and stops what it does in its own way
+            code = child.wait()  # it stops what it does in its own way
         return code, passing.told
 
 
@@ -47,13 +45,14 @@ class _Passing:
 
     def heard(self, *_: int | FrameType | None) -> None:
         """A signal."""
-        self.told = True
+        self.told = STOP.told = True
         if self._child is not None:
             self._tell(self._child)
 
     def _tell(self, child: subprocess.Popen[bytes]) -> None:
-        # Whatever came: one that drives a robot stops on the first signal and ignores a SIGTERM after it, and one that
-        # Ctrl-Z froze before it got there must go on to end.
+        # Whatever came, and whether or not the child had it too (a terminal tells both, `kill` and a supervisor only
+        # us): a command stops on the first signal and ignores a SIGTERM after it. One that Ctrl-Z froze before it got
+        # there must go on to end.
         child.send_signal(signal.SIGTERM)
         if hasattr(signal, "SIGCONT"):
             child.send_signal(signal.SIGCONT)

@@ -105,12 +105,21 @@ def test_whoever_stops_it_stops_the_robot(project: Path, calls: Calls, number: i
         signal.signal(number, before)
 
 
-def test_whoever_kills_it_kills_a_stage_that_computes(project: Path, calls: Calls) -> None:
-    """SIGTERM is passed on; what is ignored stays so: `nohup r2s2r run` outlives its terminal."""
-    Child.signal, Child.codes = signal.SIGTERM, {"import": -signal.SIGTERM}
-    assert invoke("run", "sample.csv", "--until", "estimate").exit_code == 130
-    assert stages(Child.calls) == ["import"] and Child.told[0] == signal.SIGTERM
-    Child.calls.clear(), Child.told.clear()
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_whoever_stops_it_stops_a_stage_that_computes(project: Path, calls: Calls, number: int) -> None:
+    """`kill -INT` reaches `run` alone, where Ctrl-C of a terminal reaches both: it is passed on as any other signal,
+    and no stage follows, whether the stage was ended by it or was done in that very moment."""
+    Child.signal = number
+    for code in (130, -signal.SIGTERM, 0):
+        Child.codes = {"import": code}
+        result = invoke("run", "sample.csv", "--until", "estimate")
+        assert result.exit_code == 130 and "stopped in: r2s2r import" in result.stderr
+        assert stages(Child.calls) == ["import"] and Child.told[0] == signal.SIGTERM
+        Child.calls.clear(), Child.told.clear()
+
+
+def test_what_is_ignored_stays_so(project: Path, calls: Calls) -> None:
+    """`nohup r2s2r run` outlives its terminal."""
     Child.signal, Child.codes = signal.SIGHUP, {}
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:

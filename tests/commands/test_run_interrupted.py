@@ -1,4 +1,5 @@
-"""Ctrl-C in the long stages of `run`, then the same command again: the artifacts are those of a run in one go."""
+"""Ctrl-C in the long stages of `run`, then the same command again: the artifacts are those of a run in one go. And a
+SIGINT that `run` gets alone."""
 
 from __future__ import annotations
 
@@ -81,3 +82,23 @@ def test_an_interrupted_loop_goes_on_to_the_same(project: Path, tmp_path: Path) 
         headers = [read_header(folder / "iterations" / "001" / name) for name in ARTIFACTS]
         hashes.append([one.content_sha256 for one in headers])
     assert hashes[0] == hashes[1]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there is no SIGINT for one process")
+def test_a_kill_of_run_alone_ends_its_stage(project: Path) -> None:
+    """`r2s2r run ... & kill -INT $!` of a script: the shell began both processes with SIGINT ignored, and only the one
+    gets it. The stage ends with it, and none is begun after it."""
+    with subprocess.Popen(
+        [*COMMAND[:4], "sample.csv", "--until", "identify", "--no-draw"], cwd=project, stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
+    ) as child:  # fmt: skip
+        assert child.stderr is not None
+        for line in child.stderr:
+            if "[2/3] r2s2r estimate" in line:
+                time.sleep(0.3)  # until its process is there; without one `run` has nothing to pass on, and ends too
+                child.send_signal(signal.SIGINT)
+                break
+        said = child.stderr.read()
+    assert child.returncode == 130, said
+    assert "interrupted: " in said and "[3/3]" not in said and "Traceback" not in said

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import InputError, UsageError, quoted
+from r2s2r_cli.errors import ArtifactError, InputError, UsageError, quoted
 from r2s2r_cli.options import (
     DrawOption,
     DryRunOption,
@@ -143,25 +143,46 @@ def _guard(project: Project, place: Iteration, sources: list[Path], format_: For
     from r2s2r_cli.commands.freshness import identity
 
     def guard(present: Header | None) -> None:
-        if not place.artifact("recording").exists():
+        path = place.artifact("recording")
+        if not path.exists():
             return
-        received = "a damaged recording"
-        if present is not None:
-            asked = _refs(project, sources, format_)
-            paths, same = {ref.path for ref in asked}, {identity(ref) for ref in asked}
-            before = [ref for ref in present.provenance.inputs if ref.kind in ("file", "folder")]
-            if before and all(ref.path in paths or identity(ref) in same for ref in before):
-                return
-            received = f"made by {present.provenance.stage} from {', '.join(ref.path for ref in before) or 'a robot'}"
+        made = (present or _head(project, path)).provenance
+        asked = _refs(project, sources, format_)
+        paths, same = {ref.path for ref in asked}, {identity(ref) for ref in asked}
+        before = [ref for ref in made.inputs if ref.kind in ("file", "folder")]
+        if before and all(ref.path in paths or identity(ref) in same for ref in before):
+            return
+        received = f"made by {made.stage} from {', '.join(ref.path for ref in before) or 'a robot'}"
         raise UsageError(
             "this iteration has a recording of other runs already, and import loses none",
-            where=project.relative(place.artifact("recording")),
+            where=project.relative(path),
             expected="none, or the same sources and more",
             received=received,
             hint=f"r2s2r import {shlex.join(map(str, sources))} --iteration {project.iterations()[-1].number + 1}",
         )
 
     return guard
+
+
+def _head(project: Project, path: Path) -> Header:
+    """What a damaged recording still says of itself. Raises UsageError where that is nothing: what it held nobody can
+    compare, so that only people can say that it may go."""
+    from r2s2r_cli.commands.typed import typed_again
+    from r2s2r_cli.store.header import read_header
+    from r2s2r_cli.store.verify import find_body
+
+    try:
+        return read_header(path)
+    except ArtifactError as error:
+        name = project.relative(path)
+        whole = error.__cause__ is None and find_body(path) is not None
+        raise UsageError(
+            "the recording of this iteration is damaged, and does not say which runs it held",
+            where=name,
+            expected="none, or one whose head can be read",
+            received=error.received,
+            hint=f"r2s2r recover {quoted(name)}" if whole else typed_again("import", "--force"),
+        ) from error
 
 
 def _compute(

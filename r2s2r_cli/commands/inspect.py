@@ -13,6 +13,7 @@ from r2s2r_cli.errors import GateError, quoted
 from r2s2r_cli.options import JsonOption, QuietOption
 from r2s2r_cli.store.again import command_at
 from r2s2r_cli.store.header import HDF5_SIGNATURE, NotAnArtifact
+from r2s2r_cli.store.imported import look_at
 from schemas.header import Header
 from schemas.results import InspectResult, NodeInfo
 
@@ -75,7 +76,7 @@ def _foreign(path: Path) -> InspectResult:
             where=str(path),
             expected="an artifact of r2s2r",
             received="something else" if path.stat().st_size else "an empty file",
-            hint=command_at(path) or f"file {quoted(path)}",
+            hint=command_at(path) or look_at(path),
         )
     with IsolatedReader() as reader:
         report = reader.tree(path)

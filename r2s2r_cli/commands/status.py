@@ -94,7 +94,9 @@ def survey(project: Project, *, thorough: bool = False) -> StatusResult:
     found = {path: _state(project, iterations.get(path.parent), path, stale, thorough)
              for path in sorted(listed, key=lambda path: LATER.get(path.name, 0))}  # fmt: skip
     states = [found[path][0] for path in listed]
-    for state, mend in (found[path] for path in listed):
+    # A stage that reads what is damaged fails: what brings that back comes first, in the order in which it is read.
+    damaged = [path for path, (state, _) in found.items() if state.state == "damaged"]
+    for state, mend in (found[path] for path in [*damaged, *(path for path in listed if path not in damaged)]):
         going_on = kept.get((state.stage, state.iteration))
         if mend.command:  # made anew, what is kept would be lost
             again.append(mend.command if going_on is None else going_on.command)
@@ -176,7 +178,7 @@ def _mends(error: ArtifactError, path: Path, name: str) -> str:
 
     if isinstance(error.__cause__, OSError):  # what may not be read, `recover` may not read either
         return error.hint
-    if isinstance(error, CutOff) and command_at(path):
+    if isinstance(error, CutOff) and not error.hint.startswith("r2s2r recover "):
         return error.hint
     nothing = isinstance(error, NotAnArtifact) and find_body(path) is None
     return (command_at(path) if nothing else "") or f"r2s2r recover {shlex.quote(name)}"

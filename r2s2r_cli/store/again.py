@@ -54,11 +54,16 @@ BARE = {"estimate": "estimate", "identification": "identify", "plan": "plan", "c
 
 def command_at(path: Path) -> str:
     """The command that makes what belongs at `path` of a project, whatever lies there now; empty where no stage makes
-    it without being told more (a recording, a calibration), and outside a project. To be pasted where this runs."""
+    it without being told more (a calibration, a recording whose logs nobody can guess), and outside a project. To be
+    pasted where this runs."""
     path, root = path.absolute(), root_of(path)
     kind = next((spec for spec in KINDS.values() if path.name in spec.filenames and spec.kind in BARE), None)
-    if root is None or kind is None:
+    if root is None:
         return ""
+    if kind is None:
+        from r2s2r_cli.store.imported import import_again
+
+        return import_again(path)
     words = ["r2s2r", BARE[kind.kind]]
     if kind.level == "iteration":
         number = iteration_number(path.parent)

@@ -169,11 +169,15 @@ def mends(path: Path, or_else: str = "recover") -> str:
 
 def mends_cut_off(path: Path, header: Header) -> str:
     """The command for a file that lost its end, and with it numbers: what makes it again, of the options that its head
-    still has where they mean the same here; of a measurement, and outside a project, what rescues the rest."""
+    still has where they mean the same here; of logs that are there what imports them once more; of a measurement, and
+    outside a project, what rescues the rest."""
     from r2s2r_cli.store.again import command_again, command_at
+    from r2s2r_cli.store.imported import import_again
     from r2s2r_cli.store.project import root_of
     from schemas.versions import STAGE_VERSIONS
 
+    if header.kind == "recording":
+        return import_again(path, header.provenance) or f"r2s2r recover {quoted(path)}"
     anew = command_at(path)
     if anew and root_of(path.absolute()) == Path.cwd() and header.provenance.stage in STAGE_VERSIONS:
         return command_again(header.provenance, path)

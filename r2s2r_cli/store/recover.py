@@ -15,6 +15,7 @@ from r2s2r_cli.errors import ArtifactError, quoted
 from r2s2r_cli.store.again import MEASURED, command_again, command_at
 from r2s2r_cli.store.atomic import keep_beside, replacing
 from r2s2r_cli.store.header import NotAnArtifact, block, body_sha256, read_header, sealed_header, unreadable
+from r2s2r_cli.store.imported import look_at
 from r2s2r_cli.store.isolated import IsolatedReader
 from r2s2r_cli.store.project import JOURNAL_SUFFIX, artifact_of
 from r2s2r_cli.store.read import check_kind_and_version, checked_header, load
@@ -106,7 +107,7 @@ def _without_head(path: Path, reader: IsolatedReader) -> Recovered:
     if offset is None:
         raise ArtifactError("there is no artifact in this file", where=str(path), expected="an artifact of r2s2r",
                             received="neither its head nor an HDF5 body",
-                            hint=command_at(path) or f"file {quoted(path)}")  # fmt: skip
+                            hint=command_at(path) or look_at(path))  # fmt: skip
     header = _rebuilt(path, offset, reader)
     if header is None:
         raise _lost(path, None, rescue(path, None, reader))

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from r2s2r_cli.store.again import command_at
+from r2s2r_cli.store.imported import GUESSED
 from tests.commands.conftest import document, invoke
 
 ESTIMATE = "iterations/001/20-estimate.h5"
@@ -33,15 +34,20 @@ def test_the_hint_makes_it_again(estimated: Path, content: bytes, command: str) 
 
 @pytest.mark.parametrize("command", ["status", f"inspect {ESTIMATE}", f"validate {ESTIMATE}", "identify"])
 def test_what_was_cut_off_is_made_again(estimated: Path, command: str) -> None:
-    """Its numbers are gone: at once by its stage, not first by `recover`, which is for a recording."""
-    for name, mended in ((ESTIMATE, "r2s2r estimate --iteration 1"), (RECORDING, f"r2s2r recover {RECORDING}")):
+    """Its numbers are gone: at once by its stage, not first by `recover`, which is for a recording of a robot, or of
+    logs that are not there any more."""
+    again = "r2s2r import sample.csv --iteration 1 --force"
+    for name, mended in ((ESTIMATE, "r2s2r estimate --iteration 1"), (RECORDING, again)):
         whole = (estimated / name).read_bytes()
         (estimated / name).write_bytes(whole[:-2000])
         typed = command.replace(ESTIMATE, name)
         last = invoke(*typed.split()).stderr.splitlines()[-1]
         assert last.replace(f"{estimated}/", "") == f"hint: {mended}"
-        if name == ESTIMATE:
-            assert invoke(*shlex.split(last)[2:], "--no-draw").exit_code == 0
+        assert invoke(*shlex.split(last)[2:], "--no-draw").exit_code == 0
+    (estimated / RECORDING).write_bytes((estimated / RECORDING).read_bytes()[:-2000])
+    (estimated / "sample.csv").unlink()
+    last = invoke(*command.replace(ESTIMATE, RECORDING).split()).stderr.splitlines()[-1]
+    assert last.replace(f"{estimated}/", "") == f"hint: r2s2r recover {RECORDING}"
 
 
 def test_what_was_cut_off_is_made_as_it_was(estimated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,15 +78,57 @@ def test_what_may_not_be_read_is_shown(estimated: Path, monkeypatch: pytest.Monk
 
 
 def test_what_may_be_brought_back_is_recovered(estimated: Path) -> None:
-    """A damaged head before whole data, and a recording, which nothing makes again."""
+    """A damaged head before whole data."""
     with (estimated / ESTIMATE).open("r+b") as file:
         file.write(b"xxxx")
     assert document("status")["next"] == f"r2s2r recover {ESTIMATE}"
     assert invoke("identify").stderr.splitlines()[-1] == f"hint: r2s2r recover {estimated / ESTIMATE}"
     assert invoke("recover", ESTIMATE).exit_code == 0
-    recording = "iterations/001/10-record.h5"
-    (estimated / recording).write_bytes(b"")
-    assert document("status")["next"] == f"r2s2r recover {recording}"
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["status", "estimate", "recover", f"recover {RECORDING}", f"inspect {RECORDING}", f"validate {RECORDING}"],
+)
+def test_an_empty_recording_is_imported_again(estimated: Path, command: str) -> None:
+    """Its logs are guessed by the names of its runs, and the hint says that; pasted, it brings the recording back. It
+    comes before a stage that reads it and stands first in the list."""
+    (estimated / "floor.h5").write_bytes(b"")
+    (estimated / RECORDING).write_bytes(b"")
+    last = invoke(*command.split()).stderr.splitlines()
+    hints = [line for line in last if line.startswith("hint: r2s2r import")]
+    assert hints[-1:] == [f"hint: r2s2r import sample.csv --iteration 1 --force   # {GUESSED}"]
+    assert command == "recover" or hints[-1] == last[-1]
+    assert invoke(*shlex.split(hints[0], comments=True)[2:], "--no-draw").exit_code == 0
+    assert invoke("validate", RECORDING).exit_code == 0
+
+
+def test_what_nobody_can_guess_is_no_command(estimated: Path) -> None:
+    """No log of that name: what to do with one is said behind the command that looks. Of a robot's recording it would
+    be the wrong one."""
+    (estimated / "sample.csv").unlink()
+    (estimated / RECORDING).write_bytes(b"")
+    assert document("status")["next"] == f"r2s2r recover {RECORDING}"
+    last = invoke("recover", RECORDING).stderr.splitlines()[-1]
+    assert last == f"hint: file {RECORDING}   # if it was imported: r2s2r import LOG --force"
+
+
+@pytest.mark.parametrize("damage", ["cut off", "changed", "empty"])
+def test_import_tells_damage_from_other_runs(estimated: Path, monkeypatch: pytest.MonkeyPatch, damage: str) -> None:
+    """Where the head names the logs the same ones replace it; where nothing says what it held, that is said, and
+    --force is asked for."""
+    whole = (estimated / RECORDING).read_bytes()
+    middle = len(whole) // 2
+    changed = whole[:middle] + bytes(8 * [whole[middle] ^ 255]) + whole[middle + 8 :]
+    (estimated / RECORDING).write_bytes({"cut off": whole[:-2000], "changed": changed, "empty": b""}[damage])
+    monkeypatch.setattr("sys.argv", ["r2s2r", "import", "sample.csv", "--no-draw"])
+    result = invoke("import", "sample.csv", "--no-draw")
+    if damage != "empty":
+        assert result.exit_code == 0, result.stderr
+        return
+    assert result.exit_code == 2 and "is damaged" in result.stderr and "other runs" not in result.stderr
+    assert result.stderr.splitlines()[-1] == "hint: r2s2r import sample.csv --no-draw --force"
+    assert invoke("import", "sample.csv", "--no-draw", "--force").exit_code == 0
 
 
 def test_the_command_of_a_place(estimated: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -53,6 +53,8 @@ def status(
     ]
     if rows:
         console.table("", ["iteration", "stage", "artifact", "state", "size", "why"], rows)
+        if not check:
+            console.say("heads and sizes were read, contents were not; to compare every byte: r2s2r status --check")
     gap = _gap(here)
     if gap is not None:
         from r2s2r_cli.views.compare_history import history_table

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from r2s2r_cli.errors import Interrupted, NumericalError, R2S2RError
-from r2s2r_cli.store.checkpoint import failed_of
+from r2s2r_cli.store.checkpoint import begin_anew, command_of, failed_of
 
 Item = TypeVar("Item")
 
@@ -59,7 +59,8 @@ def loaded(stage: str) -> Any:
 @contextlib.contextmanager
 def resumable(checkpoint: Kept, where: str, command: Sequence[str], *, done: str = "fitted") -> Iterator[None]:
     """Work that leaves a checkpoint (`where`, for people) when it is interrupted: raises Interrupted with `command` and
-    --resume as its hint; KeyboardInterrupt as it came where nothing was kept yet.
+    --resume as its hint; KeyboardInterrupt as it came where nothing was kept yet. What another request left stays until
+    this one has something to keep in its place: where it never had, that is said, since `status` still offers it.
 
     After a failure that comes again whatever is resumed nothing is left to go on from: of numbers that went wrong
     nothing, of a bug a file under another name, which a mended r2s2r may go on with. What the disk or the memory
@@ -72,7 +73,13 @@ def resumable(checkpoint: Kept, where: str, command: Sequence[str], *, done: str
         raise
     except KeyboardInterrupt:
         if not checkpoint.kept():
-            raise
+            left = command_of(checkpoint.path)
+            if left is None:
+                raise
+            raise Interrupted(
+                f"nothing was {done} yet; {where} is still what another request left: {begin_anew(left)}",
+                hint=begin_anew(command),
+            ) from None
         raise Interrupted(
             f"what was {done} so far is kept in {where}, nothing else was written",
             hint=shlex.join(["r2s2r", *command, "--resume"]),

@@ -79,8 +79,8 @@ class OtherRequest(UsageError):
 
 
 def of_another(checkpoint: Path, command: Sequence[str]) -> UsageError:
-    """For a checkpoint of either kind whose key is not that of this request: with the command that it belongs to, or,
-    where that is this one, because inputs or settings changed since, with the command that begins anew."""
+    """For a checkpoint of either kind whose key is not that of this request: with the command that it belongs to, and
+    behind it the one that begins anew; that alone where both are the same, because inputs or settings changed since."""
     what, where = "the checkpoint belongs to another request", str(checkpoint)
     typed = command_of(checkpoint)
     if typed is None or typed[:1] != tuple(command[:1]) or _request(typed) == _request(command):
@@ -91,10 +91,9 @@ def of_another(checkpoint: Path, command: Sequence[str]) -> UsageError:
     place = [] if number is None else ["--iteration", str(number)]
     project = [word for option in _options(command) if option[0] == "--project" for word in option]
     words = [word for option in _options(typed) if option[0] not in _MANNER for word in option]
-    return OtherRequest(
-        what, where=where, expected=begin_anew(typed), received=begin_anew(command),
-        hint=shlex.join(["r2s2r", *words, *place, *project, "--resume"]),
-    )  # fmt: skip
+    go_on, anew = shlex.join(["r2s2r", *words, *place, *project, "--resume"]), begin_anew(command)
+    return OtherRequest(what, where=where, expected=begin_anew(typed), received=anew,
+                        hint=f"{go_on}   # or, dropping it: {anew}")  # fmt: skip
 
 
 _MANNER = ("--resume", "--json", "--quiet", "--force", "--dry-run", "--iteration", "--project")

@@ -284,8 +284,9 @@ def test_a_run_without_motion_is_looked_at_where_it_lies(estimated: Path, monkey
 
 
 def test_an_interrupt_is_one_statement(estimated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With a checkpoint of this request: what is kept, and the command that goes on; without one: run it again."""
-    saves = [True, False]
+    """With a checkpoint of this request: what is kept, and the command that goes on; with that of another, which stays:
+    whose it is; without one: run it again."""
+    saves, kept = [True, False, False], "iterations/001/30-identify.partial"
 
     def stopped(asked: Asked, settings: Any, checkpoint: Any, console: Any) -> None:
         if saves.pop(0):
@@ -293,13 +294,21 @@ def test_an_interrupt_is_one_statement(estimated: Path, monkeypatch: pytest.Monk
         raise KeyboardInterrupt
 
     monkeypatch.setattr("r2s2r_cli.commands.identify_run.compute", stopped)
-    result = invoke("identify", "--train", "sample:1-2", "--seed", "4", "--no-draw")
+    first = "r2s2r identify --train sample:1-2 --seed 4 --no-draw"
+    result = invoke(*first.split()[1:])
     assert result.exit_code == 130
     assert result.stderr.splitlines() == [
-        "interrupted: what was fitted so far is kept in iterations/001/30-identify.partial, nothing else was written",
-        "hint: r2s2r identify --train sample:1-2 --seed 4 --no-draw --resume",
+        f"interrupted: what was fitted so far is kept in {kept}, nothing else was written",
+        f"hint: {first} --resume",
     ]
     result = invoke("identify", "--train", "sample:1-3")  # another request: that checkpoint is not its own
+    assert result.stderr.splitlines() == [
+        f"interrupted: nothing was fitted yet; {kept} is still what another request left: {first}",
+        "hint: r2s2r identify --train sample:1-3",
+    ]
+    assert result.exit_code == 130
+    (estimated / kept).unlink()
+    result = invoke("identify", "--train", "sample:1-3")
     assert result.stderr == "interrupted: nothing is half-written; run the command again\n"
     assert result.exit_code == 130
 

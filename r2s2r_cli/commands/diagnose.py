@@ -89,6 +89,7 @@ def diagnose(
     from r2s2r_cli.commands.wanted import wanted
     from r2s2r_cli.store.checkpoint import checkpoint_key, checkpoint_of
     from r2s2r_cli.store.checkpoint_arrays import ArrayCheckpoint
+    from r2s2r_cli.store.lock import writer
     from schemas.results_diagnose import DiagnoseReport
 
     console = Console(json=json, quiet=quiet)
@@ -120,6 +121,8 @@ def diagnose(
         )  # fmt: skip
         if dry_run:
             asked.evidence(console.say)
+        elif writer(here.root) is not None:  # to wait for the other one mends no misspelt request
+            asked.evidence(lambda _: None)
         digests = [ref.sha256 for ref in run.inputs]
         key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
         again = [word for word in typed_words("diagnose") if word != "--resume"]

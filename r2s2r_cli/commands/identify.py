@@ -183,6 +183,7 @@ def _fit(asked: Asked, overrides: dict[str, Any], console: Console, how: _Ways) 
     from r2s2r_cli.commands.outcome import show_outcome
     from r2s2r_cli.commands.stage import StageRun
     from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_key, checkpoint_of
+    from r2s2r_cli.store.lock import writer
     from schemas.results_identify import IdentifyReport
 
     here, place = asked.project, asked.iteration
@@ -196,7 +197,7 @@ def _fit(asked: Asked, overrides: dict[str, Any], console: Console, how: _Ways) 
         report_model=IdentifyReport, overrides=overrides, flags=asked.flags(), dry_run=how.dry_run,
         force=how.force or (resume and unfinished.exists()),
     )  # fmt: skip
-    if how.dry_run:
+    if how.dry_run or writer(here.root) is not None:  # to wait for the other one mends no misspelt request
         asked.check(settings)
     digests = [ref.sha256 for ref in run.inputs]
     key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)

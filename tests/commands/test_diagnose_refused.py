@@ -14,6 +14,7 @@ from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.commands.diagnose_inputs import Asked
 from r2s2r_cli.commands.named_runs import nearest_run, require_robot
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.store.lock import writing
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.read import read_artifact
 from r2s2r_cli.store.write import write_artifact
@@ -116,6 +117,16 @@ def test_a_wrong_request_has_a_command_as_its_hint(estimated: Path, typed: str, 
     assert refused.exit_code in (2, 4) and error["where"] == where
     assert error["hint"].startswith(hint)
     assert not artifacts(estimated)
+
+
+def test_a_wrong_request_is_said_while_another_writes(estimated: Path) -> None:
+    """To wait for the other one would not mend it; a right one waits."""
+    asked(estimated)
+    with writing(estimated, "identify"):
+        refused = invoke("diagnose", "--healthy", "smaple")
+        assert refused.exit_code == 2, refused.stderr
+        assert refused.stderr.splitlines()[-1] == "hint: r2s2r diagnose --healthy sample"
+        assert "another r2s2r is writing" in invoke("diagnose").stderr
 
 
 def second(root: Path, *names: str) -> Path:

@@ -17,6 +17,7 @@ from r2s2r_cli.commands.identify_inputs import Asked, parse_fixed
 from r2s2r_cli.commands.identify_run import Clock
 from r2s2r_cli.errors import R2S2RError, UsageError
 from r2s2r_cli.store.again import command_again
+from r2s2r_cli.store.lock import writing
 from r2s2r_cli.store.project import Project
 from schemas.config import IdentifySettings
 from schemas.results import StageResult
@@ -311,6 +312,15 @@ def test_an_interrupt_is_one_statement(estimated: Path, monkeypatch: pytest.Monk
     result = invoke("identify", "--train", "sample:1-3")
     assert result.stderr == "interrupted: nothing is half-written; run the command again\n"
     assert result.exit_code == 130
+
+
+def test_a_wrong_request_is_said_while_another_writes(estimated: Path) -> None:
+    """To wait for the other one would not mend it; a right one waits."""
+    with writing(estimated, "identify"):
+        result = invoke("identify", "--train", "sampel:1-2")
+        assert result.exit_code == 2 and "another r2s2r" not in result.stderr
+        assert result.stderr.splitlines()[-1] == "hint: r2s2r identify --train sample:1-2"
+        assert "another r2s2r is writing" in invoke("identify", "--train", "sample:1-2").stderr
 
 
 def test_fixed_values_are_numbers() -> None:

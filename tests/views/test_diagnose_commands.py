@@ -8,7 +8,7 @@ from r2s2r_cli.commands.diagnose_outcome import show
 from r2s2r_cli.console import Console
 from r2s2r_cli.stages.record.plan import plans
 from r2s2r_cli.stages.record.policies import random_targets
-from r2s2r_cli.views.diagnose_commands import REPEATS, ROBOT, diagnose_commands, use
+from r2s2r_cli.views.diagnose_commands import AFTER_REPAIR, REPEATS, ROBOT, diagnose_commands, use
 from r2s2r_cli.views.diagnose_page import diagnose_page, diagnose_tables
 from schemas.config import LinkSettings
 from schemas.results_diagnose import DiagnoseReport, NextGaitFound
@@ -68,13 +68,29 @@ def test_where_no_gait_helps_healthy_runs_would() -> None:
 
     assert advice(undecided).endswith("of the robot as it was when nothing was wrong (command: below)")
     assert diagnose_commands(undecided) == [
-        ("next", f"r2s2r record --random 15 --repeats 2 --iteration 2 {ROBOT}"),
+        ("next", f"r2s2r record --random 15 --repeats 2 --iteration 2 {ROBOT}{AFTER_REPAIR}"),
         ("next", "r2s2r estimate --iteration 2"),
-        ("next", "r2s2r diagnose --iteration 1 --also 2 --healthy 002-random-0-1 --healthy 002-random-0-2"),
+        (
+            "next",
+            "r2s2r diagnose --iteration 1 --also 2 --healthy 002-random-0-1 --healthy 002-random-0-2" + AFTER_REPAIR,
+        ),
     ]
     plain = "no gait of the library is likely to decide more"
     assert advice(undecided.model_copy(update={"missing": ()})) == plain == advice(report().model_copy(update=lacking))
     assert diagnose_commands(undecided.model_copy(update={"missing": ()})) == []
+
+
+def test_lines_that_take_runs_as_healthy_say_when(capsys: pytest.CaptureFixture[str]) -> None:
+    """In the terminal and on the page, as a comment of the shell that stays when the line is pasted."""
+    lacking = {"missing": ("healthy runs: none",), "iteration": 1, "free_iteration": 2}
+    undecided = report().model_copy(update={"verdict": "ambiguous", "effects": (), **lacking})
+    show(undecided, Console())
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("next: ")]
+    page = diagnose_page(undecided, []).decode()
+    said = [line.removeprefix("next: ") for line in lines if " record " in line or "--healthy" in line]
+    assert len(said) == 2
+    for line in said:
+        assert "   # after you have put the robot right" in line and f"<code>{line}</code>" in page
 
 
 def test_a_robot_that_the_project_names_is_not_named_again(capsys: pytest.CaptureFixture[str]) -> None:
@@ -106,7 +122,8 @@ def test_healthy_runs_have_the_names_that_record_gives_them() -> None:
     asked = {"missing": ("healthy runs: none",), "iteration": 1, "free_iteration": 12}
     undecided = report().model_copy(update={"verdict": "ambiguous", "effects": (), **asked})
     *_, (_, command) = diagnose_commands(undecided)
-    assert command.endswith(" ".join(f"--healthy 012-{one.name}" for one in made))
+    names = " ".join(f"--healthy 012-{one.name}" for one in made)
+    assert command.removesuffix(AFTER_REPAIR).endswith(names)
 
 
 def test_what_was_asked_for_is_told_on_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from r2s2r_cli.artifact import ArtifactData
     from r2s2r_cli.stages.calibrate import Source
-    from schemas.results_calibrate import CalibrationReport
+    from schemas.results_calibrate import CalibrationReport, SensorSet
     from schemas.robot import Robot
 
 PARTS: dict[str, tuple[str, ...]] = {
@@ -219,7 +219,7 @@ def _show(report: CalibrationReport, console: Console, *, applied: bool) -> None
         console.warn(text)
     if report.changes.empty:
         if report.sets and report.used is None:
-            console.hint(_with_set([one.name for one in report.sets]))
+            console.hint(_with_set(report.sets))
         return
     if applied:
         what = [f"{len(report.changes.sensors)} sensor lines" if report.changes.sensors else "",
@@ -228,9 +228,11 @@ def _show(report: CalibrationReport, console: Console, *, applied: bool) -> None
         console.say(f"robot.toml has new numbers: {', '.join(filter(None, what))}")
 
 
-def _with_set(names: Sequence[str]) -> str:
-    """The command as typed, with a set of the points that goes into robot.toml."""
+def _with_set(sets: Sequence[SensorSet]) -> str:
+    """The command as typed, with the place of a set of the points that goes into robot.toml, and what to choose from:
+    one of them on the line would be taken for the recommended one."""
     from r2s2r_cli.commands.typed import typed_words
+    from r2s2r_cli.stages.calibrate.report import choices
 
-    others = f"   # or --use {' | '.join(names[1:])}" if names[1:] else ""
-    return shlex.join(["r2s2r", *typed_words("calibrate"), "--use", names[0]]) + others
+    known = choices((one.name, one.rms_m) for one in sets)
+    return f"{shlex.join(['r2s2r', *typed_words('calibrate')])} --use SET   # SET: {known}"

@@ -43,7 +43,8 @@ def sensor_zero() -> dict[str, float]:
 
 
 def test_of_several_sets_none_is_chosen(points: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without --use robot.toml stays as it is, byte for byte; the hint names the sets and, pasted, uses one."""
+    """Without --use robot.toml stays as it is, byte for byte; the hint names the sets with how well each fits, and
+    chooses none: pasted as it is, it is refused with the same choice."""
     before = Path("robot.toml").read_bytes()
     typed = ["calibrate", "--points", "points.csv", "--no-draw"]
     monkeypatch.setattr("sys.argv", ["r2s2r", *typed])
@@ -51,9 +52,11 @@ def test_of_several_sets_none_is_chosen(points: Path, monkeypatch: pytest.Monkey
     assert result.exit_code == 0
     assert Path("robot.toml").read_bytes() == before
     mended = shlex.split(result.stderr.splitlines()[-1], comments=True)[2:]
-    assert mended == [*typed, "--use", "monday"] and "   # or --use friday" in result.stderr
-    assert invoke(*mended).exit_code == 0
-    assert sensor_zero()["offset_f"] == pytest.approx(OFFSET_PF * 1e-12, rel=1e-3)
+    known = "monday (0.0 mm rms) | friday (0.0 mm rms)"
+    assert mended == [*typed, "--use", "SET"] and f"   # SET: {known}" in result.stderr
+    refused = invoke(*mended)
+    assert refused.exit_code == 2 and f"expected: {known}" in refused.stderr
+    assert Path("robot.toml").read_bytes() == before
 
 
 def test_the_chosen_set_goes_into_robot_toml(points: Path) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.errors import UsageError
+from r2s2r_cli.nearest import nearest
 from r2s2r_cli.stages.calibrate import data, report
 from r2s2r_cli.stages.calibrate.apply import apply_changes, with_parts, with_sensor_line, with_tendon
 from r2s2r_cli.stages.calibrate.drift import changes, spread, working_range
@@ -18,7 +19,7 @@ from r2s2r_cli.stages.calibrate.history import read_history
 from r2s2r_cli.stages.calibrate.lines import GOOD
 from r2s2r_cli.stages.calibrate.masses import mass_properties, read_masses
 from r2s2r_cli.stages.calibrate.sensors import Points, SetFit, fit_sets, read_points
-from r2s2r_cli.stages.calibrate.source import Source, near, nearest
+from r2s2r_cli.stages.calibrate.source import Source, near
 from r2s2r_cli.stages.calibrate.tendon_checks import tendon_warnings
 from r2s2r_cli.stages.calibrate.tendons import average, fit_curve, read_curves
 from schemas.config import CalibrateSettings
@@ -78,7 +79,7 @@ def calibrate(
     used, sensor_changes = None, {}
     if points is not None and table is not None:
         sets = fit_sets(table)
-        used = _choose(points, table, use, warnings)
+        used = _choose(points, sets, use, warnings)
         sensor_changes = _sensor_changes(sets, used)
         groups |= data.sensor_groups(table, sets, used)
         warnings += _sensor_warnings(sets)
@@ -101,21 +102,23 @@ def calibrate(
     return ArtifactData("calibration", groups), result
 
 
-def _choose(source: Source, table: Points, use: str | None, warnings: list[str]) -> str | None:
-    if use is not None and use not in table.sets:
+def _choose(source: Source, sets: Sequence[SetFit], use: str | None, warnings: list[str]) -> str | None:
+    known = [fitted.name for fitted in sets]
+    if use is not None and use not in known:
+        meant = nearest(use, known)
+        chosen = shlex.quote(meant) if meant else report.CHOOSE
         raise UsageError(
-            f"the points table has no set {use!r}" + near(use, table.sets), where="--use", received=use,
-            expected=", ".join(table.sets),
-            hint=f"r2s2r calibrate --points {shlex.quote(source.name)} "
-            f"--use {shlex.quote(nearest(use, table.sets) or table.sets[-1])}",
+            f"the points table has no set {use!r}" + near(use, known), where="--use", received=use,
+            expected=report.choices((fitted.name, report.finite(fitted.rms)) for fitted in sets),
+            hint=f"r2s2r calibrate --points {shlex.quote(source.name)} --use {chosen}",
         )  # fmt: skip
-    if use is None and len(table.sets) > 1:
+    if use is None and len(known) > 1:
         warnings.append(
-            f"the points table has {len(table.sets)} sets and none was chosen with --use, so the sensors in robot.toml "
+            f"the points table has {len(known)} sets and none was chosen with --use, so the sensors in robot.toml "
             "stay as they are"
         )
         return None
-    return use if use is not None else table.sets[0]
+    return use if use is not None else known[0]
 
 
 def _sensor_changes(sets: Sequence[SetFit], used: str | None) -> dict[int, SensorChange]:

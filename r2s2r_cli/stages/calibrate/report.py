@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import shlex
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -27,11 +28,19 @@ from schemas.results_calibrate import (
 )
 
 DAY_S = 86400.0
+CHOOSE = "SET   # one of those that are listed: which one fits the robot of today, nobody else knows"
+"""Behind `--use`, where no set is near to what was typed: a set is never guessed."""
 
 
 def finite(value: float) -> float | None:
     """The number, or None where there is none: JSON has no NaN."""
     return float(value) if math.isfinite(value) else None
+
+
+def choices(sets: Iterable[tuple[str, float | None]]) -> str:
+    """Names of sets with their residual rms in length [m] (None: all of its sensors are dead), to choose from."""
+    told = ((name, "all dead" if rms_m is None else f"{1e3 * rms_m:.1f} mm rms") for name, rms_m in sets)
+    return " | ".join(f"{shlex.quote(name)} ({words})" for name, words in told)
 
 
 def sensor_sets(points: Points, sets: Sequence[SetFit]) -> tuple[SensorSet, ...]:

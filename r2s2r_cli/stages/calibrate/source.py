@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import io
 import math
 import re
@@ -14,6 +13,7 @@ from pathlib import PurePath
 from typing import Literal
 
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.nearest import nearest
 
 _OTHER_DELIMITERS = {";": ("semicolons", ";"), "\t": ("tabs", "\\t"), "|": ("bars", "|")}
 """What else separates columns: in words, and as `sed` writes it."""
@@ -108,11 +108,6 @@ def near(word: str, known: Sequence[str]) -> str:
     """`, did you mean ...` for a misspelt word, or nothing."""
     match = nearest(word, known)
     return f", did you mean {match}?" if match else ""
-
-
-def nearest(word: str, known: Sequence[str]) -> str:
-    """The known word that a misspelt one was probably meant to be; empty where none is near."""
-    return next(iter(difflib.get_close_matches(word, known, n=1, cutoff=0.6)), "")
 
 
 def _rows(source: Source, example: str) -> list[tuple[int, list[str]]]:

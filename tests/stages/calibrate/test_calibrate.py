@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -107,6 +108,10 @@ def test_a_wrong_choice_is_a_usage_error(robot: Robot, points_text: Make) -> Non
     with pytest.raises(UsageError, match="did you mean may_3") as caught:
         calibrate(robot=robot, points=source(points_text(sets=("may_3", "june_5"))), use="may3")
     assert caught.value.hint == "r2s2r calibrate --points points.csv --use may_3"
+    with pytest.raises(UsageError, match=r"no set 'monday'\n") as caught:
+        calibrate(robot=robot, points=source(points_text(sets=("may_3", "june_5"))), use="monday")
+    assert caught.value.hint.startswith("r2s2r calibrate --points points.csv --use SET   # ")
+    assert re.fullmatch(r"may_3 \(\d\.\d mm rms\) \| june_5 \(\d\.\d mm rms\)", caught.value.expected)
     with pytest.raises(UsageError, match="--use"):
         calibrate(robot=robot, history=source(HISTORY, "history.json"), use="a")
     with pytest.raises(UsageError, match="nothing to calibrate"):

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from r2s2r_cli.errors import UsageError
+from r2s2r_cli.nearest import nearest
 
 ProjectOption = Annotated[
     Path | None,
@@ -84,14 +85,12 @@ def _meant(stage: str, key: str, text: str | None) -> str:
     """The hint for an override that is none of `stage`: the setting that was probably meant, with the text that was
     given, or without one with the value that holds; where none is near, what lists them. An option alone is completed
     by the command."""
-    import difflib
-
     from r2s2r_cli.store.toml_hints import override, override_text
     from schemas.config import RunConfig
 
     settings = RunConfig().model_dump(mode="json", by_alias=True).get(stage, {})
-    near = difflib.get_close_matches(key.rpartition(".")[2], settings, n=1)
+    near = nearest(key.rpartition(".")[2], settings)
     if not near:
         return f"r2s2r {stage} --show-config"
-    meant = f"{stage}.{near[0]}"
-    return override(meant, settings[near[0]]) if text is None else override_text(meant, text)
+    meant = f"{stage}.{near}"
+    return override(meant, settings[near]) if text is None else override_text(meant, text)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import re
 from collections.abc import Iterator
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.nearest import nearest, nearest_choice
 from r2s2r_cli.options import parse_override
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.toml import check_model, read_toml
@@ -100,8 +100,8 @@ def _no_such(robot: dict[str, Any], key: str, value: Any, at: int, expected: str
     the number that was typed; where there is neither, with its own. Its place in the command is found by `where`."""
     parts = key.split(".")
     known = {name: number for name, number in _numbers(robot) if name != "schema_version"}
-    near = difflib.get_close_matches(key, known, n=1)
-    meant = near[0] if near else "contact.friction"
+    near = nearest(key, known)
+    meant = near or "contact.friction"
     return UsageError(
         f"robot.toml has no {key}", where=f"--set {key}", received=parts[at],
         expected=f"{'.'.join(parts[:at])}: {expected}" if at else expected,
@@ -128,7 +128,7 @@ def _options(given: dict[str, Any]) -> Options:
     for key, value in given.items():
         name = key.partition(".")[2]
         if name not in known:
-            near = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
+            near = nearest_choice(name, known)
             raise UsageError("the MuJoCo model has no such option", where=f"--set {key}",
                              expected=" | ".join(f"{OPTIONS}.{one}" for one in known), received=key,
                              hint=_usual(near, known[near]))  # fmt: skip

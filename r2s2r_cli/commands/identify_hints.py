@@ -7,11 +7,11 @@ import re
 import shlex
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.errors import R2S2RError, UsageError
+from r2s2r_cli.nearest import nearest_choice
 from r2s2r_cli.store.atomic import PARTIAL
 from r2s2r_cli.store.checkpoint import OtherRequest
 from r2s2r_cli.store.header import CutOff, NotAnArtifact
@@ -162,9 +162,8 @@ def _about(value: str | None) -> str:
 def require_one_of(value: str, known: tuple[str, ...], option: str) -> None:
     """Raises UsageError for a choice that an option does not have."""
     if value not in known:
-        near = get_close_matches(value, known, 1, 0.0) or known
         raise UsageError("there is no such choice", where=option, expected=" | ".join(known), received=value,
-                         hint=f"r2s2r identify {option} {near[0]}")  # fmt: skip
+                         hint=f"r2s2r identify {option} {nearest_choice(value, known)}")  # fmt: skip
 
 
 def require_starts(asked: Asked, overrides: dict[str, Any]) -> None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.nearest import nearest, nearest_choice
 from r2s2r_cli.store.project import Iteration
 
 if TYPE_CHECKING:
@@ -78,6 +78,6 @@ def require_robot(recording: ArtifactData | None, run: str, name: str) -> None:
 
 def nearest_run(name: str, known: Sequence[str]) -> str:
     """The run that was meant by a name that none has: one that has it in its own (`after` of 002-after), else the one
-    that is spelt like it."""
+    that is spelt like it. Where none is near, a place for one with a remark: a wrong run would be believed."""
     holding = [one for one in known if name and name.lower() in one.lower()]
-    return get_close_matches(name, holding or known, 1, 0.0)[0]
+    return nearest_choice(name, holding) if holding else nearest(name, known) or "RUN   # one of those that are listed"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 import os
 import re
 import shlex
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from r2s2r_cli.errors import R2S2RError, UsageError
+from r2s2r_cli.nearest import nearest
 
 _EXTRA = re.compile(r"Got unexpected extra arguments?\(?s?\)? \((?P<words>.*)\)")
 _COMMAND = re.compile(r"No such command '(?P<name>.*?)'")
@@ -53,11 +53,11 @@ def _option(error: Any, message: str, command: Any, words: list[str]) -> Said:
     name = str(error.option_name)
     known = {one.lstrip("-"): one for param in command.params for one in (*param.opts, *param.secondary_opts)
              if one.startswith("--")}  # fmt: skip
-    near = difflib.get_close_matches(name.lstrip("-"), known, 1)
+    near = nearest(name.lstrip("-"), known)
     if not near:
         mended, expected = _as_argument(name, command, words)
         return "there is no such option", expected or " | ".join(known.values()), name, mended
-    right = known[near[0]]
+    right = known[near]
     mended = [right + word[len(name) :] if word.partition("=")[0] == name else word for word in words]
     return "there is no such option", right, name, mended if mended != words else None
 
@@ -66,15 +66,15 @@ def _as_argument(name: str, command: Any, words: list[str]) -> tuple[list[str] |
     """Of an option that is spelt like an argument (`--policy straight`): the command line with its value as that, where
     it is known to be one, and what is expected then."""
     arguments = [param.name for param in command.params if param.param_type_name == "argument"]
-    near = difflib.get_close_matches(name.lstrip("-"), arguments, 1)
+    near = nearest(name.lstrip("-"), arguments)
     at = next((i for i, word in enumerate(words) if word.partition("=")[0] == name), None)
     if not near or at is None:
         return None, ""
     given = _Given(at, words)
     value = given.value
-    if near[0] == "policies" and command.name != "execute":  # which knows those of its plan by their names alone
+    if near == "policies" and command.name != "execute":  # which knows those of its plan by their names alone
         value = value if Path(value).is_file() else _planned(value, words)
-    expected = f"{near[0]} without an option before them"
+    expected = f"{near} without an option before them"
     if not value or value.startswith("-"):
         return None, expected
     return [*words[:at], value, *words[at + (1 if given.equals else 2) :]], expected
@@ -98,11 +98,11 @@ def _command(error: Any, message: str, command: Any, words: list[str]) -> Said:
     """There is no such command: the one that is spelt like it."""
     del error
     name = _COMMAND.search(message)["name"]  # type: ignore[index]
-    near = difflib.get_close_matches(name, command.commands, 1)
+    near = nearest(name, command.commands)
     mended = list(words)
     if near and name in words:
-        mended[words.index(name)] = near[0]
-    return ("there is no such command", near[0] if near else " | ".join(command.commands), name,
+        mended[words.index(name)] = near
+    return ("there is no such command", near or " | ".join(command.commands), name,
             mended if mended != words else None)  # fmt: skip
 
 
@@ -118,10 +118,10 @@ def _value(error: Any, message: str, command: Any, words: list[str]) -> Said:
     if wrong is None:
         return f"this is no value of {param.name}", expected, said, None
     begun = [one for one in choices if wrong.value and one.startswith(wrong.value)]
-    near = begun if len(begun) == 1 else difflib.get_close_matches(wrong.value, choices, 1)
+    near = begun[0] if len(begun) == 1 else nearest(wrong.value, choices)
     usual = getattr(param.default, "value", param.default)
     usual = EXAMPLES.get(wrong.option) if usual is None else usual
-    right = near[0] if near else None if usual is None or param.multiple else str(usual)
+    right = near or (None if usual is None or param.multiple else str(usual))
     mended = None if choices and not near else wrong.replaced(words, right)
     return f"this is no value of {wrong.option}", expected, wrong.value, mended
 

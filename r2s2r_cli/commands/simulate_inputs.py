@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.commands.outcome import require_input, require_model
 from r2s2r_cli.errors import InputError, UsageError, quoted
+from r2s2r_cli.nearest import nearest
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import InputRef
 
@@ -176,8 +177,6 @@ def stored_names(project: Project, texts: Sequence[str]) -> list[str]:
 def read_policies(text: str, command: str = "simulate") -> Iterator[PolicyFile]:
     """The policies of a TOML file (one) or an artifact (all, or the one named). command: that was typed, for hints.
     Raises InputError, UsageError."""
-    from difflib import get_close_matches
-
     from r2s2r_cli.commands.typed import typed_instead
     from r2s2r_cli.stages.simulate.policies import stored_policies
     from r2s2r_cli.store.read import read_artifact
@@ -190,10 +189,10 @@ def read_policies(text: str, command: str = "simulate") -> Iterator[PolicyFile]:
         return
     found = stored_policies(read_artifact(path)[1])
     if not found or (name and name not in found):
-        near = get_close_matches(name, found, 1, 0.5) if name else []
+        near = nearest(name, found)
         raise UsageError(
             "there is no such policy" if name else "the artifact holds no policy", where=str(path),
             expected=" | ".join(found) or "a policy, or runs with targets", received=name or "none",
-            hint=typed_instead(command, name, near[0]) if near else f"r2s2r inspect {quoted(path)}",
+            hint=typed_instead(command, name, near) if near else f"r2s2r inspect {quoted(path)}",
         )  # fmt: skip
     yield from [found[name]] if name else found.values()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,6 +10,7 @@ import typer
 
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError, ExitCode, GateError, UsageError
+from r2s2r_cli.nearest import nearest
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from schemas.results import Finding, ValidateResult
 
@@ -89,9 +89,10 @@ def _names(text: str | None, option: str) -> set[str]:
         raise UsageError("no check is named", where=option, expected="names separated by commas", received=repr(text),
                          hint=f"r2s2r validate {option} {known[0]}")  # fmt: skip
     for name in sorted(names - set(known)):
-        near = difflib.get_close_matches(name, known, n=1, cutoff=0.4)
-        hint = f"r2s2r validate {option} {near[0]}" if near else "docs/reference/checks.md lists the checks"
-        raise UsageError(f"there is no check {name}", where=option, expected=near[0] if near else "a name of a check",
+        near = nearest(name, known)
+        lists = "r2s2r validate --help   # docs/reference/checks.md lists the checks"
+        hint = f"r2s2r validate {option} {near}" if near else lists
+        raise UsageError(f"there is no check {name}", where=option, expected=near or "a name of a check",
                          received=name, hint=hint)  # fmt: skip
     return names
 

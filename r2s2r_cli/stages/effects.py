@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.nearest import nearest
 
 if TYPE_CHECKING:
     from r2s2r_cli.effects import Effect
@@ -39,4 +39,4 @@ def effect_of(name: str, *, where: str, command: str) -> Effect:
 def _near(name: str, known: Sequence[str]) -> list[str]:
     """The id that was probably meant: the one that has the name among its words, else one that is spelt like it."""
     of_word = [one for one in known if name in one.split("_")]
-    return of_word if len(of_word) == 1 else difflib.get_close_matches(name, known, n=1)
+    return of_word if len(of_word) == 1 else [*filter(None, [nearest(name, known)])]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 import tomllib
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from r2s2r_cli.errors import InputError, quoted
+from r2s2r_cli.nearest import nearest
 from r2s2r_cli.store.toml_hints import Mend, around, in_file
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -85,7 +85,8 @@ def _problems(error: ValidationError, model: type[BaseModel], where: str, mend: 
     places = [p["loc"] for p in everything]
     found = [p for p in everything if p["type"] != "too_short" or not _is_above(p["loc"], places)]
     unknown = [_unknown_key(p["loc"], model, where, mend) for p in found if p["type"] == "extra_forbidden"]
-    meant = {(*p["loc"][:-1], name) for p in found if p["type"] == "extra_forbidden" for name in _near(p["loc"], model)}
+    strange = [p["loc"] for p in found if p["type"] == "extra_forbidden"]
+    meant = {(*loc[:-1], name) for loc in strange if (name := _near(loc, model))}
     rest = [p for p in found if p["type"] != "extra_forbidden" and not (p["type"] == "missing" and p["loc"] in meant)]
     return unknown + [_wrong_value(p, where, mend) for p in rest]
 
@@ -110,16 +111,16 @@ def _wrong_value(problem: Any, where: str, mend: Mend) -> InputError:
     )
 
 
-def _near(loc: tuple[int | str, ...], model: type[BaseModel]) -> list[str]:
+def _near(loc: tuple[int | str, ...], model: type[BaseModel]) -> str:
     """The known key that an unknown one was probably meant to be; empty where none is near."""
-    return difflib.get_close_matches(str(loc[-1]), _keys_at(model, loc[:-1]), n=1, cutoff=0.5)
+    return nearest(str(loc[-1]), _keys_at(model, loc[:-1]))
 
 
 def _unknown_key(loc: tuple[int | str, ...], model: type[BaseModel], where: str, mend: Mend) -> InputError:
     known, near = _keys_at(model, loc[:-1]), _near(loc, model)
     return InputError(f"unknown key {'.'.join(map(str, loc))}", where=where, received=str(loc[-1]),
-                      expected=near[0] if near else " | ".join(known) or "no key",
-                      hint=mend(loc, near[0] if near else ""))  # fmt: skip
+                      expected=near or " | ".join(known) or "no key",
+                      hint=mend(loc, near))  # fmt: skip
 
 
 def _keys_at(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:

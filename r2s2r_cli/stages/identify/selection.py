@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from difflib import get_close_matches
 
 from r2s2r_cli.errors import UsageError
+from r2s2r_cli.nearest import nearest_choice
 from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.load import require_two_intervals
 from r2s2r_cli.stages.identify.selection_hints import mended, run_of, worded
@@ -106,8 +106,9 @@ def parse_selection(
     for text in texts:
         name = run_of(text)
         if name not in by_name:
-            near = get_close_matches(name, by_name, 1, 0.0)
-            meant = [near[0] + one[len(name) :].rstrip(":") for one in texts if run_of(one) == name] if near else []
+            # One of the few runs there are is meant, and the other side's hint has to fit it.
+            near = nearest_choice(name, by_name) if by_name else ""
+            meant = [near + one[len(name) :].rstrip(":") for one in texts if run_of(one) == name] if near else []
             raise UsageError(
                 "there is no such run", where=option, expected=" | ".join(by_name), received=name or text or "nothing",
                 hint=" ".join(worded(option, one) for one in meant) or "r2s2r status",

@@ -10,7 +10,7 @@ import numpy as np
 from r2s2r_cli.errors import InputError, quoted
 from r2s2r_cli.stages.import_ import clock
 from r2s2r_cli.stages.import_.checks import UNITS
-from r2s2r_cli.stages.import_.files import clipped, in_place, nearest, shown
+from r2s2r_cli.stages.import_.files import clipped, in_place, nearest_name, shown
 from r2s2r_cli.stages.import_.table import Table
 from schemas.results_import import LengthUnit
 from schemas.robot import Robot
@@ -64,7 +64,7 @@ def find_columns(table: Table, robot: Robot) -> Columns:
         if name not in known:
             if name.lower() in clock.COLUMNS and "t_s" not in index:
                 raise _other_clock(name, i, where, table.where)
-            near = "t_s" if name.lower() in clock.ALIASES and "t_s" not in index else nearest(name, known)
+            near = "t_s" if name.lower() in clock.ALIASES and "t_s" not in index else nearest_name(name, known)
             raise InputError(
                 f"unknown column {shown(name)}" + (f" (did you mean {near!r}?)" if near else ""),
                 where=f"{where}, column {i + 1}",

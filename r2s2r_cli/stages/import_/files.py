@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import codecs
-import difflib
 import os
 import stat
 from collections.abc import Iterator
@@ -11,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from r2s2r_cli.errors import InputError, nearest_folder, quoted
+from r2s2r_cli.nearest import nearest
 
 MIB = 1024 * 1024
 MAX_CSV_BYTES = 256 * MIB
@@ -32,16 +32,15 @@ def clipped(text: str) -> str:
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}... ({len(text)} characters)"
 
 
-def nearest(name: str, known: list[str]) -> str:
+def nearest_name(name: str, known: list[str]) -> str:
     """The known name that a misspelt one is nearest to, whatever its case; empty where none is near."""
     lower = {word.lower(): word for word in known}
-    close = difflib.get_close_matches(name.lower(), lower, n=1)
-    return lower[close[0]] if close else ""
+    return lower.get(nearest(name.lower(), lower), "")
 
 
 def did_you_mean(name: str, known: list[str]) -> str:
     """` (did you mean ...?)` for a misspelt name, else empty."""
-    close = nearest(name, known)
+    close = nearest_name(name, known)
     return f" (did you mean {close!r}?)" if close else ""
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator
 
 import numpy as np
 
 from r2s2r_cli.errors import UsageError
+from r2s2r_cli.nearest import nearest
 from r2s2r_cli.stages.init.attachment import Mode, attach
 from r2s2r_cli.stages.init.facts import FACTS, HSV_SOURCE, LEGEND, SATURATION_MIN, VALUE_MIN
 from r2s2r_cli.stages.init.robot_facts import Fact, Part, RobotFacts
@@ -22,7 +22,7 @@ _DECIMALS = 6
 def robot_facts(name: str) -> RobotFacts:
     """The numbers of one robot. Raises UsageError for an unknown name, with the nearest known one."""
     if name not in FACTS:
-        near = difflib.get_close_matches(name, FACTS, n=1, cutoff=0.0)[0]
+        near = nearest(name, FACTS) or next(iter(FACTS))
         raise UsageError(
             f"unknown robot {name!r}",
             where="--robot",

@@ -11,7 +11,7 @@ import pytest
 
 from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.stages.import_ import check_source, find_format, import_source, merge_runs
-from r2s2r_cli.stages.import_.files import FileBytes, clipped, file_size, nearest, read_source
+from r2s2r_cli.stages.import_.files import FileBytes, clipped, file_size, nearest_name, read_source
 from r2s2r_cli.stages.import_.sidecar import parse_sidecar, sidecar_path
 from schemas.sidecar import MINIMAL_SIDECAR, PLACEHOLDER
 from tests.support.import_samples import SIDECAR, frame_json, sample_robot, small_csv, write_authors_folder
@@ -234,6 +234,6 @@ def test_limits_are_those_of_the_caller(tmp_path: Path) -> None:
 
 def test_near_names_ignore_case_and_far_ones_are_not_forced() -> None:
     """A name in capitals is recognised; nonsense is not matched; long texts are clipped."""
-    assert nearest("T_S", ["t_s", "cap0_x_m"]) == "t_s"
-    assert nearest("temperature", ["t_s", "cap0_x_m"]) == ""
+    assert nearest_name("T_S", ["t_s", "cap0_x_m"]) == "t_s"
+    assert nearest_name("temperature", ["t_s", "cap0_x_m"]) == ""
     assert len(clipped("x" * 1000)) < 90

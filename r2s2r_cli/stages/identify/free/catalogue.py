@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 
 from r2s2r_cli.errors import UsageError
+from r2s2r_cli.nearest import nearest
 from r2s2r_cli.stages.effects import effect_of
 from r2s2r_cli.stages.identify.free.base import Free
 from r2s2r_cli.stages.identify.free.entry import Entry
@@ -47,12 +47,13 @@ def require_effects(effects: Sequence[str]) -> None:
 
 
 def unknown(name: str, known: Sequence[str], option: str = "--free") -> UsageError:
-    """The error for a name that the catalogue lacks, with the names nearest to it."""
+    """The error for a name that the catalogue lacks, with the one that is near to it, where one is."""
     known = tuple(dict.fromkeys(known))
-    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5) or list(known)[:3]
+    near = nearest(name, known)
     value = "=0.5" if option == "--fix" else ""
     return UsageError(
         f"unknown parameter {name!r}", where=option,
-        expected=f"{', '.join(near)} ... (docs/reference/free-parameters.md lists {len(known)})", received=name,
-        hint=f"r2s2r identify {option} {near[0]}{value}",
+        expected=f"{near or 'one'} of the {len(known)} names in docs/reference/free-parameters.md", received=name,
+        hint=f"r2s2r identify {option} {near}{value}" if near else
+        "r2s2r identify --help   # docs/reference/free-parameters.md lists the names",
     )  # fmt: skip

@@ -198,7 +198,7 @@ class Asked:
 
     def _nothing_else(self, healthy: Sequence[Run]) -> InputError:
         """For runs that are all given as healthy: those of other iterations, or what to record."""
-        from r2s2r_cli.views.diagnose_commands import ROBOT
+        from r2s2r_cli.reached import ROBOT
 
         used = {source.place.number for source in self.sources}
         others = [one for one in self.project.iterations() if one.number not in used and estimated(one)]

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.console import Console
+from r2s2r_cli.reached import reached
 
 if TYPE_CHECKING:
     from r2s2r_cli.artifact import ArtifactData
@@ -42,7 +43,7 @@ def pictures(
     for name, title, png in draw_diagnosis(data, report, asked):
         yield f"-{name}.png", png
         drawn.append((title, png))
-    yield ".html", diagnose_page(report, drawn, _reached(link))
+    yield ".html", diagnose_page(report, drawn, reached(link))
 
 
 def _policy(report: DiagnoseReport) -> bytes:
@@ -77,14 +78,7 @@ def show(
     console.data(report.sentence)
     if loud := loud_words(report):
         console.data(loud)
-    for what, command in diagnose_commands(report, _reached(link)):
+    for what, command in diagnose_commands(report, reached(link)):
         console.data(f"{what}: {command}")
     for text in report.warnings:
         console.warn(text)
-
-
-def _reached(link: LinkSettings | None) -> str:
-    """Options by which the robot is reached: what the project says is not typed again."""
-    from r2s2r_cli.views.diagnose_commands import ROBOT
-
-    return ROBOT if link is None or not link.port else ROBOT[ROBOT.index("--camera") :]

@@ -7,10 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from r2s2r_cli.errors import R2S2RError
+from r2s2r_cli.reached import RIG_REMARK, camera
 from schemas.header import Provenance
-
-_CAMERA = "--camera realsense"
-_RIG = "--camera rig://127.0.0.1:9000"
 
 
 @contextmanager
@@ -42,8 +40,8 @@ def seen_again(made: Provenance, path: Path, *, rig: bool = False) -> str:
         return again + "   # with end caps, or with color/ and depth/ in the folder"
     remarks = []
     if "--camera" not in again.split():
-        again += f" {_RIG if rig else _CAMERA}"
-        remarks += ["the camera as `r2s2r rig --camera-port 9000` prints it"] if rig else []
+        again += f" {camera(rig=rig)}"
+        remarks += [RIG_REMARK] if rig else []
     if made.stage == "record":
         again += " --dry-run"
         remarks.append("--dry-run moves nothing; without it the robot does")

@@ -130,9 +130,9 @@ def _policies(
 ) -> list[PolicyFile]:
     """The policies asked for. Raises InputError, UsageError."""
     from r2s2r_cli.commands.simulate_inputs import read_policies
+    from r2s2r_cli.reached import ROBOT
     from r2s2r_cli.stages.record import excitation, random_targets
     from r2s2r_cli.stages.simulate.policies import sequence
-    from r2s2r_cli.views.diagnose_commands import ROBOT
 
     found = [policy for text in files for policy in read_policies(text)]
     if random is not None:

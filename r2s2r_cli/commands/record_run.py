@@ -12,6 +12,7 @@ from r2s2r_cli.commands.record_journal import Recording
 from r2s2r_cli.commands.record_live import Live, shown, stop_key
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import HardwareError, Interrupted, R2S2RError, quoted
+from r2s2r_cli.reached import RIG_REMARK, camera, virtual
 
 if TYPE_CHECKING:
     from r2s2r_cli.devices.camera import CameraFeed
@@ -59,9 +60,10 @@ class Wish:
 def tell_of_no_camera(wish: Wish, console: Console) -> None:
     """To be said before anything moves: afterwards it is too late for a camera."""
     if wish.camera is None:
+        rig = virtual(wish.port)
         console.warn(
             "no camera is named: no states can be estimated from these runs, so `identify` cannot learn from them and "
-            "`compare` has nothing to compare; with one, add --camera realsense"
+            f"`compare` has nothing to compare; with one, add {camera(rig=rig)}{f' ({RIG_REMARK})' if rig else ''}"
         )
 
 

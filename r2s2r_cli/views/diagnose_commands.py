@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from r2s2r_cli.reached import ROBOT
+
 if TYPE_CHECKING:
     from schemas.results_diagnose import DiagnoseReport
 
-ROBOT = "--port /dev/ttyUSB0 --protocol legacy --camera realsense"
-"""How the robot of the paper is reached, in commands that are shown; `--camera` is last."""
 REPEATS = 2
 AFTER_REPAIR = "   # after you have put the robot right: these runs are taken as healthy"
 """On the lines themselves: who pastes them unread would declare the robot healthy that is diagnosed."""

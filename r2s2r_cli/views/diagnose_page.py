@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from r2s2r_cli.views.diagnose_commands import ROBOT, diagnose_commands, healthy_help
+from r2s2r_cli.reached import ROBOT
+from r2s2r_cli.views.diagnose_commands import diagnose_commands, healthy_help
 from r2s2r_cli.views.diagnose_ranking import element_words, ranking_table
 from r2s2r_cli.views.diagnose_words import (
     HELD_OUT,

@@ -240,6 +240,28 @@ def test_runs_without_a_camera_are_warned_of_before_they_move(
     assert len(told) == 1 and told[0].endswith("(0 commands)") and "--camera realsense" in told[0]
 
 
+@pytest.mark.parametrize(
+    ("port", "camera"),
+    [
+        ("socket://127.0.0.1:4000", "--camera rig://127.0.0.1:9000 (the camera as `r2s2r rig"),
+        ("socket://localhost:4000", "--camera rig://"),
+        ("/dev/pts/3", "--camera rig://"),
+        ("/dev/ttyUSB0", "--camera realsense"),
+        ("udp://0.0.0.0:2390", "--camera realsense"),
+    ],
+)
+def test_a_rig_is_advised_its_own_camera(
+    robot_project: Path, link: Maker, monkeypatch: pytest.MonkeyPatch, port: str, camera: str
+) -> None:
+    """No other one sees the robot of a rig: as `estimate` says it of the recording, said before there is one."""
+    said: list[str] = []
+    link()
+    monkeypatch.setattr(record_run, "LOOK_S", 0.05)
+    monkeypatch.setattr(Console, "warn", lambda self, text: said.append(text))
+    assert invoke("record", "--random", "2", "--port", port, "--dry-run").exit_code == 0
+    assert [camera in text for text in said if "no states can be estimated" in text] == [True]
+
+
 def test_dry_run_moves_nothing(robot_project: Path, link: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
     """The plan, the lengths of the sensors, no motor command but zeros, no file."""
     made = link()

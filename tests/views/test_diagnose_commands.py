@@ -6,9 +6,10 @@ import pytest
 
 from r2s2r_cli.commands.diagnose_outcome import show
 from r2s2r_cli.console import Console
+from r2s2r_cli.reached import ROBOT
 from r2s2r_cli.stages.record.plan import plans
 from r2s2r_cli.stages.record.policies import random_targets
-from r2s2r_cli.views.diagnose_commands import AFTER_REPAIR, REPEATS, ROBOT, diagnose_commands, use
+from r2s2r_cli.views.diagnose_commands import AFTER_REPAIR, REPEATS, diagnose_commands, use
 from r2s2r_cli.views.diagnose_page import diagnose_page, diagnose_tables
 from schemas.config import LinkSettings
 from schemas.results_diagnose import DiagnoseReport, NextGaitFound

@@ -73,7 +73,7 @@ def compare(
 
     console = Console(json=json, quiet=quiet)
     here = Project.find(project)
-    place = here.iteration(iteration, first="r2s2r plan   # then: execute, estimate")
+    place = here.iteration(iteration)
     asked = Asked(here, place, tuple(model or ()), None if of is None else of.value, own)
     run = StageRun(
         stage="compare", kind="comparison", project=here, iteration=place, find_inputs=asked.refs,

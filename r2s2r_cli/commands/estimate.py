@@ -76,10 +76,10 @@ def estimate(
         return
     executed = of is Of.EXECUTE
     source = place.artifact("recording", executed=executed)
-    first = "r2s2r execute" if executed else "r2s2r import run.csv"
+    first = f"r2s2r execute --iteration {place.number}" if executed else here.first_data(place)
     if not executed and place.artifact("recording", executed=True).exists():  # an iteration after the first
-        first = "r2s2r estimate --of execute"
-    require_input(source, f"{first} --iteration {place.number}")
+        first = f"r2s2r estimate --of execute --iteration {place.number}"
+    require_input(source, first)
     header = whole_header(source)
     run = StageRun(
         stage="estimate", kind="estimate", project=here, iteration=place,

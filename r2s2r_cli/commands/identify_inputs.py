@@ -75,7 +75,7 @@ class Asked:
         found = [*main, *(one for part in others.values() for one in part)]
         for one in found:
             number, of = one.place.number, " --of execute" * one.executed
-            require_input(one.recording, f"r2s2r import run.csv --iteration {number}")
+            require_input(one.recording, self.project.first_data(one.place))
             require_input(one.estimate, f"r2s2r estimate --iteration {number}{of}")
         return tuple(found)
 

@@ -89,7 +89,7 @@ def import_(
         return
     if not sources:
         raise UsageError("no log is named", where="r2s2r import", expected="a trajectory CSV or a recorder folder",
-                         received="nothing", hint="r2s2r import run.csv")  # fmt: skip
+                         received="nothing", hint=here.first_data())  # fmt: skip
     if depth_scale is not None and not (math.isfinite(depth_scale) and depth_scale > 0):
         raise UsageError("this is no size of a depth count", where="--depth-scale", expected="metres, above 0",
                          received=str(depth_scale), hint="--depth-scale 0.001")  # fmt: skip
@@ -115,13 +115,20 @@ def import_(
 
 
 def _refs(project: Project, sources: list[Path], format_: Format) -> list[InputRef]:
+    from r2s2r_cli.commands.typed import typed_instead
     from r2s2r_cli.stages.import_ import check_source
+    from r2s2r_cli.stages.import_.files import Missing
     from r2s2r_cli.stages.import_.sidecar import sidecar_path
     from r2s2r_cli.store.staleness import source_ref
 
     refs: list[InputRef] = []
     for path in sources:
-        check_source(path, format_.value)
+        try:
+            check_source(path, format_.value)
+        except Missing as error:
+            if error.near:
+                error.hint = typed_instead("import", str(path), str(path.with_name(error.near)))
+            raise
         sidecar = sidecar_path(path)
         try:
             refs.append(source_ref(project, path))

@@ -17,6 +17,7 @@ from r2s2r_cli.console import Console
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.options import JsonOption, QuietOption
 from r2s2r_cli.store.atomic import write_text
+from r2s2r_cli.store.first_data import first_data
 from r2s2r_cli.store.project import ITERATIONS, PROJECT_FILE
 from schemas.results import InitResult
 
@@ -69,10 +70,8 @@ def init(
     console.document(InitResult(project=title, robot=robot, files=tuple(files)))
     for file in files:
         console.data(str(directory / file))
-    log = "sample.csv" if sample else "run.csv"
-    console.hint(
-        f"cd {shlex.quote(str(directory))} && r2s2r import {log}" if str(directory) != "." else f"r2s2r import {log}"
-    )
+    first = "r2s2r import sample.csv" if sample else first_data(root, here=root)
+    console.hint(f"cd {shlex.quote(str(directory))} && {first}" if str(directory) != "." else first)
 
 
 def _write(root: Path, files: Mapping[str, str]) -> None:

@@ -16,7 +16,7 @@ def forward(project: Project) -> str:
         one.artifact("estimate", executed=executed).exists() for one in every[:-1] for executed in (False, True)
     )
     if not every or not (every[-1].artifact("recording").exists() or earlier):
-        return "r2s2r import run.csv"
+        return project.first_data()
     place = every[-1]
     if not place.artifact("recording").exists():  # it learns from the iteration before
         return _planned(project, place, ("identification", "plan"))

@@ -18,6 +18,7 @@ from r2s2r_cli.commands.run_stage import carry_out
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import R2S2RError, UsageError
 from r2s2r_cli.options import DrawOption, DryRunOption, IterationOption, JsonOption, ProjectOption, QuietOption
+from r2s2r_cli.reached import reached
 from r2s2r_cli.store.project import Iteration, Project
 
 STAGES = ("record", "estimate", "identify", "plan", "execute", "estimate-executed", "compare")
@@ -177,7 +178,7 @@ def _steps(
         yield Step("record", ("record", "--random", str(random[0]), *seeded, *robot), recording, robot=True)
     elif not earlier and not recording.exists():
         raise UsageError("there is neither a robot nor a log", where="r2s2r run", expected="--port PORT, or log files",
-                         received="neither", hint="r2s2r run run.csv")  # fmt: skip
+                         received="neither", hint=_brought(project))  # fmt: skip
     if source or recording.exists() or not earlier:
         yield Step("estimate", ("estimate",), place.artifact("estimate"))
     yield Step("identify", ("identify", *seeded), place.artifact("identification"))
@@ -188,6 +189,12 @@ def _steps(
         yield Step("estimate-executed", ("estimate", "--of", "execute"), place.artifact("estimate", executed=True))
     if robot or executed.exists() or source or recording.exists() or not earlier:
         yield Step("compare", ("compare",), place.artifact("comparison"))
+
+
+def _brought(project: Project) -> str:
+    """The loop from a log that lies here, else from the robot."""
+    first, log = project.first_data(), "r2s2r import "
+    return f"r2s2r run {first.removeprefix(log) if first.startswith(log) else reached(project.file.link)}"
 
 
 def _kept(project: Project, place: Iteration, step: Step, steps: Sequence[Step]) -> str:

@@ -149,7 +149,7 @@ class Asked:
         if estimate.exists():
             return estimate
         recording = self.iteration.artifact("recording")
-        require_input(recording, f"r2s2r import run.csv --iteration {self.iteration.number}")
+        require_input(recording, self.project.first_data(self.iteration))
         return recording
 
     @cached_property

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from r2s2r_cli.errors import ArtifactError, InputError, UsageError
+from r2s2r_cli.store.first_data import first_data
 from r2s2r_cli.store.toml import check_model, load_model, read_toml
 from r2s2r_cli.store.toml_hints import in_override
 from schemas.config import ProjectFile, RunConfig
@@ -97,10 +98,10 @@ class Project:
         return [Iteration(int(p.name), p) for p in sorted(found, key=lambda p: int(p.name))]
 
     def iteration(
-        self, number: int | None, *, create: bool = False, first: str = "r2s2r import run.csv"
+        self, number: int | None, *, create: bool = False, first: str = ""
     ) -> Iteration:  # fmt: skip
         """Iteration `number`, default the latest (with `create`: the first, where there is none). first:
-        the command that a project without iterations is hinted.
+        the command that a project without iterations is hinted; default: that which brings its first data.
 
         Raises ArtifactError where there is none yet, UsageError where this one does not exist and is not to be created,
         or is beyond the next one: a slip of the finger would become "the latest".
@@ -110,8 +111,8 @@ class Project:
             if existing:
                 return existing[-1]
             if not create:
-                raise ArtifactError("there is no iteration yet", where=str(self.root / ITERATIONS),
-                                    expected="at least one", received="none", hint=first)  # fmt: skip
+                raise ArtifactError("there is no iteration yet", where=str(self.root / ITERATIONS), received="none",
+                                    expected="at least one", hint=first or self.first_data())  # fmt: skip
             number = 1
         if not 1 <= number <= MAX_ITERATION:
             raise UsageError("there is no such iteration number", where="--iteration",
@@ -127,6 +128,11 @@ class Project:
         known = ", ".join(str(i.number) for i in existing) or "none yet"
         raise UsageError(f"iteration {number} does not exist", where="--iteration", expected=f"one of: {known}",
                          received=str(number), hint="r2s2r status")  # fmt: skip
+
+    def first_data(self, iteration: Iteration | None = None) -> str:
+        """The command that brings data where there is none at all, into an iteration where it has to be said."""
+        options = "" if iteration is None else f"--iteration {iteration.number}"
+        return first_data(self.root, self.file.link, options=options)
 
     def artifact(self, kind: str, iteration: Iteration | None, *, executed: bool = False) -> Path:
         """Where the artifact of `kind` lies: in the project, or in the iteration. executed: of the executed plan."""

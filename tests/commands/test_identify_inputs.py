@@ -70,7 +70,7 @@ def test_without_an_estimate_the_hint_is_to_estimate(project: Path) -> None:
     """A new project has nothing to learn from: exit code 4, and what to run."""
     result = invoke("identify")
     assert result.exit_code == 4
-    assert result.stderr.splitlines()[-1] == "hint: r2s2r import run.csv --iteration 1"
+    assert result.stderr.splitlines()[-1] == "hint: r2s2r import sample.csv --iteration 1"
 
 
 def test_runs_of_another_robot_are_refused(estimated: Path) -> None:

@@ -44,6 +44,20 @@ def did_you_mean(name: str, known: list[str]) -> str:
     return f" (did you mean {close!r}?)" if close else ""
 
 
+class Missing(InputError):
+    """A file or folder that is not there. near: the one beside it that is spelt like it; empty where none is."""
+
+    def __init__(self, path: Path, what: str, near: str) -> None:
+        super().__init__(
+            f"{what} does not exist" + (f" (did you mean {near!r}?)" if near else ""),
+            where=str(path),
+            expected="a file or folder that is there",
+            received="nothing",
+            hint=f"ls {quoted(nearest_folder(path))}",
+        )
+        self.near = near
+
+
 def file_size(path: Path, what: str, *, limit: int) -> int:
     """Size of a regular file [byte].
 
@@ -160,22 +174,20 @@ def _status(path: Path, what: str) -> os.stat_result:
     try:
         return path.stat()
     except (FileNotFoundError, NotADirectoryError) as error:
-        raise InputError(
-            f"{what} does not exist" + _sibling(path),
-            where=str(path),
-            expected="a file or folder that is there",
-            received="nothing",
-            hint=f"ls {quoted(nearest_folder(path))}",
-        ) from error
+        raise Missing(path, what, _sibling(path)) from error
     except (OSError, ValueError) as error:
         raise _unreadable(path, what, error) from error
 
 
 def _sibling(path: Path) -> str:
+    """The entry beside it that was meant. Of files of one kind the names count without their suffix: what all of them
+    end with makes no two of them alike."""
     try:
-        return did_you_mean(path.name, [entry.name for entry in path.parent.iterdir()])
+        names = [entry.name for entry in path.parent.iterdir()]
     except (OSError, ValueError):
         return ""
+    alike = {Path(name).stem: name for name in names if path.suffix and Path(name).suffix == path.suffix}
+    return alike.get(nearest_name(path.stem, list(alike)), "") if alike else nearest_name(path.name, names)
 
 
 def _unreadable(path: Path, what: str, error: Exception) -> InputError:

@@ -23,7 +23,7 @@ class ExitCode(IntEnum):
 EXIT_CODE_MEANING: dict[ExitCode, str] = {
     ExitCode.DONE: "done, or already up to date",
     ExitCode.BUG: "a bug in r2s2r: unexpected error, traceback on stderr",
-    ExitCode.USAGE: "usage: unknown command, option, key or name, or a request that would lose data",
+    ExitCode.USAGE: "usage: unknown command, option, key, name or value, or a request that would lose data",
     ExitCode.GATE: "gate not met: `validate` found errors, `status --check` found stale or damaged artifacts",
     ExitCode.INPUT: "artifact, project or input missing, unreadable, damaged, or of the wrong kind or version",
     ExitCode.HARDWARE: "hardware or link failure, emergency stop",

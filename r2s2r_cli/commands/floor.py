@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import UsageError
+from r2s2r_cli.errors import ArtifactError, UsageError
 from r2s2r_cli.options import DrawOption, DryRunOption, ForceOption, JsonOption, ProjectOption, QuietOption
 from r2s2r_cli.store.project import Iteration, Project
 
@@ -103,9 +103,9 @@ def _refs(project: Project, places: Sequence[Iteration], numerics: int) -> list[
 
     found = read_of(places)
     if not found and not numerics:
-        raise UsageError("there is nothing to measure a floor with", where="r2s2r floor", received="none",
-                         expected="an iteration with 10-record.h5 or 20-estimate.h5, or executed runs",
-                         hint="r2s2r record gait.toml --repeats 3 --port /dev/ttyUSB0")  # fmt: skip
+        raise ArtifactError("there is nothing to measure a floor with", where="r2s2r floor", received="none",
+                            expected="an iteration with 10-record.h5 or 20-estimate.h5, or executed runs",
+                            hint=project.first_data())  # fmt: skip
     return [artifact_ref(project, path, whole_header(path)) for path in found]
 
 

@@ -29,9 +29,9 @@ def test_what_a_single_run_gives_is_said(estimated: Path) -> None:
 
 
 def test_nothing_to_measure_with_is_said(project: Path) -> None:
-    """No iteration yet: exit code 2 and what to record; no floor.h5."""
+    """No iteration yet: exit code 4, as of every command without its input, and what brings data; no floor.h5."""
     result = invoke("floor", "--json")
-    assert result.exit_code == 2 and "--repeats 3" in json.loads(result.stdout)["hint"]
+    assert result.exit_code == 4 and json.loads(result.stdout)["hint"] == "r2s2r import sample.csv"
     assert not (project / "floor.h5").exists()
 
 

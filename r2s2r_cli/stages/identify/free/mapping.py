@@ -6,7 +6,7 @@ import collections.abc
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.identify.free.actions import Outside, Place
 from r2s2r_cli.stages.identify.free.base import Free
 from r2s2r_cli.stages.identify.free.catalogue import entries, require_effects, unknown
@@ -50,8 +50,8 @@ class Mapping:
         """fixed: values that are given, by name; a free number may be a part of a fixed one (fixed motor_speed, free
         motor_speed.2), then it wins there. structure: of the robot, if another than structure_of(robot).
 
-        Raises UsageError for unknown names and for numbers that contradict each other, InputError for a fixed value
-        out of its bounds or a robot that cannot be simulated.
+        Raises UsageError for unknown names, for numbers that contradict each other and for a fixed value out of its
+        bounds, InputError for a robot that cannot be simulated.
         """
         from r2s2r_cli.effects import with_off_values
         from r2s2r_cli.stages.effects import all_effects
@@ -176,7 +176,7 @@ class Mapping:
             free, value = entry.free, self.fixed[entry.free.name]
             unit = "" if free.unit == "1" else f" {free.unit}"
             if not free.lower <= value <= free.upper:
-                raise InputError(
+                raise UsageError(
                     f"the fixed {free.name} is out of its bounds", where="--fix",
                     expected=f"{free.lower:g} to {free.upper:g}{unit}", received=f"{value:g}",
                     hint=f"--fix {free.name}={entry.nominal:g}",

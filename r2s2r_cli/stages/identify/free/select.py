@@ -17,7 +17,7 @@ import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
-from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.identify.free.base import Coordinate, Free
 from r2s2r_cli.stages.identify.free.catalogue import entries, require_effects, unknown
 from r2s2r_cli.stages.identify.free.mapping import require_apart
@@ -41,8 +41,8 @@ def select(
     """The free numbers that the specs ask for, in their order; FAMILY.* without the elements that are fixed.
 
     Raises UsageError for a spec that cannot be read, an unknown name, a name twice, or two that set the same number
-    (motor_speed and motor_speed.2: no number is a factor on another); InputError for bounds that contradict each
-    other, the start, or what the number can be at all, and for a start on a bound.
+    (motor_speed and motor_speed.2: no number is a factor on another), for bounds that contradict each other, the start,
+    or what the number can be at all, and for a start on a bound.
     """
     require_effects(effects)
     known = entries(robot)
@@ -94,7 +94,7 @@ def _names(name: str, known: tuple[str, ...]) -> list[str]:
 
 
 def _with(free: Free, spec: Spec, text: str) -> Free:
-    """The catalogue's number with the user's start, bounds and prior. Raises InputError."""
+    """The catalogue's number with the user's start, bounds and prior. Raises UsageError."""
     made = replace(
         free,
         start=free.start if spec.start is None else spec.start,
@@ -122,13 +122,13 @@ def _with(free: Free, spec: Spec, text: str) -> Free:
     return made
 
 
-def _contradiction(free: Free, made: Free, what: str, text: str, *, expected: str) -> InputError:
+def _contradiction(free: Free, made: Free, what: str, text: str, *, expected: str) -> UsageError:
     """made: what was asked for; of that stays in the hint what can."""
     low, high = (end if free.lower <= end <= free.upper else own
                  for end, own in ((made.lower, free.lower), (made.upper, free.upper)))  # fmt: skip
     low, high = (low, high) if low < high else (high, low) if high < low else (free.lower, free.upper)
     start = next((one for one in (made.start, free.start) if low < one < high), 0.5 * (low + high))
-    return InputError(
+    return UsageError(
         f"{free.name}: {what}", where=f"--free {text}", expected=expected, received=text,
         hint=f"r2s2r identify --free {free.name}={start:g},{low:g}..{high:g}",
     )  # fmt: skip

@@ -13,7 +13,7 @@ from r2s2r_cli.effects import GroundSlope, with_off_values
 from r2s2r_cli.engine import check_parameters
 from r2s2r_cli.engine.hooks import effective
 from r2s2r_cli.engine.parameters import shapes, value
-from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.identify.free import Mapping, catalogue, select
 from r2s2r_cli.stages.identify.free.catalogue import entries
 from r2s2r_cli.stages.model import parameters_of, structure_of
@@ -199,7 +199,7 @@ def test_fixed_values_are_checked() -> None:
         mapping(fixed={"frictoin": 0.5})
     assert "--fix friction=" in caught.value.hint
     for bad in (-0.1, math.nan):
-        with pytest.raises(InputError, match="out of its bounds") as outside:
+        with pytest.raises(UsageError, match="out of its bounds") as outside:
             mapping(fixed={"friction": bad})
         assert outside.value.expected == "0.038 to 5"  # of no unit
 

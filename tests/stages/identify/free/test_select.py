@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from r2s2r_cli.errors import ExitCode, InputError, UsageError
+from r2s2r_cli.errors import ExitCode, UsageError
 from r2s2r_cli.stages.identify.free import catalogue, select
 from r2s2r_cli.stages.identify.free.select import Spec, parse
 from tests.support.engine import threebar
@@ -103,10 +103,10 @@ def test_no_name_is_offered_that_is_not_near(text: str) -> None:
     ],
 )
 def test_contradictions(text: str, what: str) -> None:
-    """Exit code 4, and the hint is a spec without the contradiction."""
-    with pytest.raises(InputError, match=what) as caught:
+    """Exit code 2, and the hint is a spec without the contradiction."""
+    with pytest.raises(UsageError, match=what) as caught:
         select([text], threebar())
-    assert caught.value.exit_code == ExitCode.INPUT
+    assert caught.value.exit_code == ExitCode.USAGE
     hint = caught.value.hint.split(" --free ")[1]
     if text == "friction=2,0.2..1.5":
         assert hint.endswith(",0.2..1.5")  # the bounds that were asked for are no part of the contradiction

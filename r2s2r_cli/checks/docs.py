@@ -34,6 +34,12 @@ def _overview() -> str:
     return "\n".join(["| check | importance | looks at |", "| --- | --- | --- |", *rows, ""])
 
 
+def _typed(fix: str) -> str:
+    """A command as it is typed, with its remark behind it; words as a sentence."""
+    command, _, remark = fix.partition("   # ")
+    return f"`{command}`: {sentence(remark)[0].lower()}{sentence(remark)[1:]}" if remark else sentence(fix)
+
+
 def _section(entry: Check) -> str:
     fix = entry.fix.replace("{file}", "FILE").replace("{location}", "PLACE")
     return (
@@ -41,7 +47,7 @@ def _section(entry: Check) -> str:
         f"{entry.importance.capitalize()}; looks at {_scope(entry)}.\n\n"
         f"- **What it checks.** {sentence(entry.what)}\n"
         f"- **Why.** {sentence(entry.why)}\n"
-        f"- **How to fix.** {sentence(fix)}\n"
+        f"- **How to fix.** {_typed(fix)}\n"
     )
 
 

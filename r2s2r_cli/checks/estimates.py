@@ -202,7 +202,7 @@ def seldom_lost(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="no cable sensor contradicts the camera",
     why="a sensor that is not used does not help where caps are hidden; the robot's controller used it all the same",
-    fix="r2s2r calibrate with a new table of that sensor, or look at its cable and its chip",
+    fix="r2s2r calibrate --points points.csv   # a new table of that sensor; or look at its cable and its chip",
 )
 def sensors_agree_with_camera(run: Run) -> Iterator[Found]:
     """Sensors that the tracker left out."""

@@ -211,7 +211,7 @@ def pid_range_in_limits(robot: Robot) -> Iterator[Found]:
     Robot,
     what="every sensor is calibrated",
     why="without slope and offset its capacitance says nothing about the length",
-    fix="r2s2r calibrate with a table of length and capacitance",
+    fix="r2s2r calibrate --points points.csv   # a table of lengths and capacitances",
 )
 def sensors_are_calibrated(robot: Robot) -> Iterator[Found]:
     """Sensors without a line."""

@@ -116,7 +116,7 @@ def sensors_received(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="sensor lengths stay within the robot's cable limits",
     why="a length that the robot cannot have is a sensor out of calibration, or another unit",
-    fix="r2s2r calibrate with a fresh table of length and capacitance",
+    fix="r2s2r calibrate --points points.csv   # a fresh table of lengths and capacitances",
 )
 def sensor_lengths_in_limits(run: Run) -> Iterator[Found]:
     """Lengths that the robot cannot have."""

@@ -189,8 +189,9 @@ def _summary(result: ValidateResult) -> str:
 
     parts = [counted(result.errors, "error", "errors"), counted(result.warnings, "warning", "warnings"),
              f"{result.advice} advice"]  # fmt: skip
-    checked = f"{counted(len(result.files), 'file', 'files')}, {counted(len(result.checks), 'check', 'checks')}"
-    return f"{checked}: {', '.join(parts)}"
+    # Each looks at all the places it fits, so that their number is not that of what was looked at.
+    kinds = counted(len(result.checks), "kind of check", "kinds of checks")
+    return f"{counted(len(result.files), 'file', 'files')}, {kinds}: {', '.join(parts)}"
 
 
 def _leave(result: ValidateResult) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -29,3 +30,11 @@ def test_every_check_has_its_section(entry: Check) -> None:
     assert sentence(entry.why) in section
     assert "How to fix" in section
     assert f"[`{entry.name}`](#{entry.name})" in page
+
+
+def test_what_mends_sensors_is_a_command() -> None:
+    """That can be pasted: its words stand behind it as a remark."""
+    hints = [entry.fix for entry in CHECKS if entry.fix.startswith("r2s2r calibrate --")]
+    assert len(hints) == 3
+    assert all(shlex.split(hint, comments=True) == ["r2s2r", "calibrate", "--points", "points.csv"] for hint in hints)
+    assert not [entry.name for entry in CHECKS if entry.fix.startswith("r2s2r calibrate with")]

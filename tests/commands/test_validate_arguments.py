@@ -142,4 +142,4 @@ def test_equal_findings_are_shown_once(capsys: pytest.CaptureFixture[str]) -> No
     lines = capsys.readouterr().out.splitlines()
     assert lines[:2] == ["error: it is wrong  [y]", "  where:    a.h5: runs/a (and 2 more places)"]
     assert lines[6] == "warning: it is wrong  [x]"
-    assert lines[-1] == "1 file, 2 checks: 3 errors, 1 warning, 0 advice"
+    assert lines[-1] == "1 file, 2 kinds of checks: 3 errors, 1 warning, 0 advice"

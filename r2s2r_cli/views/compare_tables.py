@@ -16,6 +16,8 @@ MEASURES = {
     "segment_s": ("duration of a target interval [s]", 1.0),
 }  # fmt: skip
 """Measures with their words and what SI is multiplied by."""
+_DEG = math.degrees(1)
+"""Of one radian: people read degrees, JSON and HDF5 hold radians."""
 TRAINED = "†"
 IN_PART = "‡"
 """Behind a policy of which a run is compared in part."""
@@ -47,7 +49,7 @@ def table_one(repeats: Sequence[CompareRepeatability]) -> PageTable:
         ["metric", *(one.policy for one in repeats)],
         [
             ["end CoM position (m)", *(_spread(one) for one in repeats)],
-            ["end orientation (radian)", *(_pm(one.turn_mean_rad, one.turn_sd_rad) for one in repeats)],
+            ["end orientation (degree)", *(_turned(one) for one in repeats)],
             ["duration (s)", *(f"{one.duration_mean_s:.2f} ± {one.duration_sd_s:.2f}" for one in repeats)],
             ["runs", *(str(len(one.runs)) for one in repeats)],
         ],
@@ -67,7 +69,7 @@ def table_two(report: CompareReport, iteration: int) -> PageTable:
     for model in ("", *over):
         cells = [by[policy, model] for policy in policies]
         name = f"{model} simulation" if model else "real robot"
-        rows.append([name, *(_place(one.com_m) for one in cells), "", *(_plain(one.turn_rad) for one in cells), ""])
+        rows.append([name, *(_place(one.com_m) for one in cells), "", *(_degrees(one.turn_rad) for one in cells), ""])
     for model, whole in over.items():
         cells = [by[policy, model] for policy in policies]
         marks = [f" {TRAINED}" if one.trained_on else "" for one in cells]
@@ -76,18 +78,18 @@ def table_two(report: CompareReport, iteration: int) -> PageTable:
             f"{model} error",
             *(_number(one.com_error_m, 3) + mark for one, mark in zip(cells, marks, strict=True)),
             _interval(whole.runs.get("com_end_m"), 3) + every,
-            *(_number(one.turn_error_rad, 2) + mark for one, mark in zip(cells, marks, strict=True)),
-            _interval(whole.runs.get("heading_end_rad"), 2) + every,
+            *(_degrees(one.turn_error_rad) + mark for one, mark in zip(cells, marks, strict=True)),
+            _interval(whole.runs.get("heading_end_rad"), 1, _DEG) + every,
         ])  # fmt: skip
     blank = [""] * len(policies)
     known = [next(iter(over.values())).runs.get(name) for name in ("com_end_m", "heading_end_rad")]
-    rows.append(["floor", *blank, _floor(known[0], 3), *blank, _floor(known[1], 2)])
+    rows.append(["floor", *blank, _floor(known[0], 3), *blank, _floor(known[1], 1, _DEG)])
     return PageTable(
         f"Table II, runs of iteration {iteration}: ends from the start, along and across the heading there; errors are"
         f" root mean squares over repeats, of all runs with a 95 % interval; {TRAINED} the simulator learned from them"
         + f"; {IN_PART} some runs in part, up to where all is known: their real ends are of there" * bool(cut),
         ["metric", *(f"CoM [m], {name}" for name in short), "all runs [m]",
-         *(f"turn [rad], {name}" for name in short), "all runs [rad]"],
+         *(f"turn [deg], {name}" for name in short), "all runs [deg]"],
         rows,
     )  # fmt: skip
 
@@ -160,25 +162,30 @@ def _spread(one: CompareRepeatability) -> str:
     return f"[{x:.3f} ± {sx:.3f}, {y:.3f} ± {sy:.3f}]"
 
 
-def _pm(mean: float | None, sd: float | None) -> str:
-    return "-" if mean is None or sd is None else f"{mean:.3f} ± {sd:.3f}"
+def _turned(one: CompareRepeatability) -> str:
+    mean, sd = one.turn_mean_rad, one.turn_sd_rad
+    return "-" if mean is None or sd is None else f"{_degrees(mean)} ± {_degrees(sd)}"
+
+
+def _degrees(value: float | None) -> str:
+    return "-" if value is None else f"{_DEG * value:.1f}"
 
 
 def _place(com: tuple[float, float] | None) -> str:
     return "-" if com is None else f"[{com[0]:.3f}, {com[1]:.3f}]"
 
 
-def _interval(one: CompareMeasure | None, digits: int) -> str:
+def _interval(one: CompareMeasure | None, digits: int, scale: float = 1.0) -> str:
     if one is None:
         return "-"
-    text = f"{one.rms:.{digits}f}"
+    text = f"{scale * one.rms:.{digits}f}"
     if one.lower is None or one.upper is None:
         return text
-    return f"{text} ({one.lower:.{digits}f} to {one.upper:.{digits}f})"
+    return f"{text} ({scale * one.lower:.{digits}f} to {scale * one.upper:.{digits}f})"
 
 
-def _floor(one: CompareMeasure | None, digits: int) -> str:
-    return "not known" if one is None or one.floor is None else f"{one.floor:.{digits}f}"
+def _floor(one: CompareMeasure | None, digits: int, scale: float = 1.0) -> str:
+    return "not known" if one is None or one.floor is None else f"{scale * one.floor:.{digits}f}"
 
 
 def _scaled(value: float | None, scale: float) -> str:

@@ -11,6 +11,7 @@ from schemas.results_estimate import CameraFigures, EstimateReport, EstimateRun
 
 _MADE = ("simulated", "kinematic sample")
 _AXES = "xyz"
+_HELD = "; * the source held this axis still: the median noise of the run stands in"
 
 
 def report_tables(report: EstimateReport) -> Iterator[PageTable]:
@@ -20,7 +21,7 @@ def report_tables(report: EstimateReport) -> Iterator[PageTable]:
         if run.camera is not None:
             yield from _camera_tables(run.run, run.camera)
         yield PageTable(
-            f"run {run.run}: end caps",
+            f"run {run.run}: end caps" + _HELD * any(any(cap.held) for cap in run.caps),
             ["cap", "noise sd x, y, z [mm]", "sd after smoothing [mm]", "in contact", "lowest [mm]",
              "speed, median [mm/s]", "fastest [mm/s]", "outliers", "jumps"],
             [

@@ -89,7 +89,7 @@ def floor_tables(report: FloorReport) -> list[PageTable]:
             ("floor", f"{1e3 * caps.floor_m:.1f} mm"), ("interval", interval),
             ("noise of the caps", f"{1e3 * caps.sensor_m:.1f} mm of it"),
             ("repeatability", f"{1e3 * caps.repeatability_m:.1f} mm"),
-            ("from", f"{caps.repeats} intervals in {counted(caps.phases, 'phase')}: {caps.basis}"),
+            ("from", f"{_compared(caps.repeats, caps.phases, caps.contrasts)}: {caps.basis}"),
         ]))  # fmt: skip
     if lengths is not None:
         title = f"cable lengths: floor {1e3 * lengths.floor_m:.2f} mm, {lengths.basis}"
@@ -120,6 +120,12 @@ def floor_page(report: FloorReport, picture: bytes) -> bytes:
             labels=list(report.warnings), tables=floor_tables(report), pictures=[Picture("floor", picture)],
         )
     )  # fmt: skip
+
+
+def _compared(intervals: int, phases: int, comparisons: int) -> str:
+    """How the numbers go together: of the intervals of one phase the first is what the others are compared with."""
+    found = f"{counted(intervals, 'interval')} in {counted(phases, 'phase')}"
+    return f"{found}, so {counted(comparisons, 'comparison')} (in each phase one fewer than its intervals)"
 
 
 def _unused(report: FloorReport) -> str:

@@ -98,9 +98,8 @@ _MADE = ("simulated", "kinematic sample")
 def _parameter(name: str, found: ParameterFigures) -> list[str]:
     interval = "-" if found.lower is None else f"{figure_of(found.lower)} .. {figure_of(found.upper)}"
     wide = "-" if found.range is None else f"{figure_of(found.range[0])} .. {figure_of(found.range[1])}"
-    unit = "" if found.unit == "1" else found.unit
     value = figure_of(near_zero(found.value, *found.bounds))
-    numbers = [value, figure_of(found.sd, 2), interval, wide, unit, figure_of(found.start)]
+    numbers = [value, figure_of(found.sd, 2), interval, wide, found.unit, figure_of(found.start)]
     return [name, *numbers, found.trust, found.reason]
 
 

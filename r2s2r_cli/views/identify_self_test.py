@@ -21,6 +21,5 @@ def self_test_tables(report: SelfTestReport) -> Iterator[PageTable]:
 
 def _row(found: Recovered) -> list[str]:
     covered = "-" if found.coverage is None else f"{found.coverage:.0%}"
-    unit = "" if found.unit == "1" else found.unit
     sizes = [f"{found.bias:+.2g}", figure_of(found.rmse, 2), figure_of(found.sd_reported, 2)]
-    return [unit, *sizes, covered, f"{found.identifiable:.0%}"]
+    return [found.unit, *sizes, covered, f"{found.identifiable:.0%}"]

@@ -42,7 +42,13 @@ def words(column: np.ndarray) -> list[str]:
 def told(behaviour: str, value: float) -> str:
     """A reward with its unit; of a user's behaviour the bare number."""
     unit, factor = _UNITS.get(behaviour, ("", 1.0))
-    return f"{factor * value:.0f} {unit}" if unit else f"{value:.3g}"
+    return f"{factor * value:z.0f} {unit}" if unit else f"{value:.3g}"
+
+
+def signed(value: float, digits: int = 0) -> str:
+    """With its sign, but for what rounds to nothing: no robot turns by `-0`."""
+    text = f"{value:+z.{digits}f}"
+    return text.removeprefix("+") if not text.strip("+0.") else text
 
 
 def _above(data: ArtifactData, names: list[str], robot: Robot, *, steps: bool) -> bytes:

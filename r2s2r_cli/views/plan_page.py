@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.views.page import Page, PageTable, Picture, counted
-from r2s2r_cli.views.plan import told
+from r2s2r_cli.views.plan import signed, told
 from r2s2r_cli.views.simulation_playback import playback_page
 from schemas.results_plan import GaitFigures, PlanReport, PolicyFigures
 from schemas.robot import Robot
@@ -17,7 +17,8 @@ def report_tables(report: PlanReport) -> Iterator[PageTable]:
     """The gaits of every behaviour by score, the long policies, and what the search took."""
     pairs = report.pairs
     yield PageTable(
-        f"gaits: reward over {pairs} pairs of drawn numbers ({report.draws} draws) and start poses",
+        f"gaits: reward over {pairs} pairs of drawn numbers ({report.draws} draws) and start poses; shapes: a digit a "
+        "motor, 1: its cable long, 0: short",
         ["name", "shapes", "best numbers", "mean", "sd", "score", "came back", "x, y [mm]", "turned [deg]", "time [s]"],
         [_gait(one, pairs) for one in report.gaits],
     )
@@ -61,8 +62,8 @@ def _gait(one: GaitFigures, pairs: int) -> list[str]:
     x, y = one.shift_m
     return [
         one.name, " ".join(one.shapes), of(one.nominal), of(one.mean), of(one.sd), of(one.score),
-        f"{round(one.worked * pairs)} of {pairs}", f"{1e3 * x:+.0f}, {1e3 * y:+.0f}",
-        f"{math.degrees(one.turn_rad):+.0f}", f"{one.duration_s:.1f}",
+        f"{round(one.worked * pairs)} of {pairs}", f"{signed(1e3 * x)}, {signed(1e3 * y)}",
+        signed(math.degrees(one.turn_rad)), f"{one.duration_s:.1f}",
     ]  # fmt: skip
 
 
@@ -76,8 +77,8 @@ def _policy(one: PolicyFigures) -> list[str]:
     (ex, ey), (x, y), (sx, sy) = one.expected_m, one.shift_m, one.shift_sd_m
     shortcuts = f"{one.shortcuts} (-{counted(one.saved, 'target')})" if one.shortcuts else "0"
     return [
-        one.name, str(one.targets), shortcuts, f"{ex:+.2f}, {ey:+.2f}",
-        f"{math.degrees(one.expected_turn_rad):+.0f}", f"{x:+.2f} +- {sx:.2f}, {y:+.2f} +- {sy:.2f}",
-        f"{math.degrees(one.turn_rad):+.0f} +- {math.degrees(one.turn_sd_rad):.0f}", f"{one.worked:.0%}",
+        one.name, str(one.targets), shortcuts, f"{signed(ex, 2)}, {signed(ey, 2)}",
+        signed(math.degrees(one.expected_turn_rad)), f"{signed(x, 2)} +- {sx:.2f}, {signed(y, 2)} +- {sy:.2f}",
+        f"{signed(math.degrees(one.turn_rad))} +- {math.degrees(one.turn_sd_rad):.0f}", f"{one.worked:.0%}",
         f"{one.duration_s:.0f}", " ".join(one.gaits),
     ]  # fmt: skip

@@ -123,15 +123,16 @@ def test_the_tables_of_the_paper() -> None:
     one, two = table_one(said.repeatability), table_two(said, 1)
     assert one.columns == ["metric", "arching"]
     assert one.rows[0] == ["end CoM position (m)", "[-1.140 ± 0.020, 0.290 ± 0.050]"]
-    assert one.rows[1] == ["end orientation (radian)", "0.136 ± 0.070"]
-    assert list(two.columns) == ["metric", "CoM [m], straight", "CoM [m], turn", "all runs [m]", "turn [rad], straight",
-                                 "turn [rad], turn", "all runs [rad]"]  # fmt: skip
+    assert one.rows[1] == ["end orientation (degree)", "7.8 ± 4.0"]
+    assert list(two.columns) == ["metric", "CoM [m], straight", "CoM [m], turn", "all runs [m]", "turn [deg], straight",
+                                 "turn [deg], turn", "all runs [deg]"]  # fmt: skip
     assert [row[0] for row in two.rows] == ["real robot", "initial simulation", "refined simulation", "initial error",
                                             "refined error", "floor"]  # fmt: skip
     assert two.rows[0][1] == "[-0.970, 0.400]"
     assert two.rows[3][1:4] == ["0.160", "0.160", "0.080 (0.040 to 0.160)"]
     assert two.rows[4][1] == f"0.160 {TRAINED}"
     assert two.rows[5][3] == "0.004"
+    assert two.rows[0][4] == "17.8" and two.rows[3][4] == "5.2"  # 0.31 and 0.09 rad
     assert all(len(row) == len(two.columns) for row in two.rows)
 
 

@@ -10,6 +10,7 @@ from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.stages.floor import Numerics, floor
 from r2s2r_cli.views.floor import draw_floor, floor_page, floor_tables, repeats_drawn
 from r2s2r_cli.views.record_page import plan_table, record_page, report_tables
+from schemas.results_floor import CapFloor, FloorReport
 from schemas.results_record import CameraCounts, RecordReport, RecordRun
 from tests.support.builders import floor as built_floor, png, robot
 
@@ -60,6 +61,14 @@ def test_the_floor_is_drawn_whatever_parts_it_has() -> None:
     for names in (("caps", "lengths", "numerics"), ("caps",), ("lengths",), ("numerics",)):
         part = ArtifactData("floor", {name: data.groups[name] for name in names})
         assert draw_floor(part).startswith(b"\x89PNG")
+
+
+def test_a_floor_says_how_its_counts_go_together() -> None:
+    """8 intervals in 3 phases are 5 comparisons: beside the warning that there are few of them."""
+    caps = CapFloor(floor_m=0.004, sensor_m=0.001, repeatability_m=0.0039, contrasts=5, phases=3, repeats=8, basis="b")
+    (table,) = floor_tables(FloorReport.model_construct(runs=(), caps=caps, lengths=None, numerics=None))
+    told = "8 intervals in 3 phases, so 5 comparisons (in each phase one fewer than its intervals): b"
+    assert dict(table.rows)["from"] == told
 
 
 def test_the_page_of_a_floor_says_its_numbers() -> None:

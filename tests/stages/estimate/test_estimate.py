@@ -12,6 +12,7 @@ from r2s2r_cli.errors import ArtifactError, InputError, NumericalError, R2S2RErr
 from r2s2r_cli.stages.estimate import estimate
 from r2s2r_cli.stages.estimate.rigid import rotate
 from r2s2r_cli.stages.estimate.smooth import JUMP, OUTLIER, chi2_quantile
+from r2s2r_cli.views.estimate_page import report_tables
 from schemas.base import DIM_SIZES
 from schemas.estimate import ESTIMATE, EstimateSettings
 from schemas.results_estimate import EstimateReport
@@ -220,6 +221,8 @@ def test_real_crawl_ground_noise_and_rods(crawl: tuple[ArtifactData, EstimateRep
     noise = np.array([cap.noise_sd_m for cap in run.caps])
     assert 0.0005 < noise.min() < noise.max() < 0.004
     assert [cap.cap for cap in run.caps if any(cap.held)] == [5]
+    table = next(one for one in report_tables(report) if "end caps" in one.title)
+    assert [row[0] for row in table.rows if "*" in row[1]] == ["5"] and "; * the source held this axis" in table.title
 
 
 def test_real_crawl_marks_the_jumps_of_its_tracker(crawl: tuple[ArtifactData, EstimateReport]) -> None:

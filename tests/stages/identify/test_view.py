@@ -108,6 +108,7 @@ def test_a_parameter_that_is_not_identifiable_has_no_interval() -> None:
     table = next(iter(report_tables(report(builders.identification(repeating=True)))))
     row = dict(zip(table.columns, next(row for row in table.rows if row[0] == "restitution"), strict=True))
     assert (row["sd"], row["95 % interval"], row["range"]) == ("-", "-", "-")
+    assert row["unit"] == "1"  # a blank cell would say that nobody knows it
     assert row["trust"] == "not identifiable" and row["why"] == "zero sensitivity: no cap bounced"
     first = dict(zip(table.columns, table.rows[0], strict=True))
     assert first["95 % interval"] == "0.7804 .. 0.8196"
@@ -259,6 +260,6 @@ def test_the_self_test_as_a_table() -> None:
     found = SelfTestReport(cases=(case,) * 20, parameters={"friction": sure, "damping": never}, noise_m=0.001,
                            converged=0.95, seed=0)  # fmt: skip
     (table,) = self_test_tables(found)
-    assert table.rows == [["friction", "", "-0.002", "0.01", "0.011", "95%", "100%"],
+    assert table.rows == [["friction", "1", "-0.002", "0.01", "0.011", "95%", "100%"],
                           ["damping", "N s/m", "+0.5", "1", "-", "-", "0%"]]  # fmt: skip
     assert table.title == "self-test, simulated: 20 planted robots, noise 1.0 mm, 95% converged"

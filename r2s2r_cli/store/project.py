@@ -124,7 +124,7 @@ class Project:
         if create:
             wanted = f"{following}, which is the next, or one before it" if existing else "1, the first"
             raise UsageError(f"iteration {number} is not the next one", where="--iteration", expected=wanted,
-                             received=str(number), hint="r2s2r status")  # fmt: skip
+                             received=str(number), hint=f"--iteration {following}")  # fmt: skip
         known = ", ".join(str(i.number) for i in existing) or "none yet"
         raise UsageError(f"iteration {number} does not exist", where="--iteration", expected=f"one of: {known}",
                          received=str(number), hint="r2s2r status")  # fmt: skip

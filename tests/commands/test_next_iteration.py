@@ -25,11 +25,12 @@ CREATING = {
 @pytest.mark.parametrize("command", CREATING)
 @pytest.mark.parametrize("dry", [(), ("--dry-run",)])
 def test_a_number_that_skips_some_is_refused(estimated: Path, command: str, dry: tuple[str, ...]) -> None:
-    """Exit code 2 with the number that comes next, in a dry run as well; nothing is made."""
+    """Exit code 2 and the command with the number that comes next, in a dry run as well; nothing is made."""
     result = invoke(command, *CREATING[command], "--iteration", "99", *dry)
     assert result.exit_code == 2, result.stderr
     assert "iteration 99 is not the next one\n  where: --iteration\n  expected: 2, which is the next" in result.stderr
-    assert "received: 99\nhint: r2s2r status" in result.stderr
+    mended = " ".join(["r2s2r", command, *CREATING[command], "--iteration", "2", *dry])
+    assert f"received: 99\nhint: {mended}\n" in result.stderr
     assert [path.name for path in (estimated / "iterations").iterdir()] == ["001"]
 
 

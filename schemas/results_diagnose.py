@@ -212,6 +212,8 @@ class DiagnoseReport(Frozen):
     """What the logs say against each other, strongest first, in words."""
     parity_sd: tuple[float, ...] = ()
     """How far each of these stands out [sd]; none before this was noted."""
+    parity_effects: tuple[str, ...] = ()
+    """The effect that each of these speaks for most, empty: for none; none before this was noted."""
     missing: tuple[str, ...]
     refit: dict[str, tuple[float, float]]
     """Nuisances of the refit nominal model: value and sd."""

@@ -57,7 +57,18 @@ def loud_words(report: DiagnoseReport) -> str:
     loud = [text for text, sd in zip(report.parity, report.parity_sd, strict=False) if abs(sd) > LOUD_SD]
     if report.verdict not in ("ambiguous", "no_gap") or not loud:
         return ""
-    return f"Yet the logs by themselves stand out by more than {LOUD_SD:g} sd: {'; '.join(loud)}."
+    return f"Yet the logs by themselves stand out by more than {LOUD_SD:g} sd: {'; '.join(loud)}.{_no_help(report)}"
+
+
+def _no_help(report: DiagnoseReport) -> str:
+    """Of what the loud findings speak for, what the replay gains nothing by: else one would simulate it next."""
+    of = zip(report.parity_effects, report.parity_sd, strict=False)
+    loud = {effect for effect, sd in of if abs(sd) > LOUD_SD}
+    gains = {one.effect: one.elpd_gain if one.marginal_nats is None else one.marginal_nats
+             for one in report.ranking if one.effect in loud and one.fitted}  # fmt: skip
+    idle = [f"{effect} ({gain:+z.1f} nats)" for effect, gain in gains.items() if gain <= 0.0]
+    said = f" Simulating it does not help: the runs are predicted no better with {', nor with '.join(idle)}."
+    return said if idle else ""
 
 
 def commits(report: DiagnoseReport) -> bool:

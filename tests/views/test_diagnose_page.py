@@ -168,3 +168,23 @@ def test_what_the_logs_shout_is_beneath_a_sentence_that_names_nothing(verdict: s
     assert ("<p>Yet the logs by themselves" in page) == said
     loud = loud_words(made)
     assert loud == (f"Yet the logs by themselves stand out by more than 4 sd: {parity[0]}." if said else "")
+
+
+@pytest.mark.parametrize(
+    ("gain", "fitted", "sd", "said"),
+    [(-1.2, True, 6.0, True), (0.0, True, 6.0, True), (3.0, True, 6.0, False), (0.0, False, 6.0, False),
+     (-1.2, True, 3.8, False)],
+)  # fmt: skip
+def test_what_the_logs_shout_and_the_replay_gains_nothing_by_is_said(
+    gain: float, fitted: bool, sd: float, said: bool
+) -> None:
+    """Only of an effect that was simulated, and whose finding is told: to identify with it would be in vain."""
+    none = report().ranking[-1]
+    other = none.model_copy(update={"effect": "sensor_bias", "marginal_nats": gain, "fitted": fitted})
+    made = report().model_copy(update={
+        "verdict": "ambiguous", "ranking": (none, other), "parity": ("sensor 0 reads too long", "rods turn"),
+        "parity_sd": (sd, 9.0), "parity_effects": ("sensor_bias", ""),
+    })  # fmt: skip
+    words = f" Simulating it does not help: the runs are predicted no better with sensor_bias ({gain:+.1f} nats)."
+    assert loud_words(made).endswith(words) == said
+    assert ("Simulating" in loud_words(made)) == said

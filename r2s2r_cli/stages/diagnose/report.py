@@ -51,8 +51,9 @@ def diagnose_report(found: Diagnosis) -> DiagnoseReport:
         gap_nats=_known(which.left.refit), left_nats=_known(which.left.best), left_sd_nats=_known(which.left.sd),
         stranger_sd2=None if which.stranger is None else which.stranger.left,
         calibrated=which.calibrated, left_out=which.within, segments=_segments(found),
-        hidden=tuple(shift.words for shift in which.shifts), parity=tuple(words for words, _ in told),
-        parity_sd=tuple(sd for _, sd in told), missing=_missing(found),
+        hidden=tuple(shift.words for shift in which.shifts), parity=tuple(words for words, _, _ in told),
+        parity_sd=tuple(sd for _, sd, _ in told), parity_effects=tuple(effect for _, _, effect in told),
+        missing=_missing(found),
         refit=found.refit, refit_units={name: _unit(name) for name in found.refit}, rollouts=found.rollouts,
         within_run=found.within_run, warnings=found.warnings,
     )  # fmt: skip
@@ -126,10 +127,11 @@ def _segments(found: Diagnosis) -> tuple[SegmentFound, ...]:
     )  # fmt: skip
 
 
-def _parity(found: Diagnosis) -> list[tuple[str, float]]:
-    """The findings that are told: in words, and how far each stands out [sd]."""
+def _parity(found: Diagnosis) -> list[tuple[str, float, str]]:
+    """The findings that are told: in words, how far each stands out [sd], and the effect it speaks for most."""
     told = () if found.parity is None else found.parity.significant[:FINDINGS]
-    return [(f"{one.what} ({one.z:+.1f} sd)", float(np.clip(one.z, -MOST_SD, MOST_SD))) for one in told]
+    return [(f"{one.what} ({one.z:+.1f} sd)", float(np.clip(one.z, -MOST_SD, MOST_SD)),
+             one.suspicions[0].effect if one.suspicions else "") for one in told]  # fmt: skip
 
 
 def _missing(found: Diagnosis) -> tuple[str, ...]:

@@ -20,8 +20,8 @@ def said(check: str, value: float, *, knock: object = None, healthy: bool = Fals
     base = SimpleNamespace(of={key: Measured(0.0, 0.001)}) if healthy else None
     made = finding_of(key, Measured(value, 0.01), base, SimpleNamespace(gain={}, knock=knock))  # type: ignore[arg-type]
     assert made is not None
-    ((words, sd),) = _parity(SimpleNamespace(parity=SimpleNamespace(significant=[replace(made, z=3.0)])))  # type: ignore[arg-type]
-    assert sd == 3.0
+    ((words, sd, effect),) = _parity(SimpleNamespace(parity=SimpleNamespace(significant=[replace(made, z=3.0)])))  # type: ignore[arg-type]
+    assert sd == 3.0 and effect == (made.suspicions[0].effect if made.suspicions else "")
     return words
 
 

@@ -67,7 +67,7 @@ def test_people_get_one_block_a_finding_and_a_summary(estimated: Path) -> None:
         "  received: 1.5 at row 9, cable 2",
         "  hint:     write targets in the source as positions 0 .. 1, then run the stage again",
         "",
-        "1 file, 1 check: 1 error, 0 warnings, 0 advice",
+        "1 file, 1 kind of check: 1 error, 0 warnings, 0 advice",
     ]
     assert result.stderr.splitlines()[0] == "error: 1 error in 1 of 1 files"
     assert result.stderr.splitlines()[-1].startswith("hint: ")

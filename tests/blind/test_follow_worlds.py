@@ -225,5 +225,5 @@ def test_logs_that_were_changed_are_not_followed(trial: Path, tmp_path: Path) ->
                         str(trial / "a.key"), "--out", str(tmp_path / "out"), "--json", "--quiet")  # fmt: skip
     finally:
         path.write_text(text)
-    assert result.exit_code == 4 and "closed with" in json.loads(result.stdout)["received"]
+    assert result.exit_code == 4 and "closed with" in json.loads(result.stdout)["what"]
     assert not list((tmp_path / "out").rglob("*.csv"))

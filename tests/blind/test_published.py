@@ -178,7 +178,8 @@ LEFT_OUT = {
     ("PublishedNext", "NextGaitFound"): {"file", "targets", "candidates"},
     ("PublishedDiagnosis", "DiagnoseReport"): {
         "iteration", "free_iteration", "robot", "floor_from", "floor_given", "left_out", "segments", "hidden",
-        "missing", "parity_effects", "parity_sd", "refit", "refit_units", "rollouts", "within_run", "wall_s", "seconds", "warnings",
+        "missing", "parity_effects", "parity_sd", "refit", "refit_units", "rollouts", "within_run",
+        "wall_s", "seconds", "warnings",
     },
 }  # fmt: skip
 """Of what a diagnosis says, by the model of the published file: nothing that is scored, calibrated or asked about."""

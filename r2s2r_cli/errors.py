@@ -71,6 +71,11 @@ class R2S2RError(Exception):
         self.received = received
         self.hint = hint
 
+    @property
+    def facts(self) -> dict[str, str]:
+        """What it is made from, by keyword: on its way between processes it is made again of them."""
+        return {name: getattr(self, name) for name in ("what", "where", "expected", "received", "hint")}
+
     def lines(self) -> list[str]:
         """The message as it is printed, one fact a line, without the leading `error:`."""
         facts = [("where", self.where), ("expected", self.expected), ("received", self.received)]

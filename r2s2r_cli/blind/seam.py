@@ -119,8 +119,7 @@ def _held(work: Callable[[Item], Result], item: Item) -> Result | _Broken:
     try:
         return work(item)
     except R2S2RError as error:
-        names = ("what", "where", "expected", "received", "hint")
-        return _Broken(type(error), {name: getattr(error, name) for name in names})
+        return _Broken(type(error), error.facts)
 
 
 def _dask(spec: str) -> tuple[Executor, Callable[[], None]]:

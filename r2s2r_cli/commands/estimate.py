@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from enum import StrEnum
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -76,8 +77,10 @@ def estimate(
         return
     executed = of is Of.EXECUTE
     source = place.artifact("recording", executed=executed)
-    first = f"r2s2r execute --iteration {place.number}" if executed else here.first_data(place)
-    if not executed and place.artifact("recording", executed=True).exists():  # an iteration after the first
+    first: str | Callable[[], str] = partial(here.first_data, place)
+    if executed:
+        first = f"r2s2r execute --iteration {place.number}"
+    elif place.artifact("recording", executed=True).exists():  # an iteration after the first
         first = f"r2s2r estimate --of execute --iteration {place.number}"
     require_input(source, first)
     header = whole_header(source)

@@ -7,7 +7,7 @@ import os
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,7 +75,7 @@ class Asked:
         found = [*main, *(one for part in others.values() for one in part)]
         for one in found:
             number, of = one.place.number, " --of execute" * one.executed
-            require_input(one.recording, self.project.first_data(one.place))
+            require_input(one.recording, partial(self.project.first_data, one.place))
             require_input(one.estimate, f"r2s2r estimate --iteration {number}{of}")
         return tuple(found)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -37,15 +37,16 @@ def show_outcome(result: StageResult, console: Console) -> None:
             console.say(f"  from {path}")
 
 
-def require_input(path: Path, command: str) -> None:
-    """Raises ArtifactError where the stage before has not run."""
+def require_input(path: Path, command: str | Callable[[], str]) -> None:
+    """Raises ArtifactError where the stage before has not run. command: that makes it; asked for only then, where
+    finding it takes a look at the folder."""
     if not path.exists():
         raise ArtifactError(
             "the artifact of the stage before is missing",
             where=str(path),
             expected=path.name,
             received="nothing",
-            hint=command,
+            hint=command if isinstance(command, str) else command(),
         )
 
 

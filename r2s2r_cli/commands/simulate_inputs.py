@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -149,7 +149,7 @@ class Asked:
         if estimate.exists():
             return estimate
         recording = self.iteration.artifact("recording")
-        require_input(recording, self.project.first_data(self.iteration))
+        require_input(recording, partial(self.project.first_data, self.iteration))
         return recording
 
     @cached_property

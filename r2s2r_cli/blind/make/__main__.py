@@ -79,8 +79,7 @@ def _told(names: Callable[[], Iterator[str]], count: int) -> int:
             sys.stdout.flush()
     except R2S2RError as error:
         # Whoever started this process says it in its own name.
-        facts = {name: getattr(error, name) for name in ("what", "where", "expected", "received", "hint")}
-        sys.stdout.write(json.dumps({"error": facts}) + "\n")
+        sys.stdout.write(json.dumps({"error": error.facts}) + "\n")
         return int(error.exit_code)
     except KeyboardInterrupt:
         return 130

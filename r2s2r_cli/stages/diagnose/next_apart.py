@@ -36,7 +36,7 @@ def apart(arena: Arena, whole: Stretch, fits: Sequence[Fit]) -> np.ndarray:
     `whole`, whose frames alone count. fits: most probable first; the refit nominal model, where it is one of them, is
     where derivatives by the nuisances are taken."""
     solver = Fits(arena)
-    p, drawn = len(arena.engine), drawn_nuisances(arena)
+    p = len(arena.engine)
     middle = next((fit for fit in fits if not fit.hypothesis.parts), fits[0])
     by = SECANT * np.array([arena.model.numbers[k].sd for k in arena.engine])
     moved = np.clip(middle.z[:p] + np.where(middle.z[:p] + by > arena.upper[:p], -by, by), arena.lower[:p], None)
@@ -44,9 +44,8 @@ def apart(arena: Arena, whole: Stretch, fits: Sequence[Fit]) -> np.ndarray:
     around[np.arange(p), np.arange(p)] = moved
     rows, places, at = [], [], 0
     for fit in fits:  # of each: where it stands, its own numbers moved, its nuisances drawn
-        sizes, count = _sizes(fit), len(fit.x)
-        z = np.repeat(fit.z[None], 1 + count + len(drawn), axis=0)
-        z[1 + count :, :p] = np.clip(fit.z[:p] + drawn, arena.lower[:p], arena.upper[:p])
+        sizes, count, drawn = _sizes(fit), len(fit.x), drawn_about(arena, fit)
+        z = np.concatenate([np.repeat(fit.z[None], 1 + count, axis=0), drawn])
         rows.append(solver.values(fit.hypothesis, z, np.concatenate([sizes, np.repeat(fit.x[None], len(drawn), 0)])))
         places.append((at, slice(at + 1, at + 1 + count), slice(at + 1 + count, at + len(z))))
         at += len(z)
@@ -68,7 +67,7 @@ def apart(arena: Arena, whole: Stretch, fits: Sequence[Fit]) -> np.ndarray:
         prior[:p, :p] = arena.precision[:p, :p]
         prior[range(p, len(prior)), range(p, len(prior))] = (PRIOR_SCALES * fit.hypothesis.stack("scale")) ** -2.0
         costs.append(left([truth - one[own] for truth, one in zip(truths, seen, strict=True)], columns, prior))
-    nats = np.mean(np.array(costs).reshape(len(fits), len(fits), len(drawn)), axis=2).T
+    nats = np.mean(np.array(costs).reshape(len(fits), len(fits), 2 * PAIRS), axis=2).T
     return np.asarray(nats - np.diag(nats)[:, None])
 
 
@@ -91,13 +90,15 @@ def left(difference: Sequence[np.ndarray], columns: Sequence[np.ndarray], prior:
     return best
 
 
-def drawn_nuisances(arena: Arena) -> np.ndarray:
-    """What nuisances of the engine are off by, (draw, p): SECANT of what is known of them before today's runs.
-    The same ones for all policies, which are compared."""
+def drawn_about(arena: Arena, fit: Fit) -> np.ndarray:
+    """Nuisances (draw, p + q) about those of a fit, within their bounds: those of the engine are off by SECANT of what
+    is known of them before today's runs. The same draws for all policies, which are compared."""
     p = len(arena.engine)
     root = np.linalg.cholesky(np.linalg.inv(arena.precision)[:p, :p])
     one = SECANT * np.random.default_rng(0).standard_normal((PAIRS, p)) @ root.T
-    return np.concatenate([one, -one])
+    found = np.repeat(fit.z[None], 2 * PAIRS, axis=0)
+    found[:, :p] = np.clip(fit.z[:p] + np.concatenate([one, -one]), arena.lower[:p], arena.upper[:p])
+    return found
 
 
 def _sizes(fit: Fit) -> np.ndarray:

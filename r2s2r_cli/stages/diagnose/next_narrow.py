@@ -14,11 +14,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from r2s2r_cli.stages.diagnose.imagined import LONGEST, Targets, ends, imagined
-from r2s2r_cli.stages.diagnose.next_apart import drawn_nuisances, pieces_at
+from r2s2r_cli.stages.diagnose.next_apart import drawn_about, pieces_at
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
+from r2s2r_cli.stages.measures.keyframes import frame_rmse
 
 LEAST_WAY = 0.25
 """Share of the fitted intervals in which the robot moves less than it must in one that counts."""
@@ -37,8 +38,7 @@ def narrowest(arena: Arena, base: Fit, gaits: Mapping[str, Targets], floor_m: fl
 def ways(arena: Arena, base: Fit, many: Sequence[Stretch]) -> np.ndarray:
     """How far the caps move in stretches, as the refit nominal model has it: root mean square [m], (stretch,)."""
     values = Fits(arena).values(base.hypothesis, base.z[None], base.x[None])
-    seen = arena.replayer.seen(many, values)
-    return np.array([float(_rms(one.caps[0, -1] - one.caps[0, 0])) for one in seen])
+    return _moved([one.caps for one in arena.replayer.seen(many, values)])
 
 
 def ends_off(arena: Arena, base: Fit, targets: Targets, *, name: str, least_m: float) -> np.ndarray:
@@ -48,17 +48,17 @@ def ends_off(arena: Arena, base: Fit, targets: Targets, *, name: str, least_m: f
     policy, like = targets[:LONGEST], arena.many[0]
     whole = imagined(arena, policy, like=like, name=name)
     edges = sorted({min(edge, len(whole.t)) for edge in ends(arena, whole, like, policy)})
-    p, drawn = len(arena.engine), drawn_nuisances(arena)
-    z = np.repeat(base.z[None], 1 + len(drawn), axis=0)
-    z[1:, :p] = np.clip(base.z[:p] + drawn, arena.lower[:p], arena.upper[:p])
+    drawn = drawn_about(arena, base)
+    z = np.concatenate([base.z[None], drawn])
     values = Fits(arena).values(base.hypothesis, z, np.repeat(base.x[None], len(z), axis=0))
     many = pieces_at(arena, whole, values[0], edges)
     caps = [sight.caps for sight in arena.replayer.seen(many, values)]
-    off = np.array([float(np.nan_to_num(_rms(one[1:, -1] - one[:1, -1]), nan=np.inf).max()) for one in caps])
-    way = np.array([float(_rms(one[0, -1] - one[0, 0])) for one in caps])
-    return np.where(way >= least_m, off, np.inf)
+    last = np.array([one[:, -1] for one in caps])  # (interval, draw, cap, 3), without a draw first
+    off = frame_rmse(np.repeat(last[:, :1], len(drawn), axis=1), last[:, 1:])
+    off = np.nan_to_num(off, nan=np.inf).max(axis=1)
+    return np.where(_moved(caps) >= least_m, off, np.inf)
 
 
-def _rms(way: np.ndarray) -> np.ndarray:
-    """Over the caps, of (..., cap, 3)."""
-    return np.asarray(np.sqrt(np.mean(np.sum(way**2, axis=-1), axis=-1)))
+def _moved(caps: Sequence[np.ndarray]) -> np.ndarray:
+    """Of stretches, the first row of each (k, F, cap, 3) [m], (stretch,)."""
+    return frame_rmse(np.array([one[0, 0] for one in caps]), np.array([one[0, -1] for one in caps]))

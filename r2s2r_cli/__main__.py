@@ -19,11 +19,13 @@ def main() -> None:
     """Load the app and run it. Ctrl-C and SIGTERM count as an interrupt from the first moment to the last, without
     a traceback.
 
-    Matrices are small here: threads of BLAS cost more than they bring (48 s of processor time instead of 39 s for one
-    diagnosis, and ten times as long where other programs want the cores too). The engine has its own.
+    Matrices are small here: threads of BLAS and torch cost more than they bring (48 s of processor time instead of 39 s
+    for one diagnosis by those of BLAS, 3.4 s become 8.5 s for its probes by those of torch, and ten times as long where
+    other programs want the cores too), and sums would depend on how many there are. The engine has its own.
     """
     sys.unraisablehook = again(sys.unraisablehook)
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     try:
         early: list[int] = []
         for number in (signal.SIGINT, signal.SIGTERM):

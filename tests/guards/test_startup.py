@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -80,3 +81,14 @@ def test_light_commands_are_light(project: Path) -> None:
     found = heavy(project, "--version", "status", "status --json", "validate")
     assert list(found) == ["validate"]
     assert "h5py" in found["validate"]
+
+
+def test_torch_has_one_thread_where_nobody_asks_for_more(tmp_path: Path) -> None:
+    """Whatever the machine has: sums, and so artifacts, do not depend on it."""
+    code = PROBE + "import os, torch; print(torch.get_num_threads(), os.environ['OPENBLAS_NUM_THREADS'])"
+    own = {name: value for name, value in os.environ.items() if name != "OMP_NUM_THREADS"}
+    done = subprocess.run(
+        [sys.executable, "-c", code, '[["--version"]]'], cwd=tmp_path, capture_output=True, text=True, check=True,
+        env={**own, "OPENBLAS_NUM_THREADS": "3"},
+    )  # fmt: skip
+    assert done.stdout.split()[-2:] == ["1", "3"]

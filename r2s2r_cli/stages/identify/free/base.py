@@ -8,6 +8,9 @@ from enum import StrEnum
 
 import numpy as np
 
+FAR = 700.0
+"""Coordinate of a bound that lies at infinity, and beyond: next to it floats have no other value than the bound."""
+
 
 class Coordinate(StrEnum):
     """How a number x in (lower, upper) becomes a coordinate z that an optimiser moves freely."""
@@ -38,10 +41,12 @@ class Free:
     what: str = ""
 
     def to_z(self, value: float) -> float:
-        """The coordinate of a value strictly inside the bounds (or on them, where the coordinate is not LOGIT)."""
+        """The coordinate of a value inside the bounds or on them."""
         if self.coordinate is Coordinate.LOG:
-            return math.log(value)
+            return math.log(value) if value > 0 else -FAR
         if self.coordinate is Coordinate.LOGIT:
+            if not self.lower < value < self.upper:
+                return -FAR if value <= self.lower else FAR
             return math.log((value - self.lower) / (self.upper - value))
         return value
 
@@ -50,7 +55,8 @@ class Free:
         if self.coordinate is Coordinate.LOG:
             return math.exp(z)
         if self.coordinate is Coordinate.LOGIT:
-            return self.lower + (self.upper - self.lower) / (1.0 + math.exp(-z))
+            # A fit whose data ask for more than a bound allows goes ever further: its exponential would overflow.
+            return self.lower if z < -FAR else self.lower + (self.upper - self.lower) / (1.0 + math.exp(-z))
         return z
 
     def slope(self, z: float) -> float:
@@ -58,6 +64,8 @@ class Free:
         if self.coordinate is Coordinate.LOG:
             return math.exp(z)
         if self.coordinate is Coordinate.LOGIT:
+            if z < -FAR:
+                return 0.0
             share = 1.0 / (1.0 + math.exp(-z))
             return (self.upper - self.lower) * share * (1.0 - share)
         return 1.0

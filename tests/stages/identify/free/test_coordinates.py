@@ -50,3 +50,15 @@ def test_all_coordinates_of_the_catalogue_at_once() -> None:
     slopes = slopes_of(frees, z)
     assert np.isfinite(slopes).all()
     assert (slopes > 0).all()
+
+
+def test_a_number_that_went_to_its_bound_comes_back() -> None:
+    """However far a fit goes beyond what floats tell from a bound: the value is the bound, and has a coordinate."""
+    one = free(Coordinate.LOGIT)
+    for z, bound in ((-1e9, 0.2), (-800.0, 0.2), (800.0, 1.4), (1e9, 1.4)):
+        assert one.from_z(z) == bound
+        assert one.slope(z) == 0.0
+        assert one.from_z(one.to_z(bound)) == bound
+    none = Free("x", "1", 0.5, 0.0, 1.4, Coordinate.LOG)
+    assert none.from_z(-1e9) == 0.0
+    assert none.from_z(none.to_z(0.0)) == pytest.approx(0.0, abs=1e-300)

@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import least_squares, lsq_linear
 
 from r2s2r_cli.errors import NumericalError
+from r2s2r_cli.stages.identify.free import Coordinate, Free, slopes_of, values_of
 from r2s2r_cli.stages.identify.solve.levenberg import levenberg_marquardt
 from r2s2r_cli.stages.identify.solve.loss import LOSSES, Huber, StudentT
 from r2s2r_cli.stages.identify.solve.record import Reason
@@ -221,3 +222,16 @@ def test_two_solves_give_the_same_bits() -> None:
     first, second = (levenberg_marquardt(decay(), DECAY_START, loss=StudentT()) for _ in range(2))
     for one in dataclasses.fields(first):
         np.testing.assert_array_equal(getattr(first, one.name), getattr(second, one.name))
+
+
+def test_data_that_ask_for_more_than_a_share_can_be() -> None:
+    """A logit has no end, and each step is further than the one before: the fit ends at the bound that data pull to."""
+    frees = (Free("x", "1", 0.3, 0.0, 1.0, Coordinate.LOGIT),)
+    for wanted, bound in ((-0.5, 0.0), (1.5, 1.0)):
+        problem = formula(
+            lambda z, wanted=wanted: 100.0 * (values_of(frees, z) - wanted) * np.arange(1.0, 4.0),
+            lambda z: 100.0 * slopes_of(frees, z) * np.arange(1.0, 4.0)[:, None],
+            1,
+        )
+        solution = levenberg_marquardt(problem, np.array([frees[0].to_z(0.3)]))
+        assert values_of(frees, solution.z)[0] == pytest.approx(bound, abs=1e-6)

@@ -68,8 +68,16 @@ class Task:
         asked = (*self.settings.free, *self.request.free)
         own = default_fixed(self.robot) if self.with_default else {}
         named = {name_of(spec.removeprefix(PLUS)).partition(".")[0] for spec in asked}
+        named |= self._free_before  # it is free again, and cannot be given as well
         mine = {name: value for name, value in own.items() if not {name, name.partition("_")[0]} & named}
         return {**mine, **self.request.fixed}
+
+    @property
+    def _free_before(self) -> set[str]:
+        """Names that were free in the identification which is gone on from."""
+        from r2s2r_cli.stages.identify.online import specs_of
+
+        return set() if self.request.before is None else {*specs_of(self.request.before)}
 
     def predictor(self, frees: Sequence[Free]) -> Predictor:
         """The engine with these free numbers, those that were given, and the effects that were asked for."""

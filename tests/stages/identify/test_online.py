@@ -22,6 +22,7 @@ from r2s2r_cli.stages.identify.online import (
     by_run,
     drift_of,
     drifted,
+    first_free,
     known_of,
     learned,
     specs_of,
@@ -81,6 +82,20 @@ def test_what_was_free_is_free_again() -> None:
     speed, bounce = select(tuple(specs.values()), subject().robot)
     assert (speed.name, speed.start, speed.lower, speed.upper, speed.prior_sd) == ("motor_speed", 1.0, 0.1, 2.0, 0.3)
     assert (bounce.name, bounce.start, bounce.upper) == ("restitution", 0.3, 0.95)
+
+
+@pytest.mark.parametrize("name", ["damping", "damping_actuated"])
+def test_a_damping_that_was_free_is_free_again(name: str) -> None:
+    """And not given beside it, as it is with the default set: the same number would be free and fixed."""
+    free = select((f"{name}=4,1..40,~0.3", "friction"), subject().robot)
+    known = tuple(ParameterFound(one, one.start, 0.1, 3.0, 5.0, NAN, Trust.IDENTIFIED) for one in free)
+    before = identification(found(parameters=known, information=None, updates=(), starts=(), trace=(), profiles=()))
+    request = Request((Selection("line", (1,)),), online=True, before=before)
+    task = Task(subject().robot, (), request, IdentifySettings())
+    again = first_free(task)
+    assert {one.name for one in again} == {name, "friction"}
+    assert task.given == {}
+    assert task.predictor(again).mapping.names == tuple(one.name for one in again)
 
 
 def test_a_run_that_shows_nothing_changes_nothing_but_the_width() -> None:

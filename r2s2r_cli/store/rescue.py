@@ -6,6 +6,7 @@ import contextlib
 import glob
 import itertools
 import json
+import os
 import shutil
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -119,7 +120,8 @@ def _save(reader: IsolatedReader, source: Path, name: str, piece: Path) -> tuple
     except ArtifactError as error:
         return error.what, ""
     if "disk" in answer:
-        raise OSError(answer["disk"], "", str(piece))
+        # Without a file's name: the caller names the rescue, of which this piece is a part.
+        raise OSError(answer["disk"], os.strerror(answer["disk"]))
     return answer["problem"], answer["digest"]
 
 

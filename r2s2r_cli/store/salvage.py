@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from pathlib import Path
 from typing import Any
@@ -51,7 +52,8 @@ def _read_facts(file: h5py.File, found: Report) -> None:
 
 
 def save(path: str, dataset: str, target: str) -> Report:
-    """Write one dataset to `target` as a `.npy` file. `digest`: of what was read; `problem`: why it could not be."""
+    """Write one dataset to `target` as a `.npy` file. `digest`: of what was read; `problem`: why it could not be.
+    `disk`: number of the error, where it was read and `target` could not be written."""
     try:
         with h5py.File(path, "r", locking=False) as file:
             node = file[dataset]
@@ -59,13 +61,12 @@ def save(path: str, dataset: str, target: str) -> Report:
                 return {"digest": "", "problem": "a group stands in its place"}
             check_dataset(node)
             digest = dataset_digest(node)
-            with Path(target).open("wb") as out:
-                _write_npy(out, node)
+            try:
+                with Path(target).open("wb") as out:
+                    _write_npy(out, node)
+            except OSError as error:  # all of it was read for the digest: what fails now is the disk it is written to
+                return {"digest": "", "problem": "", "disk": error.errno or errno.EIO}
             return {"digest": digest, "problem": ""}
-    except OSError as error:
-        if error.errno is not None and error.filename is not None:  # the disk it is written to, not HDF5
-            return {"digest": "", "problem": "", "disk": error.errno}
-        return {"digest": "", "problem": meaning(error)}
     except Exception as error:
         return {"digest": "", "problem": meaning(error)}
 

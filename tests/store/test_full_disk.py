@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
+from r2s2r_cli.artifact import Group
 from r2s2r_cli.errors import ArtifactError
 from r2s2r_cli.store.hdf5_file import Sink, writable
 from r2s2r_cli.store.isolated import IsolatedReader
@@ -178,6 +179,22 @@ def test_recovering_without_space_loses_nothing(
     assert path.read_bytes() == bytes(damaged)
     assert all(name.startswith("recording.h5") for name in disk.names())
     assert not [name for name in disk.names() if name.endswith(".npz")]
+
+
+def test_a_dataset_that_the_disk_has_no_room_for_is_not_called_damaged(disk: SmallDisk, reader: IsolatedReader) -> None:
+    """Others fit and are read; a rescue without this one, which is whole, would say that its data are lost."""
+    path = disk.path / "simulation.h5"
+    data = simulation(10_000)
+    frames = {name: np.zeros_like(value) for name, value in data.groups["runs/walk/frames"].datasets.items()}
+    data.groups["runs/walk/frames"] = Group(frames)
+    write_artifact(path, data, provenance())
+    with h5py.File(path, "r+") as file:
+        file["runs/walk/policy/target"][0, 0] = 0.5
+    assert path.stat().st_size < disk.free() < frames["p_WE"].nbytes
+    with pytest.raises(ArtifactError, match="disk is full") as caught:
+        recover_file(path, reader)
+    assert caught.value.where == f"{path}.rescued.npz"
+    assert disk.names() == {"simulation.h5"}
 
 
 def test_the_sink_serves_hdf5_what_the_disk_refused(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ def require_current(project: Project, name: str, path: Path, header: Header) -> 
             received="; ".join(wrong[:3]) + (f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""),
             hint="r2s2r identify" + ("" if number is None else f" --iteration {number}"),
         )  # fmt: skip
-    if not path.resolve().is_relative_to(project.root):
+    if not path.resolve().is_relative_to(project.root.resolve()):
         return []  # of another project: its inputs are not here
     return [text for ref in made.inputs for text in input_reasons(project, ref)]
 
@@ -44,7 +44,7 @@ def learned_names(project: Project, model: Path, header: Header) -> dict[tuple[s
     What one from elsewhere learned from is here only where the recording or the estimate is the same: in another
     project others lie at the same places. In this one what was estimated anew still are the runs it learned from.
     """
-    foreign = not model.resolve().is_relative_to(project.root)
+    foreign = not model.resolve().is_relative_to(project.root.resolve())
     inputs = header.provenance.inputs
     here = {Path(ref.path).parent for ref in inputs if not foreign or not input_reasons(project, ref)}
     estimates = [ref for ref in inputs if ref.kind == "estimate"]

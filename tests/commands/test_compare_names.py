@@ -9,6 +9,7 @@ import pytest
 
 from r2s2r_cli.commands.compare import _show
 from r2s2r_cli.commands.compare_models import learned_names, require_current
+from r2s2r_cli.commands.wanted import robot_part
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.store.header import read_header
@@ -84,6 +85,19 @@ def test_runs_of_another_project_are_not_those_at_the_same_place(looped: Project
     ref = InputRef(path=name, kind="estimate", schema_version=1, sha256=same)
     found = learned_names(looped, elsewhere, header(looped.root, inputs=(ref,)))
     assert found == {(name, "sample"): "sample"}
+
+
+def test_a_project_that_is_named_by_a_link_is_the_same_one(looped: Project, tmp_path: Path) -> None:
+    """Its simulators are no other project's: they have learned from the runs here, and what changed since is said."""
+    (tmp_path / "link").symlink_to(looped.root, target_is_directory=True)
+    for project in (looped, Project.find(tmp_path / "link")):
+        path, made = model_of(project), header(project.root, "iterations/001/20-estimate.h5")
+        made = made.model_copy(
+            update={"provenance": made.provenance.model_copy(update={"robot": robot_part("identify", project.robot())})}
+        )
+        assert learned_names(project, path, made) == {("iterations/001/20-estimate.h5", "sample"): "sample"}
+        (said,) = require_current(project, "initial", path, made)
+        assert "20-estimate.h5 changed" in said
 
 
 def test_numbers_of_another_robot_or_version_are_refused(looped: Project) -> None:

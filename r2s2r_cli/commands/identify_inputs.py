@@ -168,17 +168,10 @@ class Asked:
 
         Raises UsageError, InputError or ArtifactError, as the fit would.
         """
-        from r2s2r_cli.stages.identify.free import Mapping
-        from r2s2r_cli.stages.identify.task import Task, free_parameters, require_combination
+        from r2s2r_cli.stages.identify.identify import require_possible
 
-        robot, runs = self.project.robot(), self.runs()
-        request = self.request(runs, settings)
-        require_combination(request)
-        frees = free_parameters(robot, runs, request, settings)
-        if request.method == "paper" or request.drive == "closed loop":
-            Mapping(robot, frees, request.effects, fixed=request.fixed)
-        else:
-            Task(robot, runs, request, settings).predictor(frees)
+        runs = self.runs()
+        require_possible(self.project.robot(), runs, self.request(runs, settings), settings)
 
     def request(self, runs: Sequence[RunData], settings: IdentifySettings) -> Request:
         """The request, its intervals resolved. Raises UsageError for runs and intervals that do not exist."""

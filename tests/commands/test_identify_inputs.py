@@ -198,7 +198,12 @@ def test_a_dry_run_checks_what_is_asked_for(estimated: Path) -> None:
     assert alone.exit_code == 4 and alone.stderr.endswith(
         "hint: r2s2r identify --dry-run   # without --online: from robot.toml\n"
     )
-    assert "cannot be free in command replay" in invoke("identify", "--free", "com.0", "--dry-run").stderr
+    for method in ((), ("--method", "paper"), ("--drive", "closed-loop")):
+        # All are judged by command replay, the paper's fit after it has ended.
+        result = invoke("identify", *method, "--free", "com.0", "--dry-run")
+        assert "cannot be free in command replay" in result.stderr, method
+    result = invoke("identify", "--method", "paper", "--free", "command_delay", "--dry-run")
+    assert "has no derivative in the paper's method" in result.stderr
     assert invoke("identify", "--test", "sample:99", "--dry-run").exit_code == 2
 
 

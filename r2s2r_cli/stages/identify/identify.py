@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from r2s2r_cli.artifact import ArtifactData
-from r2s2r_cli.stages.identify.closed_method import find_closed
+from r2s2r_cli.stages.identify.closed_method import closed_predictor, find_closed
 from r2s2r_cli.stages.identify.cma_method import find_cma
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.default_method import find_default
 from r2s2r_cli.stages.identify.found import Found
 from r2s2r_cli.stages.identify.groups import identification
-from r2s2r_cli.stages.identify.online import find_online
-from r2s2r_cli.stages.identify.paper_method import find_paper
+from r2s2r_cli.stages.identify.online import find_online, first_free
+from r2s2r_cli.stages.identify.paper_method import find_paper, paper_engines
 from r2s2r_cli.stages.identify.report import report_of
 from r2s2r_cli.stages.identify.request import Checkpoint, Progress, Request, silent
 from r2s2r_cli.stages.identify.task import Task, require_combination
@@ -63,4 +63,16 @@ def find(
     return find_closed(task) if request.drive == "closed loop" else find_default(task)
 
 
-__all__ = ["find", "identify"]
+def require_possible(robot: Robot, runs: Sequence[RunData], request: Request, settings: IdentifySettings) -> None:
+    """Raises what is wrong with a request before anything is simulated, as the method of that request would."""
+    require_combination(request)
+    task = Task(robot, runs, request, settings)
+    if request.method == "paper":
+        paper_engines(task)
+    elif request.drive == "closed loop":
+        closed_predictor(task)
+    else:
+        task.predictor(first_free(task))
+
+
+__all__ = ["find", "identify", "require_possible"]

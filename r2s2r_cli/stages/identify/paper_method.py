@@ -23,6 +23,7 @@ from r2s2r_cli.stages.identify.paper import (
 )
 from r2s2r_cli.stages.identify.paper.adam import identify_paper
 from r2s2r_cli.stages.identify.paper.demonstration import Demonstration
+from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.solve.record import names_on_bound
 from r2s2r_cli.stages.identify.task import Task, specs_asked
@@ -38,21 +39,28 @@ def find_paper(task: Task) -> Found:
     Raises UsageError for numbers that the engine does not read, NumericalError where the robot does not come to rest
     where a stretch begins or the simulation leaves the finite numbers.
     """
-    from r2s2r_cli.stages.model import structure_of
-
-    request, recipe, settings = task.request, task.recipe, task.settings
-    specs = specs_asked(request, settings, PAPER_FREE)
-    made = preset(
-        task.robot, select(specs, task.robot, request.effects, request.fixed),
-        effects=request.effects, fixed=dict(request.fixed),
-        structure=replace(structure_of(task.robot), rod_contact=settings.rod_contact), step=recipe.step,
-        cache_dir=task.cache_dir,
-    )  # fmt: skip
+    request, settings = task.request, task.settings
+    made, judge = paper_engines(task)
     named = {run.name: run for run in task.runs}
     demos = [demo for one in request.train for demo in demonstrations(named[one.run], one)]
     asked = Settings(iterations=settings.max_iterations, closed_loop=request.drive == "closed loop")
     fit = _fitted(task, made, demos, asked)
-    return _found(task, made, fit, demos)
+    return _found(task, made, judge, fit, demos)
+
+
+def paper_engines(task: Task) -> tuple[Preset, Predictor]:
+    """The paper's engine with what is free in it, and the one of the other methods, which replays commands and judges.
+    Raises UsageError for numbers that one of them does not read: before anything is fitted."""
+    from r2s2r_cli.stages.model import structure_of
+
+    request = task.request
+    frees = select(specs_asked(request, task.settings, PAPER_FREE), task.robot, request.effects, request.fixed)
+    made = preset(
+        task.robot, frees, effects=request.effects, fixed=dict(request.fixed),
+        structure=replace(structure_of(task.robot), rod_contact=task.settings.rod_contact), step=task.recipe.step,
+        cache_dir=task.cache_dir,
+    )  # fmt: skip
+    return made, task.predictor(frees)
 
 
 def _fitted(task: Task, made: Preset, demos: list[Demonstration], asked: Settings) -> PaperFit:
@@ -73,10 +81,8 @@ def _fitted(task: Task, made: Preset, demos: list[Demonstration], asked: Setting
     )  # fmt: skip
 
 
-def _found(task: Task, made: Preset, fit: PaperFit, demos: list[Demonstration]) -> Found:
-    frees, trace = made.numbers.frees, fit.trace
-    # The same numbers in the engine of the other methods, which replays commands and judges.
-    predictor = task.predictor(frees)
+def _found(task: Task, made: Preset, predictor: Predictor, fit: PaperFit, demos: list[Demonstration]) -> Found:
+    trace = fit.trace
     judged = judged_by(task, predictor, fit.best)
     best = int(np.argmin(trace.whole))
     steps = len(trace.losses)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import selectors
@@ -61,20 +62,20 @@ class IsolatedReader:
         child.wait()
         for stream in (child.stdin, child.stdout):
             if stream is not None:
-                stream.close()
+                with contextlib.suppress(BrokenPipeError):  # a request that the dead child did not take
+                    stream.close()
 
     def _ask(self, call: Call, path: Path, **arguments: str) -> dict[str, Any]:
         try:
             limit = BASE_LIMIT_S + path.stat().st_size / BYTES_PER_S
         except OSError as error:
             raise unreadable(path, error) from error
-        child = self._running()
+        request = {"call": call, "path": str(path.absolute()), **arguments}
         try:
-            request = {"call": call, "path": str(path.absolute()), **arguments}
-            print(json.dumps(request), file=child.stdin, flush=True)
-            answer = _line(child, limit)
-        except BrokenPipeError:
-            answer = ""
+            answer = self._answer(request, limit)
+        except BrokenPipeError:  # it died before it took the request, which says nothing of this file
+            self.close()
+            answer = self._answer(request, limit)
         if answer and answer.endswith("\n"):
             return json.loads(answer)
         self.close()
@@ -87,6 +88,12 @@ class IsolatedReader:
             received="a file that cannot be opened safely",
             hint=f"r2s2r recover {quoted(path)}",
         )
+
+    def _answer(self, request: dict[str, str], limit: float) -> str | None:
+        """What `_line` reads. Raises BrokenPipeError where the child is dead before it was asked."""
+        child = self._running()
+        print(json.dumps(request), file=child.stdin, flush=True)
+        return _line(child, limit)
 
     def _running(self) -> subprocess.Popen[str]:
         if self._child is None or self._child.poll() is not None:

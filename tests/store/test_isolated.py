@@ -55,6 +55,19 @@ def test_a_file_that_crashes_the_library_is_an_error(tmp_path: Path, golden: Cop
         assert reader.verify(golden("policy"))["content_ok"]
 
 
+def test_a_child_that_died_before_it_was_asked_says_nothing_of_the_file(
+    golden: Copy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The machine was out of memory, say: a new child reads the file, which is sound."""
+    with IsolatedReader() as reader:
+        child = reader._running()
+        child.kill()
+        child.wait()
+        # It dies just after it was found alive.
+        monkeypatch.setattr(child, "poll", lambda: monkeypatch.undo())
+        assert reader.verify(golden("policy"))["content_ok"]
+
+
 def test_the_child_ends_with_its_reader(golden: Copy) -> None:
     """No process is left behind."""
     with IsolatedReader() as reader:

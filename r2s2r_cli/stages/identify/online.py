@@ -126,7 +126,8 @@ def specs_of(before: ArtifactData) -> dict[str, str]:
         spec = f"{name}={start!r}"
         if math.isfinite(low) and math.isfinite(high):
             spec += f",{low!r}..{high!r}"
-        found[name] = spec + (f",~{sd!r}" if math.isfinite(sd) else "")
+        # A winch held as others are that came out equal, on a bound say, has a prior of no width: nobody asked for it.
+        found[name] = spec + (f",~{sd!r}" if math.isfinite(sd) and sd > 0 else "")
     return found
 
 

@@ -84,6 +84,15 @@ def test_what_was_free_is_free_again() -> None:
     assert (bounce.name, bounce.start, bounce.upper) == ("restitution", 0.3, 0.95)
 
 
+def test_a_winch_whose_likes_came_out_equal_can_be_gone_on_with() -> None:
+    """Their scatter, which is its prior then, is 0: as a prior that was asked for, that is refused."""
+    (free,) = select((f"motor_speed_in.{subject().robot.actuated[0]}",), subject().robot)
+    held = ParameterFound(replace(free, prior_sd=0.0), free.start, 0.0, 0.0, 0.0, NAN, Trust.NOT_IDENTIFIABLE)
+    before = identification(found(parameters=(held,), information=None, updates=(), starts=(), trace=(), profiles=()))
+    (again,) = select(tuple(specs_of(before).values()), subject().robot)
+    assert (again.start, again.prior_sd) == (free.start, free.prior_sd)
+
+
 @pytest.mark.parametrize("name", ["damping", "damping_actuated"])
 def test_a_damping_that_was_free_is_free_again(name: str) -> None:
     """And not given beside it, as it is with the default set: the same number would be free and fixed."""

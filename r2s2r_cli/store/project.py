@@ -155,8 +155,9 @@ class Project:
         local = iteration.path / CONFIG_FILE if iteration else None
         if local is not None:
             if local not in self._read:
-                self._read[local] = read_toml(local) if local.is_file() else {}
-                check_model(self._read[local], RunConfig, str(local))
+                found = read_toml(local) if local.is_file() else {}
+                check_model(found, RunConfig, str(local))  # first: asked again, the error names this file again
+                self._read[local] = found
             values = _merge(values, self._read[local])
         for key, value in overrides.items():
             values = _merge(values, _nest(key, value))

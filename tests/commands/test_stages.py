@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from r2s2r_cli.errors import ArtifactError
+from r2s2r_cli.errors import ArtifactError, InputError
 from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.read import read_artifact
 from tests.commands.conftest import document, invoke
 
@@ -258,6 +259,17 @@ def test_estimate_without_a_recording_says_what_to_run(project: Path) -> None:
     result = invoke("estimate")
     assert result.exit_code == 4
     assert "r2s2r import" in result.stderr.splitlines()[-1]
+
+
+def test_a_wrong_setting_is_named_where_it_stands_however_often(estimated: Path) -> None:
+    """A command asks for the settings of one stage after the other; project.toml is not to blame."""
+    here = Project.find(estimated)
+    place = here.iteration(1)
+    (place.path / "config.toml").write_text("[estimate]\nfrobnicate = 1\n")
+    for _ in range(2):
+        with pytest.raises(InputError, match="frobnicate") as raised:
+            here.config(place, {})
+        assert raised.value.where == str(place.path / "config.toml")
 
 
 def test_settings_come_from_four_layers(estimated: Path) -> None:

@@ -170,7 +170,8 @@ class Slope:
             gx, gz = c * gx - s * gz, s * gx + c * gz
         else:
             gy, gz = c * gy + s * gz, c * gz - s * gy
-        return replace(theta, gravity=torch.cat([part.expand(len(value), 1) for part in (gx, gy, gz)], dim=-1))
+        # Of both angles one may be given, a batch of 1, where the other is free.
+        return replace(theta, gravity=torch.cat(torch.broadcast_tensors(gx, gy, gz), dim=-1))
 
 
 @dataclass(frozen=True)

@@ -104,6 +104,14 @@ def test_an_attachment_phase_turns_the_points_of_one_rod() -> None:
             assert theta.p_BS[0, k, side].tolist() == pytest.approx(expected, abs=1e-15)
 
 
+@pytest.mark.parametrize(("free", "given"), [("x", "y"), ("y", "x")])
+def test_of_two_slopes_one_may_be_given(free: str, given: str) -> None:
+    """Many values of the one with the one value of the other, as a population asks for them: each as by itself."""
+    made = mapping(f"ground_slope_{free}", fixed={f"ground_slope_{given}": 0.01})
+    many = np.array([[0.02], [0.03], [0.04]])
+    assert torch.equal(made.theta(many).gravity, torch.cat([made.theta(one).gravity for one in many]))
+
+
 def test_a_slope_is_that_of_the_effect() -> None:
     """Gravity of ground_slope_x and ground_slope_y together is gravity under effects/ground_slope."""
     theta = mapping("ground_slope_x", "ground_slope_y").theta(np.array([0.03, -0.05]))

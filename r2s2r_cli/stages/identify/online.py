@@ -22,6 +22,7 @@ from r2s2r_cli.stages.identify.fit import fit
 from r2s2r_cli.stages.identify.found import Found, TraceStep, Update
 from r2s2r_cli.stages.identify.free import Free, select
 from r2s2r_cli.stages.identify.free.base import Coordinate
+from r2s2r_cli.stages.identify.free.catalogue import own_entries
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.solve.record import Progress as SolverProgress
@@ -30,6 +31,7 @@ from r2s2r_cli.stages.identify.trust.identifiability import Trust
 from r2s2r_cli.stages.identify.trusted import Sureness, sureness
 from r2s2r_cli.stages.identify.twice import learned_twice
 from schemas.identification import FIXED_BY_HAND
+from schemas.robot import Robot
 
 DRIFT = 0.05
 """Standard deviation of what a run changes: of a logarithmic coordinate, 5 %; else this share of its width."""
@@ -129,6 +131,14 @@ def specs_of(before: ArtifactData) -> dict[str, str]:
         # A winch held as others are that came out equal, on a bound say, has a prior of no width: nobody asked for it.
         found[name] = spec + (f",~{sd!r}" if math.isfinite(sd) and sd > 0 else "")
     return found
+
+
+def given_in(before: ArtifactData, robot: Robot) -> dict[str, float]:
+    """What was not free there but had a value of its own, by hand or with the default set, by name, in its unit.
+    Without the numbers of effects (`effects_asked.effects_kept` has those)."""
+    group, own = before.groups["parameters"], own_entries(robot)
+    fixed = zip(_names(before), group["trust"], group["value"], strict=True)
+    return {name: float(value) for name, trust, value in fixed if int(trust) == FIXED_BY_HAND and name in own}
 
 
 def known_of(before: ArtifactData) -> Known:

@@ -52,8 +52,9 @@ class Task:
 
     @property
     def with_default(self) -> bool:
-        """Whether the default set is free, alone or with more beside it."""
-        return all(spec.startswith(PLUS) for spec in (*self.settings.free, *self.request.free))
+        """Whether the default set is free, alone or with more beside it. The paper's own two numbers are another."""
+        own = self.request.method != "paper"
+        return own and all(spec.startswith(PLUS) for spec in (*self.settings.free, *self.request.free))
 
     @property
     def of_default(self) -> tuple[str, ...]:
@@ -64,20 +65,22 @@ class Task:
     @property
     def given(self) -> dict[str, float]:
         """Values of parameters that are not fitted: those that the default set goes with, where it is what is free and
-        none of them was asked for; and those of the request."""
-        asked = (*self.settings.free, *self.request.free)
-        own = default_fixed(self.robot) if self.with_default else {}
-        named = {name_of(spec.removeprefix(PLUS)).partition(".")[0] for spec in asked}
-        named |= self._free_before  # it is free again, and cannot be given as well
-        mine = {name: value for name, value in own.items() if not {name, name.partition("_")[0]} & named}
+        none of them was asked for, or those that the identification which is gone on from was given; and those of the
+        request."""
+        asked = {name_of(spec.removeprefix(PLUS)) for spec in (*self.settings.free, *self.request.free)}
+        # A number is asked for by its name, with all of its family, or, one damping of all cables, by a part of them.
+        asked |= {name.removesuffix(".*") for name in asked} | {"damping_actuated" for name in asked if _damps(name)}
+        own = self._beside if self.with_default else {}
+        mine = {name: value for name, value in own.items() if not {name, name.partition(".")[0]} & asked}
         return {**mine, **self.request.fixed}
 
     @property
-    def _free_before(self) -> set[str]:
-        """Names that were free in the identification which is gone on from."""
-        from r2s2r_cli.stages.identify.online import specs_of
+    def _beside(self) -> dict[str, float]:
+        """What has a value beside the numbers that are free where nobody names any."""
+        from r2s2r_cli.stages.identify.online import given_in
 
-        return set() if self.request.before is None else {*specs_of(self.request.before)}
+        before = self.request.before
+        return default_fixed(self.robot) if before is None else given_in(before, self.robot)
 
     def predictor(self, frees: Sequence[Free]) -> Predictor:
         """The engine with these free numbers, those that were given, and the effects that were asked for."""
@@ -92,14 +95,18 @@ class Task:
         from r2s2r_cli.stages.identify.free.catalogue import catalogue
 
         known, nan = catalogue(self.robot), float("nan")
+        why = "the default set goes with it" if self.request.before is None else "as in the earlier identification"
         return tuple(
             ParameterFound(
                 known[name], value, nan, nan, nan, (nan, nan), None,
-                "fixed by hand" if name in self.request.fixed
-                else f"the default set goes with it; robot.toml has {known[name].start:g}",
+                "fixed by hand" if name in self.request.fixed else f"{why}; robot.toml has {known[name].start:g}",
             )
             for name, value in self.given.items()
         )  # fmt: skip
+
+
+def _damps(name: str) -> bool:
+    return name.partition(".")[0] == "damping"
 
 
 def require_combination(request: Request) -> None:

@@ -107,6 +107,32 @@ def test_a_damping_that_was_free_is_free_again(name: str) -> None:
     assert task.predictor(again).mapping.names == tuple(one.name for one in again)
 
 
+@pytest.mark.parametrize(
+    ("asked", "given"),
+    [
+        ({}, {"damping_actuated": 40.0, "stiffness.6": 300.0}),
+        ({"free": ("+stiffness.6",)}, {"damping_actuated": 40.0}),
+        ({"free": ("+stiffness.7",)}, {"damping_actuated": 40.0, "stiffness.6": 300.0}),
+        ({"free": ("friction",)}, {}),
+        ({"fixed": {"stiffness.6": 250.0}}, {"damping_actuated": 40.0, "stiffness.6": 250.0}),
+    ],
+)
+def test_what_was_given_is_given_again(asked: dict[str, Any], given: dict[str, float]) -> None:
+    """By hand or with the default set, where nobody says what is free now; and nothing else is: what an earlier fit
+    of friction alone left at robot.toml's value stays there."""
+    robot = subject().robot
+    friction, *fixed = select(("friction", "damping_actuated=40", "stiffness.6=300"), robot)
+    known = [ParameterFound(friction, 0.5, 0.1, 0.4, 0.6, NAN, Trust.IDENTIFIED)]
+    own = [ParameterFound(one, one.start, *NAN[:1] * 3, NAN, None, "fixed by hand") for one in fixed]
+    plain = {"information": None, "updates": (), "starts": (), "trace": (), "profiles": ()}
+    for parameters, expected in ((known + own, given), (known, asked.get("fixed", {}))):
+        before = identification(found(parameters=tuple(parameters), **plain))
+        request = Request((Selection("line", (1,)),), online=True, before=before, **asked)
+        task = Task(robot, (), request, IdentifySettings())
+        assert task.given == expected
+        assert not {one.free.name for one in task.fixed()} ^ set(expected)
+
+
 def test_a_run_that_shows_nothing_changes_nothing_but_the_width() -> None:
     """The speed is learned, though the run alone is too short to report it; the restitution stays what it was and
     drifts on; its update has no sd."""

@@ -61,7 +61,9 @@ def test_half_speed_is_half_the_time() -> None:
         ({"free": ("friction",)}, {}),
         ({"free": ("+damping_actuated",)}, {}),
         ({"free": ("+damping.0",)}, {}),
+        ({"free": ("+damping.*",)}, {}),
         ({"fixed": {"damping_actuated": 4.0}}, {"damping_actuated": 4.0}),
+        ({"method": "paper"}, {}),
     ],
 )
 def test_winches_do_not_follow_a_pull_unless_one_says_so(asked: dict[str, object], given: dict[str, float]) -> None:

@@ -11,7 +11,8 @@ import numpy as np
 
 from r2s2r_cli.stages.identify.commands import CommandLog
 from r2s2r_cli.stages.identify.offsets import displaced
-from r2s2r_cli.stages.identify.predict import STRIDE, Predictor, alike
+from r2s2r_cli.stages.identify.predict import STRIDE, Predictor
+from r2s2r_cli.stages.identify.prediction import alike
 from r2s2r_cli.stages.identify.windows import Window
 
 if TYPE_CHECKING:

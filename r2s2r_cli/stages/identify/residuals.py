@@ -10,7 +10,8 @@ import numpy as np
 from r2s2r_cli.stages.identify.candidates import predict_candidates
 from r2s2r_cli.stages.identify.free.base import Free, slopes_of, values_of
 from r2s2r_cli.stages.identify.offsets import StartSpread, count
-from r2s2r_cli.stages.identify.predict import Prediction, Predictor
+from r2s2r_cli.stages.identify.predict import Predictor
+from r2s2r_cli.stages.identify.prediction import Prediction
 from r2s2r_cli.stages.identify.solve.problem import Evaluation
 from r2s2r_cli.stages.identify.windows import Window
 

@@ -12,7 +12,7 @@ import pytest
 
 from r2s2r_cli.stages.identify.free import Mapping, select
 from r2s2r_cli.stages.identify.offsets import StartSpread, count
-from r2s2r_cli.stages.identify.predict import Prediction
+from r2s2r_cli.stages.identify.prediction import Prediction
 from r2s2r_cli.stages.identify.residuals import FIXED_SD, CapResiduals
 from r2s2r_cli.stages.identify.windows import Window, window
 from r2s2r_cli.stages.model import structure_of

@@ -18,7 +18,8 @@ from r2s2r_cli.stages.diagnose.which.stable import Stable
 from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.diagnose.which.turning import STEP_S, turning
 from r2s2r_cli.stages.identify.offsets import displaced
-from r2s2r_cli.stages.identify.predict import Predictor, alike
+from r2s2r_cli.stages.identify.predict import Predictor
+from r2s2r_cli.stages.identify.prediction import alike
 from r2s2r_cli.stages.identify.windows import Window
 
 if TYPE_CHECKING:

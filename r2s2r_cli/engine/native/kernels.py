@@ -13,8 +13,9 @@ from r2s2r_cli.engine.native.emit import Body, Place, subroutine_text
 from r2s2r_cli.engine.native.graph import Graph
 from r2s2r_cli.engine.native.hoist import Hoisted, hoisted
 from r2s2r_cli.engine.native.llvm_text import Module, Target
+from r2s2r_cli.engine.native.pack_order import units
 from r2s2r_cli.engine.native.packed import PackedBody
-from r2s2r_cli.engine.native.packs import Packs, Twins, units
+from r2s2r_cli.engine.native.packs import Packs, Twins
 from r2s2r_cli.engine.native.passes import depths, live
 from r2s2r_cli.engine.native.program import Backward, Forward, Tangent
 

@@ -12,7 +12,7 @@ from r2s2r_cli.commands import bench_gait
 from schemas.robot import Robot
 
 if TYPE_CHECKING:
-    from r2s2r_cli.engine.rollout import Trajectory
+    from r2s2r_cli.engine.trajectory import Trajectory
     from r2s2r_cli.rig.model.options import Integrator
 
 SETTLE_S = 3.0

@@ -28,7 +28,7 @@ from r2s2r_cli.engine.reading import (
     momentum as momentum,
     read as read,
 )
-from r2s2r_cli.engine.rollout import Simulator as Simulator, Trajectory as Trajectory
+from r2s2r_cli.engine.rollout import Simulator as Simulator
 from r2s2r_cli.engine.settle import Settled as Settled, settled as settled, window_state as window_state
 from r2s2r_cli.engine.state import (
     State as State,
@@ -41,3 +41,4 @@ from r2s2r_cli.engine.state import (
 )
 from r2s2r_cli.engine.step import step as step
 from r2s2r_cli.engine.structure import Detach as Detach, Structure as Structure
+from r2s2r_cli.engine.trajectory import Trajectory as Trajectory

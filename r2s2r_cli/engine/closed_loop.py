@@ -18,9 +18,10 @@ from r2s2r_cli.engine.nonfinite import require_finite
 from r2s2r_cli.engine.parameters import Parameters, check_parameters
 from r2s2r_cli.engine.pid import LatchedPid, advance, start_progress, steps_a_tick, ticks
 from r2s2r_cli.engine.reading import cap_lengths
-from r2s2r_cli.engine.rollout import Simulator, Trajectory
+from r2s2r_cli.engine.rollout import Simulator
 from r2s2r_cli.engine.state import State, check_state, end_caps
 from r2s2r_cli.engine.structure import Structure
+from r2s2r_cli.engine.trajectory import Trajectory
 
 
 @dataclass(frozen=True)

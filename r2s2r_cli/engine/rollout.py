@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -24,48 +23,18 @@ from r2s2r_cli.engine.flat import (
     unpack_state,
 )
 from r2s2r_cli.engine.ground import Ground
-from r2s2r_cli.engine.hooks import effective
-from r2s2r_cli.engine.late import delay_of, observe, shifted
+from r2s2r_cli.engine.late import delay_of, shifted
 from r2s2r_cli.engine.native import NativeStep, rollout
 from r2s2r_cli.engine.nonfinite import require_finite
 from r2s2r_cli.engine.parameters import Parameters, check_parameters
 from r2s2r_cli.engine.reading import always_stable_step, stable_substeps
-from r2s2r_cli.engine.state import State, check_state, end_caps
+from r2s2r_cli.engine.state import State, check_state
 from r2s2r_cli.engine.structure import Detach, Structure
 from r2s2r_cli.engine.trace_key import trace_key
+from r2s2r_cli.engine.trajectory import Trajectory
 
 IMPULSE_WINDOW = 0.5
 """[s] beyond it the tangent with detached impulses has left every bound (contact.md section 5: 22 after 1 s)."""
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """States at regular times. t: (frame,) [s]; states: fields (B, frame, ...); substeps: engine steps a `step`."""
-
-    structure: Structure
-    theta: Parameters
-    t: Tensor
-    states: State
-    step: float
-    substeps: int
-
-    def at(self, frame: int) -> State:
-        """The state at one frame, batch first."""
-        return unpack_state(self.structure, pack_state(self.structure, self.states, leading=2)[:, frame])
-
-    def end_caps(self) -> Tensor:
-        """End-cap centres p_WE [m], (B, frame, cap, 3)."""
-        flat = pack_state(self.structure, self.states, leading=2)
-        batch, frames = flat.shape[:2]
-        merged = unpack_state(self.structure, flat.flatten(0, 1))
-        theta = effective(self.structure, self.theta).map(
-            lambda x: x.expand(batch, *x.shape[1:]).repeat_interleave(frames, dim=0)
-        )
-        return end_caps(theta, merged).unflatten(0, (batch, frames))
-
-    def observed(self) -> Tensor:
-        """End caps as the camera sees them, (B, frame, cap, 3) [m]: effects of channel observation included."""
-        return observe(self.structure, self.theta, self.t, self.end_caps())
 
 
 class Simulator:

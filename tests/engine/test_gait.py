@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from r2s2r_cli.engine.reading import energy
-from r2s2r_cli.engine.rollout import Trajectory
+from r2s2r_cli.engine.trajectory import Trajectory
 from tests.support.engine import random_gait, simulator, threebar_engine
 
 BATCH = 16

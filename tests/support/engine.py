@@ -12,8 +12,9 @@ from torch import Tensor
 
 from r2s2r_cli.engine import Parameters, State, Structure, end_caps, step
 from r2s2r_cli.engine.parameters import shapes
-from r2s2r_cli.engine.rollout import Simulator, Trajectory
+from r2s2r_cli.engine.rollout import Simulator
 from r2s2r_cli.engine.state import state_shapes
+from r2s2r_cli.engine.trajectory import Trajectory
 from r2s2r_cli.stages.init.robots import robot_toml
 from r2s2r_cli.stages.model import parameters_of, rest_state, structure_of
 from schemas.robot import Robot

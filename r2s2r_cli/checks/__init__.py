@@ -15,7 +15,8 @@ from r2s2r_cli.checks import (
     plans,
     policies,
     recorded,
-    robots,
+    robot_body,
+    robot_drive,
     schema,
     sensors,
     simulations,
@@ -57,10 +58,10 @@ CHECKS: tuple[Check, ...] = (
     calibrations.tendons_rise, calibrations.masses_make_a_rod, calibrations.history_is_sound,
     policies.policy_robot_known, policies.policy_fits_cables, policies.policy_targets_in_range,
     policies.policy_times_sensible, policies.policy_steps_differ,
-    robots.rest_pose_fits_rods, robots.rest_pose_on_ground, robots.sites_on_their_caps, robots.cables_join_other_caps,
-    robots.rod_masses_plausible, robots.parts_on_their_rod, robots.winches_plausible, robots.rest_lengths_in_limits,
-    robots.pid_range_in_limits, robots.sensors_are_calibrated, robots.sensor_lines_plausible,
-    robots.robot_was_measured,
+    robot_body.rest_pose_fits_rods, robot_body.rest_pose_on_ground, robot_body.sites_on_their_caps,
+    robot_body.cables_join_other_caps, robot_body.rod_masses_plausible, robot_body.parts_on_their_rod,
+    robot_drive.winches_plausible, robot_drive.rest_lengths_in_limits, robot_drive.pid_range_in_limits,
+    robot_drive.sensors_are_calibrated, robot_drive.sensor_lines_plausible, robot_body.robot_was_measured,
 )  # fmt: skip
 
 FAMILIES: dict[str, str] = {
@@ -81,6 +82,7 @@ FAMILIES: dict[str, str] = {
     "simulations": "Simulated runs",
     "calibrations": "Calibrations",
     "policies": "Policies",
-    "robots": "Robot descriptions",
+    "robot_body": "Robot descriptions: rods, end caps, cables",
+    "robot_drive": "Robot descriptions: winches, controller, tendons, sensors",
 }
 """Module of each family -> its heading; in the order of CHECKS."""

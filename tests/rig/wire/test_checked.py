@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from r2s2r_cli.rig.wire.base import Line
-from r2s2r_cli.rig.wire.checked import WATCHDOG_S, CheckedCodec, Code, State
+from r2s2r_cli.rig.wire.checked import CheckedCodec
+from r2s2r_cli.rig.wire.checked_device import WATCHDOG_S, Code, State
 from tests.support.rig_machine import MOTORS, SENSORS, Machine, reading
 
 

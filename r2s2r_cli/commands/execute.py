@@ -80,7 +80,9 @@ def execute(
     from r2s2r_cli.commands.cameras import stored_camera
     from r2s2r_cli.commands.execute_outcome import expect
     from r2s2r_cli.commands.outcome import require_model
-    from r2s2r_cli.commands.record_run import Wish, carry_out, look, tell_of_no_camera
+    from r2s2r_cli.commands.record_look import look
+    from r2s2r_cli.commands.record_run import carry_out
+    from r2s2r_cli.commands.record_wish import Wish, tell_of_no_camera
     from r2s2r_cli.stages.record import plans
     from r2s2r_cli.store.staleness import artifact_ref
 

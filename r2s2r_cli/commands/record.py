@@ -87,7 +87,9 @@ def record(
     """
     from r2s2r_cli.commands.cameras import stored_camera
     from r2s2r_cli.commands.outcome import print_config
-    from r2s2r_cli.commands.record_run import Wish, carry_out, look, tell_of_no_camera
+    from r2s2r_cli.commands.record_look import look
+    from r2s2r_cli.commands.record_run import carry_out
+    from r2s2r_cli.commands.record_wish import Wish, tell_of_no_camera
     from r2s2r_cli.commands.simulate_inputs import stored_names
     from r2s2r_cli.commands.wanted import wanted
     from r2s2r_cli.stages.record import plans

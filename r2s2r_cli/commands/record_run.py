@@ -3,68 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.commands.record_journal import Recording
 from r2s2r_cli.commands.record_live import Live, shown, stop_key
+from r2s2r_cli.commands.record_wish import Wish, guarded, remarks
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import HardwareError, Interrupted, R2S2RError, quoted
-from r2s2r_cli.reached import RIG_REMARK, camera, virtual
 
 if TYPE_CHECKING:
     from r2s2r_cli.devices.camera import CameraFeed
     from r2s2r_cli.devices.link import LinkFacts
-    from r2s2r_cli.hardware.guard import GuardedLink
-    from r2s2r_cli.stages.record import CameraFacts, RunPlan, Session
-    from r2s2r_cli.store.project import Iteration, Project
-    from schemas.config import RecordSettings
-    from schemas.header import InputRef
+    from r2s2r_cli.stages.record import CameraFacts, Session
     from schemas.results import StageResult
     from schemas.results_record import RecordReport
-    from schemas.robot import Robot
 
-LOOK_S = 1.0
-"""How long --dry-run looks at the sensors."""
 _RIG = "rig"
-
-
-@dataclass(frozen=True)
-class Wish:
-    """One command line of `record` or `execute` (stage), read and checked. inputs: what the policies came from."""
-
-    project: Project
-    iteration: Iteration
-    robot: Robot
-    runs: Sequence[RunPlan]
-    settings: RecordSettings
-    port: str
-    protocol: str
-    camera: str | None
-    simulated: bool
-    overrides: Mapping[str, Any]
-    flags: Mapping[str, Any]
-    seed: int | None
-    draw: bool
-    force: bool
-    stage: str = "record"
-    inputs: Sequence[InputRef] = ()
-
-    def recording(self) -> Recording:
-        """Where it goes."""
-        return Recording(self.project, self.iteration, self.overrides, self.flags, self.seed, self.stage, self.inputs)
-
-
-def tell_of_no_camera(wish: Wish, console: Console) -> None:
-    """To be said before anything moves: afterwards it is too late for a camera."""
-    if wish.camera is None:
-        rig = virtual(wish.port)
-        console.warn(
-            "no camera is named: no states can be estimated from these runs, so `identify` cannot learn from them and "
-            f"`compare` has nothing to compare; with one, add {camera(rig=rig)}{f' ({RIG_REMARK})' if rig else ''}"
-        )
 
 
 def carry_out(wish: Wish, console: Console) -> None:
@@ -81,13 +37,13 @@ def carry_out(wish: Wish, console: Console) -> None:
         try:
             with ExitStack() as stack:
                 feed, facts = _camera(wish.camera, stack)
-                link = stack.enter_context(_guarded(wish, dry_run=False))
+                link = stack.enter_context(guarded(wish, dry_run=False))
                 live = Live([len(as_run(plan, wish.robot).target) for plan in wish.runs])
                 session = Session(
                     wish.runs, wish.robot, link, wish.settings, feed=feed, wall_clock=time.time, watch=live.watch,
                     begin=lambda: link.restart(time_limit=wish.settings.time_limit_s),
                 )  # fmt: skip
-                _remarks(link.facts, console)
+                remarks(link.facts, console)
                 kept = recording.put_aside()
                 if kept is not None:
                     console.say(f"the recording that was there is kept as {kept.name}")
@@ -103,51 +59,6 @@ def carry_out(wish: Wish, console: Console) -> None:
         signals.standing()
         result = _seal(wish, recording, session, console)
     _finish(wish, session.report(), result, ended, console)
-
-
-def look(wish: Wish, console: Console) -> None:
-    """--dry-run: the plan, and with a port what the sensors say; no motor moves, nothing is written.
-
-    What would be refused without --dry-run is said, not raised; a port is left alone while somebody records. Raises
-    HardwareError for a port that cannot be read.
-    """
-    from r2s2r_cli.views.record_page import look_tables, plan_table
-    from schemas.results import StageResult
-
-    recording = wish.recording()
-    refusal = recording.refusal(force=wish.force)
-    busy = recording.writer()
-    tables = [plan_table(wish.runs, wish.robot)]
-    if wish.port and busy is not None:  # opening its port would disturb it
-        console.warn(f"the sensors are not looked at: {busy} is recording")
-    elif wish.port:
-        with _guarded(wish, dry_run=True) as link:
-            end, sample = time.monotonic() + LOOK_S, None
-            while time.monotonic() < end:
-                sample = link.read(0.05) or sample
-            _remarks(link.facts, console)
-            tables += look_tables(link.facts, link.statistics, sample, wish.robot)
-    for table in tables:
-        console.table(table.title, table.columns, table.rows)
-    console.document(
-        StageResult(
-            stage=wish.stage, state="dry_run", artifact=wish.project.relative(recording.target), content_sha256=None,
-            reasons=("it was asked for",), inputs=(),
-        )
-    )  # fmt: skip
-    if refusal is None:
-        console.say(f"would write {wish.project.relative(recording.target)}; nothing moved")
-        return
-    console.say("nothing moved")
-    console.warn(f"without --dry-run this would be refused: {refusal.what} ({refusal.where})")
-    console.hint(refusal.hint)
-
-
-def _guarded(wish: Wish, *, dry_run: bool) -> GuardedLink:
-    from r2s2r_cli.hardware.guard import GuardedLink
-    from r2s2r_cli.hardware.open_link import open_link
-
-    return GuardedLink(open_link(wish.port, wish.robot, protocol=wish.protocol), wish.robot, dry_run=dry_run)
 
 
 def _camera(spec: str | None, stack: ExitStack) -> tuple[CameraFeed | None, CameraFacts | None]:
@@ -184,12 +95,6 @@ def _groups(wish: Wish, link: LinkFacts) -> dict[str, Mapping[str, Any]]:
         )
         for plan in wish.runs
     }
-
-
-def _remarks(facts: LinkFacts, console: Console) -> None:
-    for text in facts.remarks:
-        console.warn(text)
-    console.say(f"{facts.robot or 'robot'} at {facts.port}, protocol {facts.protocol}; space is the emergency stop")
 
 
 def _seal(wish: Wish, recording: Recording, session: Session, console: Console) -> StageResult | None:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from r2s2r_cli.commands import record_run
+from r2s2r_cli.commands import record_look, record_run
 from r2s2r_cli.commands.record_live import Live
 from r2s2r_cli.commands.status import survey
 from r2s2r_cli.console import Console
@@ -256,7 +256,7 @@ def test_a_rig_is_advised_its_own_camera(
     """No other one sees the robot of a rig: as `estimate` says it of the recording, said before there is one."""
     said: list[str] = []
     link()
-    monkeypatch.setattr(record_run, "LOOK_S", 0.05)
+    monkeypatch.setattr(record_look, "LOOK_S", 0.05)
     monkeypatch.setattr(Console, "warn", lambda self, text: said.append(text))
     assert invoke("record", "--random", "2", "--port", port, "--dry-run").exit_code == 0
     assert [camera in text for text in said if "no states can be estimated" in text] == [True]
@@ -265,7 +265,7 @@ def test_a_rig_is_advised_its_own_camera(
 def test_dry_run_moves_nothing(robot_project: Path, link: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
     """The plan, the lengths of the sensors, no motor command but zeros, no file."""
     made = link()
-    monkeypatch.setattr(record_run, "LOOK_S", 0.05)
+    monkeypatch.setattr(record_look, "LOOK_S", 0.05)
     result = invoke(*ASK, "--dry-run")
     assert result.exit_code == 0, result.stderr
     assert "random-0" in result.stdout and "250.0" in result.stdout  # the passive cables of the fake

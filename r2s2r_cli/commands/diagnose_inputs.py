@@ -1,4 +1,4 @@
-"""What `diagnose` was asked for: runs of one or several iterations, the identified simulator, the split, the floor."""
+"""What `diagnose` was asked for: runs of one or several iterations, the identified simulator, the floor."""
 
 from __future__ import annotations
 
@@ -10,24 +10,17 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from r2s2r_cli.commands.diagnose_split import fit_and_judge
 from r2s2r_cli.commands.identify_inputs import Asked as IdentifyAsked
 from r2s2r_cli.commands.named_runs import Source, estimated, named_runs, nearest_run, require_robot
 from r2s2r_cli.commands.outcome import require_input, require_model
 from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.store.project import Iteration, Project
-from schemas.config import IdentifySettings
 from schemas.header import InputRef
 
 if TYPE_CHECKING:
-    from r2s2r_cli.artifact import ArtifactData, Group
     from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run
     from r2s2r_cli.stages.identified import Identified
-    from r2s2r_cli.stages.identify.data import Selection
-
-TRAIN, TEST = 1, 2
-"""Codes of `schemas.identification.ROLES`."""
-TRAIN_SHARE: float = IdentifySettings.model_fields["train_share"].default
-"""Of the intervals of a run, where no identification says which are fitted."""
 
 
 @dataclass(frozen=True)
@@ -122,9 +115,7 @@ class Asked:
         diagnosed = tuple(run for run in runs if run.name not in self.healthy)
         if not diagnosed and healthy:
             raise self._nothing_else(healthy)
-        fit, judge = self._split(diagnosed, found)
-        if not fit and not self.train and not self.test:
-            fit, judge = self._split_anew(diagnosed, found, say)
+        fit, judge = fit_and_judge(diagnosed, found, self.train, self.test, healthy=self.healthy, say=say)
         made = Evidence(
             robot, model, diagnosed, fit, judge, self._floor(), healthy, _unsaid(model, self.identification)
         )
@@ -157,44 +148,6 @@ class Asked:
             gait = gaits.setdefault(caps.intervals.target.round(6).tobytes(), one.name)
             found.append(Run(caps, sensed_run(one.name, one.recording, one.run, robot), gait=gait))
         return tuple(found)
-
-    def _split(self, runs: Sequence[Run], found: ArtifactData) -> tuple[tuple[Selection, ...], tuple[Selection, ...]]:
-        """As typed, else that of the identification; runs that it does not know are fitted, the last of them judged."""
-        from r2s2r_cli.stages.diagnose.evidence import whole
-        from r2s2r_cli.stages.identify.selection import split
-
-        caps = [run.caps for run in runs]
-        if self.train or self.test:
-            return split(caps, self.train, self.test, TRAIN_SHARE)
-        table = found.groups["segments"]
-        fit, judge = (_selected(table, role, {run.name for run in runs}) for role in (TRAIN, TEST))
-        known = _runs_of(table)
-        new = [run for run in runs if run.name not in known]
-        added = list(whole(new))
-        if added and judge:
-            fit += added
-        elif added:
-            fit, judge = [*fit, *added[:-1]], [added[-1]]
-        return tuple(fit), tuple(judge)
-
-    def _split_anew(
-        self, runs: Sequence[Run], found: ArtifactData, say: Callable[[str], None] | None
-    ) -> tuple[tuple[Selection, ...], tuple[Selection, ...]]:
-        """The usual split, where that of the identification leaves nothing of the diagnosed runs to fit: it was made
-        for other runs."""
-        from r2s2r_cli.stages.identify.selection import in_words, split
-
-        if not runs:
-            return (), ()
-        fit, judge = split([run.caps for run in runs], (), (), TRAIN_SHARE)
-        if say is not None:
-            words = (", ".join(f"{one.run}:{in_words(one.intervals)}" for one in part) for part in (fit, judge))
-            table = found.groups["segments"]
-            trained = {one.run for one in _selected(table, TRAIN, _runs_of(table))}
-            whom = "healthy runs alone" if trained <= {*self.healthy} else "none of these runs"
-            said = "the identification was fitted to {}: here {} is fitted, {} judged; else say --train and --test"
-            say(said.format(whom, *words))
-        return fit, judge
 
     def _nothing_else(self, healthy: Sequence[Run]) -> InputError:
         """For runs that are all given as healthy: those of other iterations, or what to record."""
@@ -233,20 +186,3 @@ def _unsaid(model: Identified, path: Path) -> tuple[str, ...]:
     if not names:
         return ()
     return (f"uncertainty of {', '.join(names)}: {path.name} has none, so the refit takes its usual priors",)
-
-
-def _runs_of(table: Group) -> set[str]:
-    """Names of the runs in the table of segments of an identification."""
-    return {name.decode() for name in table["run"].tolist()}
-
-
-def _selected(table: Group, role: int, names: set[str]) -> list[Selection]:
-    from r2s2r_cli.stages.identify.data import Selection
-
-    found: dict[str, list[int]] = {}
-    for run, interval, own in zip(
-        table["run"].tolist(), table["interval"].tolist(), table["role"].tolist(), strict=True
-    ):
-        if own == role and run.decode() in names:
-            found.setdefault(run.decode(), []).append(int(interval))
-    return [Selection(run, tuple(sorted(set(numbers)))) for run, numbers in found.items()]

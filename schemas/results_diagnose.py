@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from schemas.base import Frozen
+from schemas.parity import ParityFound, rows
 from schemas.results import StageResult
 
 Verdict = Literal["effect", "pair", "ambiguous", "no_gap", "unknown"]
@@ -224,6 +225,11 @@ class DiagnoseReport(Frozen):
     wall_s: float = 0.0
     seconds: dict[str, float] = Field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+
+    @property
+    def findings(self) -> tuple[ParityFound, ...]:
+        """`parity` with its `parity_sd` and `parity_effects`."""
+        return rows(self.parity, self.parity_sd, self.parity_effects)
 
 
 class DiagnoseResult(StageResult):

@@ -54,16 +54,17 @@ def verdict_words(report: DiagnoseReport) -> str:
 def loud_words(report: DiagnoseReport) -> str:
     """What the logs say beyond LOUD_SD where the verdict names no cause and so does not speak of it; else empty."""
     # Nothing of a diagnosis from before they were noted.
-    loud = [text for text, sd in zip(report.parity, report.parity_sd, strict=False) if abs(sd) > LOUD_SD]
+    loud = [one for one in report.findings if one.sd is not None and abs(one.sd) > LOUD_SD]
     if report.verdict not in ("ambiguous", "no_gap") or not loud:
         return ""
-    return f"Yet the logs by themselves stand out by more than {LOUD_SD:g} sd: {'; '.join(loud)}.{_no_help(report)}"
+    said = "; ".join(one.words for one in loud)
+    in_vain = _in_vain(report, {one.effect for one in loud})
+    return f"Yet the logs by themselves stand out by more than {LOUD_SD:g} sd: {said}.{in_vain}"
 
 
-def _no_help(report: DiagnoseReport) -> str:
-    """Of what the loud findings speak for, what the replay gains nothing by: else one would simulate it next."""
-    of = zip(report.parity_effects, report.parity_sd, strict=False)
-    loud = {effect for effect, sd in of if abs(sd) > LOUD_SD}
+def _in_vain(report: DiagnoseReport, loud: set[str]) -> str:
+    """Of the effects that the loud findings speak for, what the replay gains nothing by: else one would simulate it
+    next."""
     gains = {one.effect: one.elpd_gain if one.marginal_nats is None else one.marginal_nats
              for one in report.ranking if one.effect in loud and one.fitted}  # fmt: skip
     idle = [f"{effect} ({gain:+z.1f} nats)" for effect, gain in gains.items() if gain <= 0.0]

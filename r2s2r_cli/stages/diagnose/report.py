@@ -14,6 +14,7 @@ from r2s2r_cli.stages.diagnose.which.numbers import NUISANCES
 from r2s2r_cli.stages.diagnose.which.shifts import CAMERA
 from r2s2r_cli.stages.diagnose.words import sentence
 from r2s2r_cli.stages.effects import all_effects
+from schemas.parity import ParityFound, columns
 from schemas.results_diagnose import (
     DiagnoseReport,
     ElementFound,
@@ -34,7 +35,6 @@ MOST_SD = 1e6
 def diagnose_report(found: Diagnosis) -> DiagnoseReport:
     """Of a diagnosis; wall time and files are added by the command."""
     which = found.which
-    told = _parity(found)
     return DiagnoseReport(
         verdict=which.verdict, sentence=sentence(found), effects=which.effects, probability=which.probability,  # type: ignore[arg-type]
         set90=which.set90, ranking=tuple(_ranked(one) for one in which.ranking),
@@ -51,11 +51,10 @@ def diagnose_report(found: Diagnosis) -> DiagnoseReport:
         gap_nats=_known(which.left.refit), left_nats=_known(which.left.best), left_sd_nats=_known(which.left.sd),
         stranger_sd2=None if which.stranger is None else which.stranger.left,
         calibrated=which.calibrated, left_out=which.within, segments=_segments(found),
-        hidden=tuple(shift.words for shift in which.shifts), parity=tuple(words for words, _, _ in told),
-        parity_sd=tuple(sd for _, sd, _ in told), parity_effects=tuple(effect for _, _, effect in told),
-        missing=_missing(found),
+        hidden=tuple(shift.words for shift in which.shifts), missing=_missing(found),
         refit=found.refit, refit_units={name: _unit(name) for name in found.refit}, rollouts=found.rollouts,
         within_run=found.within_run, warnings=found.warnings,
+        **columns(_parity(found)),
     )  # fmt: skip
 
 
@@ -127,11 +126,16 @@ def _segments(found: Diagnosis) -> tuple[SegmentFound, ...]:
     )  # fmt: skip
 
 
-def _parity(found: Diagnosis) -> list[tuple[str, float, str]]:
-    """The findings that are told: in words, how far each stands out [sd], and the effect it speaks for most."""
+def _parity(found: Diagnosis) -> list[ParityFound]:
+    """The findings that are told."""
     told = () if found.parity is None else found.parity.significant[:FINDINGS]
-    return [(f"{one.what} ({one.z:+.1f} sd)", float(np.clip(one.z, -MOST_SD, MOST_SD)),
-             one.suspicions[0].effect if one.suspicions else "") for one in told]  # fmt: skip
+    return [
+        ParityFound(
+            f"{one.what} ({one.z:+.1f} sd)", float(np.clip(one.z, -MOST_SD, MOST_SD)),
+            one.suspicions[0].effect if one.suspicions else "",
+        )
+        for one in told
+    ]  # fmt: skip
 
 
 def _missing(found: Diagnosis) -> tuple[str, ...]:

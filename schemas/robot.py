@@ -33,7 +33,6 @@ Vector3 = tuple[Coordinate, Coordinate, Coordinate]
 Index = Annotated[int, Field(strict=True, ge=0)]
 Hue = Annotated[float, Field(strict=True, ge=0, le=180)]
 Channel = Annotated[float, Field(strict=True, ge=0, le=255)]
-ROBOT_SCHEMA_VERSION = 1
 
 
 class Lump(Frozen):

@@ -27,17 +27,6 @@ ROD_TOLERANCE = 0.1
 """A camera whose scale is wrong is something to be diagnosed, not refused."""
 
 
-def set_names(folder: Path) -> tuple[str, ...]:
-    """Names of the sets of a bank, sorted. Raises InputError where there is none."""
-    found = tuple(sorted(one.parent.name for one in folder.glob("*/robot.toml")))
-    if not found:
-        raise InputError(
-            "there are no blind sets", where=str(folder), expected="folders with robot.toml and gaits/",
-            received="none", hint="r2s2r blind make bank --key labels.key",
-        )  # fmt: skip
-    return found
-
-
 def read_set(folder: Path, *, shuffled: int | None = None) -> Evidence:
     """The evidence of one set. The simulator is that of its robot.toml: nothing was identified before.
 

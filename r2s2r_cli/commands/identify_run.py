@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from r2s2r_cli.commands.interrupts import loaded
 from r2s2r_cli.console import Console
@@ -95,10 +95,3 @@ def _shown(console: Console, clock: Clock) -> Iterator[Callable[[Step], None]]:
             show(step.part, step.done, step.total, "" if step.cost is None else f"loss {step.cost:.6g}")
 
         yield progress
-
-
-def _loaded_self_test() -> Iterator[Any]:
-    import r2s2r_cli.engine  # noqa: F401
-    import r2s2r_cli.stages.identify.self_tested as stage
-
-    yield stage

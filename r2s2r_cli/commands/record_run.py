@@ -58,7 +58,7 @@ def carry_out(wish: Wish, console: Console) -> None:
         assert session is not None  # noqa: S101 - an error without a session was raised above
         signals.standing()
         result = _seal(wish, recording, session, console)
-    _finish(wish, session.report(), result, ended, console)
+    _finish(session.report(), result, ended, console)
 
 
 def _camera(spec: str | None, stack: ExitStack) -> tuple[CameraFeed | None, CameraFacts | None]:
@@ -130,9 +130,7 @@ def _not_interrupted() -> Iterator[None]:
                           hint="r2s2r recover") from error  # fmt: skip
 
 
-def _finish(
-    wish: Wish, report: RecordReport, result: StageResult | None, ended: BaseException | None, console: Console
-) -> None:
+def _finish(report: RecordReport, result: StageResult | None, ended: BaseException | None, console: Console) -> None:
     """Say what there is; then raise what ended the recording early."""
     from r2s2r_cli.commands.outcome import show_outcome
     from r2s2r_cli.views.record_page import report_tables

@@ -16,12 +16,11 @@ _STAMP_ROUNDING_S = 1e-6
 
 WINDOW = 5
 """Frames of one local line."""
-_DOF = WINDOW - 2
-"""Degrees of freedom left by a straight line."""
 _CUT = 7.8147
-"""95 % quantile of chi-square with `_DOF` degrees of freedom: windows beyond it are taken for motion."""
+"""95 % quantile of chi-square with the WINDOW - 2 degrees of freedom that a straight line leaves: windows beyond it are
+taken for motion."""
 _MEDIAN = 2.3660
-"""Median of chi-square with `_DOF` degrees of freedom."""
+"""Median of the same chi-square."""
 _MAX_ITERATIONS = 100
 
 GAP_FACTOR = 5.0

@@ -77,7 +77,7 @@ def seal(journal: Path, target: Path, *, recovered: bool = False, late: Late | N
     with unwatched(journal):
         head, start = read_head(journal)
         provenance = _with_late(_provenance(journal, head), late)
-        rows, end, lost = _survey(journal, head, start)
+        rows, end, lost = _survey(journal, start)
         torn_from = torn_at(journal, end)
         lost += torn_from - end
         torn = journal.stat().st_size - torn_from
@@ -109,7 +109,7 @@ def _with_late(provenance: Provenance, late: Late | None) -> Provenance:
     )
 
 
-def _survey(journal: Path, head: JournalHead, start: int) -> tuple[dict[int, Rowset], int, int]:
+def _survey(journal: Path, start: int) -> tuple[dict[int, Rowset], int, int]:
     """The whole rows by stream, where the last one ends, and how many bytes between them are damaged."""
     rows: dict[int, Rowset] = {}
     end, lost = start, 0

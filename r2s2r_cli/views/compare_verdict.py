@@ -32,7 +32,7 @@ def verdict(report: CompareReport) -> str:
     words = [ends, _against(first.model, last.model, b)]
     if len(report.models) > 2:
         before = report.models[-2]
-        words.append(_beside(before.model, last.model, before.heldout if held else before.runs, b))
+        words.append(_beside(before.model, before.heldout if held else before.runs, b))
     return " ".join(word for word in words if word)
 
 
@@ -45,7 +45,7 @@ def _in_part(report: CompareReport) -> str:
     return f" ({done} of {of} target intervals: {counted(cut, 'run')} in part)" if cut else ""
 
 
-def _beside(before: str, last: str, side: Mapping[str, CompareMeasure], now: Mapping[str, CompareMeasure]) -> str:
+def _beside(before: str, side: Mapping[str, CompareMeasure], now: Mapping[str, CompareMeasure]) -> str:
     """What the last simulator is beside the one named before it: with an effect and without, say."""
     both = {name: (scale * side[name].rms, scale * now[name].rms, text) for name, (text, scale) in MEASURES.items()
             if name in side and name in now}  # fmt: skip

@@ -49,15 +49,6 @@ def depth_order(g: Graph, nodes: Sequence[int]) -> list[int]:
     return sorted(nodes, key=lambda i: (depth[i] // BUCKET, i))
 
 
-def dependent(g: Graph, nodes: Sequence[int], kinds: Iterable[str]) -> set[int]:
-    """Those nodes that read an input of one of these kinds."""
-    wanted, found = set(kinds), set()
-    for i in nodes:
-        if g.args[i][0] in wanted if g.ops[i] == "in" else any(k in found for k in g.arguments(i)):
-            found.add(i)
-    return found
-
-
 def shared(g: Graph, outputs: Sequence[int]) -> tuple[Graph, list[int]]:
     """The program with several divisions by one number made multiplications by its reciprocal."""
     order = live(g, outputs)

@@ -31,7 +31,7 @@ class Firmware:
     def __init__(self, robot: Robot, world: World, plant: Plant) -> None:
         _check(world, len(posts(robot, world.boards.layout)))
         self._plant, self._settings = plant, world.boards
-        self._rods, self._motors, self._sensors = len(robot.rods), len(robot.motors), len(robot.sensors)
+        self._motors, self._sensors = len(robot.motors), len(robot.sensors)
         self._sign = np.array([motor.sign for motor in robot.motors], dtype=float)
         self._boards = [
             Board(i, post, world, generator(world, f"board {i}"))

@@ -43,7 +43,7 @@ def mjcf(robot: Robot, options: Options | None = None) -> str:
         *_world(robot, options, pose),
         *_tendons(robot),
         *_actuators(robot, pose),
-        *_keyframe(robot, pose),
+        *_keyframe(pose),
         "</mujoco>",
     ]
     return "\n".join(lines) + "\n"
@@ -199,7 +199,7 @@ def _actuators(robot: Robot, pose: Pose) -> Iterator[str]:
     yield "  </actuator>"
 
 
-def _keyframe(robot: Robot, pose: Pose) -> Iterator[str]:
+def _keyframe(pose: Pose) -> Iterator[str]:
     qpos = [_n(*p, *wxyz(q)) for p, q in zip(pose.p_WR, pose.q_WR, strict=True)]
     yield ""
     yield "  <keyframe>"

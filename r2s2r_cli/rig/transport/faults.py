@@ -26,7 +26,6 @@ class Channel:
     def __init__(self, wire: Wire, rng: np.random.Generator, *, stream: bool, still: bool = False) -> None:
         self._wire, self._rng, self._stream = wire, rng, stream
         self._pause = 0.0 if still else wire.pause_s
-        self._still = still
         self._heap: list[Piece] = []
         self._count = 0
         self._held: tuple[bytes, int | None, float] | None = None

@@ -54,16 +54,14 @@ def predicted(
     driver = Driver(model.numbers.robot, settings, cache_dir, model.numbers)
     found = []
     for run in runs:
-        walk, real, warnings = _closed_loop(driver, run, settings)
+        walk, real, warnings = _closed_loop(driver, run)
         key, more = _keyframes(driver, model, run, settings)
         found.append(PredictedRun(run.name, walk, real, key, (*warnings, *more)))
         done()
     return tuple(found)
 
 
-def _closed_loop(
-    driver: Driver, run: RealRun, settings: SimulateSettings
-) -> tuple[Walk | None, Walk | None, list[str]]:
+def _closed_loop(driver: Driver, run: RealRun) -> tuple[Walk | None, Walk | None, list[str]]:
     """The policy with the controller in the loop, started where the opening rest of the run ended, at rest."""
     words = "the state at the end of the opening rest" if run.opening.intervals else "the first state"
     start = Start(f"{words} of run {run.name}", run.walk.p_WE[0])

@@ -29,13 +29,12 @@ LOST_M = 0.05
 class Run:
     """One run that is diagnosed. caps: observed end caps, commands, target intervals. lengths: what the cable sensors
     read at their own times; None where the log has none. gait: policy that was run; runs of one gait are repeats of
-    each other. boundary: whether the robot was put down by hand before it (a run of its own), which ends what drifts.
+    each other.
     """
 
     caps: RunData
     lengths: SensedRun | None = None
     gait: str = ""
-    boundary: bool = True
 
     @property
     def name(self) -> str:

@@ -44,16 +44,14 @@ class GaitLibrary:
 class NextGait:
     """name, targets: the policy. separates: the most probable candidate, taken as the truth, with every other one and
     the nats that it is told from that by; `none` is the refit nominal model. nats: what the gait is worth
-    (`next_settled.worth`); now: the best of the gaits that were run, were it run again. typical: median over the
-    library, which is what a gait taken at random is worth. narrows: target intervals by which it narrows the bound of
-    `no_gap`, where it was chosen for that; then it separates nothing."""
+    (`next_settled.worth`); now: the best of the gaits that were run, were it run again. narrows: target
+    intervals by which it narrows the bound of `no_gap`, where it was chosen for that; then it separates nothing."""
 
     name: str
     targets: Targets
     separates: tuple[tuple[str, str, float], ...]
     nats: float
     now: float | None
-    typical: float
     narrows: int | None = None
 
 
@@ -95,7 +93,6 @@ def _separating(
     return NextGait(
         best, library.gaits[best], tuple((names[0], names[j], float(nats[best][0, j])) for j in range(1, len(names))),
         value[best], max((value[name] for name in own if name in value), default=None),
-        float(np.median([value[name] for name in library.gaits if name in value])),
     )  # fmt: skip
 
 
@@ -105,7 +102,7 @@ def _narrowing(evidence: Evidence, compared: Compared, library: GaitLibrary) -> 
     if which.verdict != "ambiguous" or which.ranking[0].effect != NONE or not evidence.healthy:
         return None
     best = narrowest(compared.arena, compared.base, library.gaits, which.no_gap.floor)
-    return None if best is None else NextGait(best[0], library.gaits[best[0]], (), 0.0, None, 0.0, narrows=best[1])
+    return None if best is None else NextGait(best[0], library.gaits[best[0]], (), 0.0, None, narrows=best[1])
 
 
 def chosen(before: float, sure: Mapping[str, float]) -> str | None:

@@ -99,7 +99,7 @@ def refit(
         unheard(evidence), evidence.fit, replayer, simulator, (noise, lasts), prior, starts, begin, late, told
     )
     if not again:
-        arena, base = _frozen(arena, base, prior)
+        arena, base = _frozen(arena)
     asked = sum(len(one.intervals) for one in evidence.fit)
     if len(arena.whole) < asked:
         warnings.append(
@@ -168,9 +168,8 @@ def _from(arena: Arena, z: np.ndarray) -> Fit:
     return Fits(arena).begun([(Hypothesis(), z, np.zeros(0))])[0]
 
 
-def _frozen(arena: Arena, base: Fit, prior: tuple[np.ndarray, np.ndarray] | None) -> tuple[Arena, Fit]:
+def _frozen(arena: Arena) -> tuple[Arena, Fit]:
     """The arena in which no nuisance can move from its prior."""
-    del base
     z = arena.mean.copy()
     arena.precision = FROZEN * arena.precision
     arena.prepare(z)

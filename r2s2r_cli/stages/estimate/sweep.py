@@ -36,7 +36,7 @@ FRESH_S = 0.06
 class Swept:
     """What the pass found, one row a frame.
 
-    visible: share of each cap that is seen, (frame, cap). code: see REASONS of vision/sightings.py, uint8 (frame, cap).
+    visible: share of each cap that is seen, (frame, cap). code: as in vision/sightings.py, uint8 (frame, cap).
     shift_px: depth against colour, (frame, 2), NaN where unknown. known: caps from this frame and those before it alone
     [m], (frame, cap, 3), known_sd [m]; of frames before `first` from those after. first: frame in which the caps were
     told apart. searched: frames in which they had to be found again, (frame,) bool.

@@ -15,8 +15,6 @@ _PNG = b"\x89PNG\r\n\x1a\n"
 _PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
 _JPEG = b"\xff\xd8\xff"
 _JPEG_END = b"\xff\xd9"
-_GREY = 0
-"""PNG colour type of a depth image."""
 _COLORS = {2: "RGB", 3: "palette", 6: "RGBA"}
 _HEAD = 65536
 """A JPEG's size stands behind its metadata; a thumbnail of 64 KiB before it is the most that EXIF allows."""

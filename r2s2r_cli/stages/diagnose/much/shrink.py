@@ -68,18 +68,6 @@ class Shrinkage:
         known = self.of(model)
         return None if known is None else corrected_gap(float(np.mean(known)), self.floor)
 
-    @property
-    def refit_share(self) -> float | None:
-        """What refitting alone took off the stale nominal's gap."""
-        nominal, refit = self.of("nominal"), self.of("refit")
-        return None if nominal is None or refit is None else own_share(nominal, refit, self.floor)
-
-    @property
-    def closable(self) -> float | None:
-        """Own share of the black box: what could have been closed."""
-        refit, ceiling = self.of("refit"), self.of("ceiling")
-        return None if refit is None or ceiling is None else own_share(refit, ceiling, self.floor)
-
 
 def _means(before: np.ndarray, after: np.ndarray, kept: float) -> tuple[np.ndarray, np.ndarray]:
     """Means over the segments that count, (...,) each, of squared errors (..., segment)."""

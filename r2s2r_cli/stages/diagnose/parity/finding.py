@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from r2s2r_cli.stages.diagnose.parity.knocks import Knock
     from r2s2r_cli.stages.diagnose.parity.stranger import Stranger
 
-KINDS = ("cable", "cap", "rod", "motor", "sensor", "place", "world", "camera")
-"""Kinds of elements, as `diagnose --json` has them."""
 MOST_NATS = 60.0
 """However far a finding stands out, it says no more than this for an effect or a channel."""
 ABSOLUTE = 0.25
@@ -25,8 +23,9 @@ from runs of the same robot, and how far robots are from their robot.toml is kno
 
 @dataclass(frozen=True)
 class Element:
-    """A part that a finding is about. kind: of KINDS. index: of the cable for cables, motors and sensors; None where it
-    is all of the kind, or the kind has no numbers. xy_m: of a place on the floor [m], frame W."""
+    """A part that a finding is about. kind: as `ElementFound` of the report has it. index: of the cable for cables,
+    motors and sensors; None where it is all of the kind, or the kind has no numbers. xy_m: of a place on the floor [m],
+    frame W."""
 
     kind: str
     index: int | None = None

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from r2s2r_cli.stages.identified import Identified
 
-G = 9.81
-
 
 class Probe(Hooks):
     """All probes of the engine.

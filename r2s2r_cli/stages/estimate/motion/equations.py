@@ -35,7 +35,7 @@ def equations(x: np.ndarray, evidence: Evidence, body: Body, settings: MotionSet
     _sensors(frames, x, evidence, body)
     _floor(frames, x, evidence, body, settings)
     add_crossings(frames, x, body)
-    upper = _motion(frames, x, evidence, body, settings)
+    upper = _motion(frames, x, evidence, body)
     _start(frames, x, body, settings)
     return frames.cost, Normal(frames.matrix, upper, frames.gradient)
 
@@ -125,7 +125,7 @@ def unit_information(dt: np.ndarray) -> np.ndarray:
     return np.moveaxis(rows, 2, 0)
 
 
-def _motion(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body, settings: MotionSettings) -> np.ndarray:
+def _motion(frames: Frames, x: np.ndarray, evidence: Evidence, body: Body) -> np.ndarray:
     dt = np.diff(evidence.t)
     n, half = len(x), 3 * body.caps
     w = np.repeat(transition_information(evidence), 3, axis=1)

@@ -23,7 +23,6 @@ class Survey:
     ground: Ground | None = None
     noise: DepthNoise = field(default_factory=DepthNoise)
     shift_px: tuple[float, float] = (0.0, 0.0)
-    shift_sd_px: float = float("nan")
     swell_px: float = 0.0
     swell_sd_px: float = 0.3
     frames: tuple[int, ...] = ()
@@ -31,8 +30,6 @@ class Survey:
     height_sd: float = float("nan")
     """Of the camera's distance from the ground [m]; NaN: not known."""
 
-    def with_colors(
-        self, *, shift_px: tuple[float, float], shift_sd_px: float, swell_px: float, swell_sd_px: float
-    ) -> Survey:
+    def with_colors(self, *, shift_px: tuple[float, float], swell_px: float, swell_sd_px: float) -> Survey:
         """The same with what the caps showed."""
-        return replace(self, shift_px=shift_px, shift_sd_px=shift_sd_px, swell_px=swell_px, swell_sd_px=swell_sd_px)
+        return replace(self, shift_px=shift_px, swell_px=swell_px, swell_sd_px=swell_sd_px)

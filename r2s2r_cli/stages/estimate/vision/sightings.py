@@ -13,22 +13,13 @@ colour where it should be. DOUBTFUL: something of its colour that is no sphere o
 NO_PICTURE: no colour picture, or a blank one.
 """
 
-REASONS = {
-    SEEN: "seen in colour and depth",
-    COLOR_ONLY: "seen in colour, no depth on it",
-    OUT_OF_VIEW: "out of the picture",
-    HIDDEN: "hidden: nothing of its colour where it should be",
-    DOUBTFUL: "of its colour, but no sphere of its size",
-    NO_PICTURE: "no picture, or a blank one",
-}
-
 
 @dataclass(frozen=True)
 class Sightings:
     """Caps seen in one frame, independent of the prediction that told where to look.
 
     p_C: centres in frame C [m], (cap, 3), NaN where not seen. cov_C: their covariance [m^2], (cap, 3, 3), NaN likewise.
-    visible: share 0 .. 1 of each cap's disc that is seen in its colour, (cap,). code: uint8 (cap,), see `REASONS`.
+    visible: share 0 .. 1 of each cap's disc that is seen in its colour, (cap,). code: uint8 (cap,), see `SEEN`.
     shift_px: where depth shows the caps minus where colour does [px], (2,) along u and v, mean over the caps with
     its covariance (2, 2), beyond the shift that was corrected already; NaN where depth cannot tell.
     """

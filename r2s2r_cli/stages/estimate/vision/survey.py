@@ -91,7 +91,7 @@ def survey(
         X_WC, ground, _ = _posed(source.X_WC, ground, [])
         first = replace(first, X_WC=X_WC, ground=ground)
     shift, shift_sd = _pooled(rough)
-    second = first.with_colors(shift_px=shift, shift_sd_px=shift_sd, swell_px=0.0, swell_sd_px=0.3)
+    second = first.with_colors(shift_px=shift, swell_px=0.0, swell_sd_px=0.3)
     fine = _caps(usable, robot, lens, scale, second) if np.hypot(*shift) > 0.3 else rough
     if fine is not rough:
         more, shift_sd = _pooled(fine)
@@ -100,7 +100,7 @@ def survey(
     if np.hypot(*shift) > max(0.25, 4 * shift_sd):
         warnings.append(f"depth lies ({shift[0]:+.2f}, {shift[1]:+.2f}) pixels beside colour; this is corrected")
     return Survey(
-        X_WC, ground, noise, shift, shift_sd, swell, 0.1 if len(fine.swell) >= 6 else 0.3,
+        X_WC, ground, noise, shift, swell, 0.1 if len(fine.swell) >= 6 else 0.3,
         tuple(int(i) for i in index), tuple(warnings), height_sd,
     )  # fmt: skip
 

@@ -150,7 +150,7 @@ def identifiability(
     words = tuple(_words(frees, z0[:p], width, rows[k], eigenvalue[k]) for k in range(p))
     weak = eigenvalue < THRESHOLD
     trust = tuple(trust_of(share) for share in left_of(sd_z).tolist())
-    reason = tuple(_reason(i, frees, z0, width, sd_z, dead, stalled | rough) for i in range(p))
+    reason = tuple(_reason(i, frees, width, sd_z, dead, stalled | rough) for i in range(p))
     return Identifiability(
         problem.names, z0[:p], width, column_norm, secant_norm, scaled, eigenvalue, rows, weak, words,
         sd_z * width, sd_z * width * slopes_of(tuple(frees), z0[:p]), sd_flat(eigenvalue, rows) * width, trust, reason,
@@ -210,7 +210,6 @@ def trust_of(share: float) -> Trust:
 def _reason(
     i: int,
     frees: Sequence[Free],
-    z: np.ndarray,
     width: np.ndarray,
     sd: np.ndarray,
     dead: np.ndarray,

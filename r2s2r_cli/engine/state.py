@@ -106,14 +106,6 @@ def cable_ends(structure: Structure, device: torch.device) -> Tensor:
     return torch.tensor(structure.cable_rods, dtype=torch.long, device=device).reshape(-1, 2)
 
 
-def attachment_points(structure: Structure, theta: Parameters, state: State) -> Tensor:
-    """Attachment points p_WS [m], (B, cable, 2, 3)."""
-    R_WR = roma.unitquat_to_rotmat(state.q_WR)
-    rods = cable_ends(structure, R_WR.device)
-    p_BS = theta.p_BS.expand(len(R_WR), -1, -1, -1)
-    return state.p_WB[:, rods] + torch.einsum("bkeij,bkej->bkei", R_WR[:, rods], p_BS)
-
-
 def middles(theta: Parameters, state: State) -> tuple[Tensor, Tensor]:
     """Middle between the caps of each rod p_WR [m] and its velocity [m/s], each (B, rod, 3): what artifacts hold."""
     shape = (len(state.p_WB), -1, 2, 3)

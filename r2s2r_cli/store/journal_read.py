@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import io
 import json
 import math
 import zlib
@@ -132,12 +131,6 @@ def _next_mark(file: BinaryIO, position: int, size: int) -> int:
             return position + found
         position += step
     return size
-
-
-def decode(stream: Stream, payload: bytes) -> dict[str, np.ndarray | bytes]:
-    """The row that a record holds."""
-    file = io.BytesIO(payload)
-    return {field.name: read_field(file, 0, stream, field.name) for field in stream.fields}
 
 
 def read_field(file: BinaryIO, offset: int, stream: Stream, name: str) -> np.ndarray | bytes:

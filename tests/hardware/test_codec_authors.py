@@ -56,7 +56,7 @@ def test_speeds_of_boards_are_parts_of_99() -> None:
     assert line.data == b"0 0 0 99.00 -99.00 49.50 0.00 0.99 -69.30 0 0 0\n"
     assert BOARDS.stop().data == b"0 0 0 0 0 0 0 0 0 0 0 0\n"
     assert line.every_board and BOARDS.stop().every_board and BOARDS.emergency().every_board
-    assert BOARDS.hello() is None and BOARDS.reset() is None and BOARDS.beat() is None
+    assert BOARDS.hello() is None and BOARDS.reset() is None
 
 
 def test_legacy_counts_become_farad() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from r2s2r_cli.errors import InputError
-from r2s2r_cli.rig.model import poses_at, rest_pose
+from r2s2r_cli.rig.model import rest_pose
 from r2s2r_cli.rig.model.frames import quaternion, rest_frames, rotation, site_spans, wxyz, xyzw
 from r2s2r_cli.stages.init.attachment import rod_frames, site_points
 from schemas.robot import Robot
@@ -66,31 +66,9 @@ def test_a_turn_about_x_is_written_as_mujoco_writes_it() -> None:
     np.testing.assert_array_equal(xyzw(wxyz(np.arange(8.0).reshape(2, 4))), np.arange(8.0).reshape(2, 4))
 
 
-def test_poses_of_the_rest_caps_are_the_rest_pose() -> None:
-    """The smallest rotation out of the rest frames is none where nothing moved."""
-    robot = known()
-    at, rest = poses_at(robot, np.array(robot.rest_caps_m)), rest_pose(robot)
-    for name in ("p_WR", "q_WR", "rest"):
-        np.testing.assert_allclose(getattr(at, name), getattr(rest, name), atol=1e-12)
-
-
-def test_poses_of_moved_caps_point_at_them_and_do_not_roll() -> None:
-    """z leads to the odd cap, also for a rod turned end for end, and the turn's axis is perpendicular to the rod."""
-    robot = known()
-    generator = np.random.default_rng(5)
-    p_WE = np.array(robot.rest_caps_m) + generator.normal(scale=0.05, size=(6, 3))
-    p_WE[[0, 1]] = np.array(robot.rest_caps_m)[[1, 0]]
-    pose, before = poses_at(robot, p_WE), rest_frames(robot)
-    R_WR = rotation(pose.q_WR)
-    axes = p_WE[1::2] - p_WE[0::2]
-    np.testing.assert_allclose(R_WR[..., 2], axes / np.linalg.norm(axes, axis=1, keepdims=True), atol=1e-12)
-    for i in range(3):
-        q = quaternion(R_WR[i] @ before[i].T)
-        assert abs(q[:3] @ before[i][:, 2]) < 1e-12
-
-
 def test_a_rod_without_length_is_refused() -> None:
     """Two equal caps: the message names them."""
+    caps = [[0, 0, 0], [0, 0, 1], [1, 0, 0], [1, 0, 0], [2, 0, 0], [2, 0, 1]]
     with pytest.raises(InputError, match="two caps of rod 1 are one point") as caught:
-        poses_at(known(), np.array([[0, 0, 0], [0, 0, 1], [1, 0, 0], [1, 0, 0], [2, 0, 0], [2, 0, 1]]))
+        rest_frames(known().model_copy(update={"rest_caps_m": caps}))
     assert caught.value.where == "caps 2 and 3"

@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+import roma
 import torch
+from torch import Tensor
 
-from r2s2r_cli.engine import cap_lengths, end_caps
-from r2s2r_cli.engine.state import attachment_points
+from r2s2r_cli.engine import Parameters, State, cap_lengths, end_caps
+from r2s2r_cli.engine.state import cable_ends
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.calibrate.masses import mass_properties
-from r2s2r_cli.stages.init.robots import ROBOTS, robot_toml
+from r2s2r_cli.stages.init.facts import FACTS
+from r2s2r_cli.stages.init.robots import robot_toml
 from r2s2r_cli.stages.model import REST_MIN, parameters_of, rest_state, structure_of
 from schemas.robot import Robot
 
@@ -42,7 +45,14 @@ def unchecked(field: str, value: float) -> Robot:
     return good.model_copy(update={key: (items[0].model_copy(update={field: value}), *items[1:])})
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+def sites(known: Robot, theta: Parameters, state: State) -> Tensor:
+    """Attachment points p_WS [m], (B, cable, 2, 3)."""
+    R_WR = roma.unitquat_to_rotmat(state.q_WR)
+    rods = cable_ends(structure_of(known), R_WR.device)
+    return state.p_WB[:, rods] + torch.einsum("bkeij,bkej->bkei", R_WR[:, rods], theta.p_BS)
+
+
+@pytest.mark.parametrize("name", FACTS)
 def test_every_robot_fits_its_structure(name: str) -> None:
     """Rods, cables and winches of each known robot, at the pose of its file."""
     known = Robot.model_validate(tomllib.loads(robot_toml(name)))
@@ -84,7 +94,7 @@ def test_an_off_centre_part_moves_caps_and_sites_in_the_body_frame() -> None:
     torch.testing.assert_close(shift[..., :2], torch.zeros_like(shift[..., :2]))
     for name in ("caps", "sites"):
         where = [
-            end_caps(t, rest_state(r)) if name == "caps" else attachment_points(structure_of(r), t, rest_state(r))
+            end_caps(t, rest_state(r)) if name == "caps" else sites(r, t, rest_state(r))
             for t, r in ((theta, heavy), (before, plain))
         ]
         torch.testing.assert_close(where[0], where[1], rtol=0, atol=1e-12)
@@ -102,8 +112,8 @@ def test_winches_turn_at_the_speed_of_their_motors() -> None:
 def test_winch_limits_are_between_attachment_points() -> None:
     """limits are distances of cap centres: at the rest pose sites are so much closer, and the limits with them."""
     theta, state, known = parameters_of(robot()), rest_state(robot()), robot()
-    sites = attachment_points(structure_of(known), theta, state)[0]
-    apart = torch.linalg.vector_norm(sites[:, 1] - sites[:, 0], dim=-1)
+    p_WS = sites(known, theta, state)[0]
+    apart = torch.linalg.vector_norm(p_WS[:, 1] - p_WS[:, 0], dim=-1)
     caps = cap_lengths(tuple((a, b) for a, b in (c.caps for c in known.cables)), end_caps(theta, state))[0]
     offset = (apart - caps)[:6]
     assert float(offset.max()) < -0.01
@@ -124,8 +134,8 @@ def test_cables_at_the_rod_ends() -> None:
     theta, state = parameters_of(known), rest_state(known)
     assert not theta.p_BS[..., :2].any()
     pairs = tuple((a, b) for a, b in (cable.caps for cable in known.cables))
-    sites = attachment_points(structure_of(known), theta, state)
-    torch.testing.assert_close(torch.linalg.vector_norm(sites[:, :, 1] - sites[:, :, 0], dim=-1),
+    p_WS = sites(known, theta, state)
+    torch.testing.assert_close(torch.linalg.vector_norm(p_WS[:, :, 1] - p_WS[:, :, 0], dim=-1),
                                cap_lengths(pairs, end_caps(theta, state)), rtol=0, atol=2e-6)  # fmt: skip
     assert theta.rest_max[0].tolist() == pytest.approx([known.limits.cable_length_max_m] * 6, abs=2e-6)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import signal
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,16 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from r2s2r_cli.errors import ArtifactError, UsageError
 from r2s2r_cli.store import journal as module
 from r2s2r_cli.store.journal import Field, Journal, JournalHead, Stream
-from r2s2r_cli.store.journal_read import decode, read_head, records, unwatched
+from r2s2r_cli.store.journal_read import read_field, read_head, records, unwatched
 from tests.support.recorder import COLOR, RUN, SENSORS, append, head, image, sensor_row, write
 
 IN_A_FOLDER = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def decode(stream: Stream, payload: bytes) -> dict[str, Any]:
+    """The row that a record holds."""
+    file = io.BytesIO(payload)
+    return {field.name: read_field(file, 0, stream, field.name) for field in stream.fields}
 
 
 def rows(path: Path) -> list[tuple[int, dict[str, Any]]]:

@@ -163,10 +163,6 @@ class Codec(Protocol):
         """Take the latch off; None where the device has none."""
         ...
 
-    def beat(self) -> Outgoing | None:
-        """Ask for a sign of life; None where there is no such question."""
-        ...
-
     def tick(self, k: int) -> Outgoing:
         """In lock-step: go on for tick k."""
         ...

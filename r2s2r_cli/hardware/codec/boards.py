@@ -86,9 +86,6 @@ class BoardsCodec:
     def reset(self) -> None:
         """There is nothing to reset on the boards."""
 
-    def beat(self) -> None:
-        """There is no question that they would answer."""
-
     def tick(self, k: int) -> Outgoing:
         """Any one board will do."""
         return Outgoing(b"#tick %d\n" % k)

@@ -121,10 +121,6 @@ class CheckedCodec:
         """The device waits for a hello afterwards."""
         return self._line("R", "RESET")
 
-    def beat(self) -> Outgoing:
-        """Does not feed the watchdog."""
-        return self._line("B")
-
     def tick(self, k: int) -> Outgoing:
         """Answered by TickDone."""
         seq = self._next()

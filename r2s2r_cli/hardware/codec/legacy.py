@@ -72,9 +72,6 @@ class LegacyCodec:
     def reset(self) -> None:
         """There is nothing to reset on the robot."""
 
-    def beat(self) -> None:
-        """There is no question that it would answer."""
-
     def tick(self, k: int) -> Outgoing:
         """Understood by a rig only."""
         return Outgoing(_PADDING + b"#tick %d\n" % k)

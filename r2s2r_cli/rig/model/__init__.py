@@ -4,6 +4,6 @@
 """
 
 from r2s2r_cli.rig.model.bodies import Body as Body, body_of as body_of
-from r2s2r_cli.rig.model.frames import Pose as Pose, poses_at as poses_at, rest_pose as rest_pose
+from r2s2r_cli.rig.model.frames import Pose as Pose, rest_pose as rest_pose
 from r2s2r_cli.rig.model.mjcf_text import mjcf as mjcf
 from r2s2r_cli.rig.model.options import STIFF as STIFF, Options as Options

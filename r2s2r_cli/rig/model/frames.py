@@ -38,20 +38,6 @@ def rest_pose(robot: Robot) -> Pose:
     return Pose(p_WR, np.array([quaternion(R) for R in R_WR]), spans[list(robot.actuated)])
 
 
-def poses_at(robot: Robot, p_WE: np.ndarray) -> Pose:
-    """The pose with end caps at p_WE [m], (cap, 3), each rod turned out of its rest frame by the smallest rotation.
-
-    Caps say nothing about how far a rod has rolled; winched cables are as long as the distance they then span.
-    Raises InputError where two caps of a rod coincide.
-    """
-    p_WE = np.asarray(p_WE, dtype=float)
-    axes = _axes(p_WE)
-    R_WR = np.array([_least_turn(R[:, 2], z) @ R for R, z in zip(rest_frames(robot), axes, strict=True)])
-    p_WR = _middles(p_WE)
-    spans = site_spans(robot, p_WR, R_WR)
-    return Pose(p_WR, np.array([quaternion(R) for R in R_WR]), spans[list(robot.actuated)])
-
-
 def rest_frames(robot: Robot) -> np.ndarray:
     """R_WR of every rod at rest, (rod, 3, 3). Raises InputError for a rod without length."""
     frames = []
@@ -134,17 +120,3 @@ def _axes(p_WE: np.ndarray) -> np.ndarray:
             expected="two different points", received=f"{p_WE[2 * rod]}", hint="correct rest_caps_m in robot.toml",
         )  # fmt: skip
     return np.asarray(d / length[:, None])
-
-
-def _least_turn(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The smallest rotation (3, 3) that takes the direction a to b."""
-    middle = a + b
-    if np.linalg.norm(middle) < 1e-9:
-        across = np.cross(a, UP if abs(a[2]) < 0.9 else FORWARD)
-        across = across / np.linalg.norm(across)
-        return np.asarray(2 * np.outer(across, across) - np.eye(3))
-    middle = middle / np.linalg.norm(middle)
-    # Two half turns, about the bisector and about a, make the turn from a to b.
-    half_turn_a = 2 * np.outer(a, a) - np.eye(3)
-    half_turn_m = 2 * np.outer(middle, middle) - np.eye(3)
-    return np.asarray(half_turn_m @ half_turn_a)

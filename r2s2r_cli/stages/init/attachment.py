@@ -78,18 +78,6 @@ def rod_frames(p_WE: np.ndarray) -> np.ndarray:
     return np.stack([x, np.cross(z, x), z], axis=-1)
 
 
-def attachment_sites(
-    p_WE: np.ndarray,
-    cables: Sequence[tuple[int, int]],
-    cap_radius: float,
-    mode: Mode = "surface",
-    *,
-    guides: Sequence[int] = (),
-) -> np.ndarray:
-    """Attachment sites [m], shape (cable, 2, 3), each in the frame R of the rod of that cable end. See `attach`."""
-    return attach(p_WE, cables, cap_radius, mode, guides=guides).sites
-
-
 def attach(
     p_WE: np.ndarray,
     cables: Sequence[tuple[int, int]],

@@ -69,13 +69,6 @@ def prism_caps_rate(
     return v
 
 
-def passive_length(rod_length: float, edge_odd: float, edge_even: float) -> float:
-    """Length of the passive tendons, cap centre to cap centre [m]: they turn by 180 - 150 = 30 degrees."""
-    odd, even = edge_odd / np.sqrt(3.0), edge_even / np.sqrt(3.0)
-    height = _height(rod_length, edge_odd, edge_even)
-    return float(np.sqrt(height**2 + odd**2 + even**2 + 2 * odd * even * np.cos(TWIST)))
-
-
 def resting_rotation(p: np.ndarray, support: tuple[int, ...], forward: np.ndarray) -> np.ndarray:
     """Rotation R_WP, shape (3, 3), that lays a body on three of its caps.
 
@@ -116,21 +109,6 @@ def prism_rest(rod_length: float, edge: float, cap_radius: float) -> np.ndarray:
     """The prism at rest, p_WE [m], shape (6, 3): on caps 0, 2, 5, its axis (even to odd) along x."""
     p = prism_caps(rod_length, edge, edge)
     return lay_down(p, PRISM_SUPPORT, np.array([0.0, 0.0, 1.0]), cap_radius)
-
-
-def support_margin(p_WE: np.ndarray, support: tuple[int, ...]) -> float:
-    """How far the centre of mass stands inside its support triangle, seen from above [m]; negative: it tips over.
-
-    p_WE: caps [m], shape (cap, 3). All rods weigh the same and balance in their middle, so the centre of mass is the
-    centroid of the caps.
-    """
-    com = p_WE.mean(axis=0)[:2]
-    corners = p_WE[list(support), :2]
-    edges = np.roll(corners, -1, axis=0) - corners
-    arms = com - corners
-    cross = edges[:, 0] * arms[:, 1] - edges[:, 1] * arms[:, 0]
-    turn = edges[0, 0] * edges[1, 1] - edges[0, 1] * edges[1, 0]
-    return float((np.sign(turn) * cross / np.linalg.norm(edges, axis=1)).min())
 
 
 def _height(rod_length: float, edge_odd: float, edge_even: float) -> float:

@@ -12,9 +12,6 @@ from r2s2r_cli.stages.init.attachment import Mode, attach
 from r2s2r_cli.stages.init.facts import FACTS, HSV_SOURCE, LEGEND, SATURATION_MIN, VALUE_MIN
 from r2s2r_cli.stages.init.robot_facts import Fact, Part, RobotFacts
 
-ROBOTS: dict[str, str] = {name: facts.title for name, facts in FACTS.items()}
-"""Name and one-line title of every robot that `init` knows."""
-
 _DECIMALS = 6
 """Derived points are written to the micrometre, far below what anyone can measure on the robot."""
 

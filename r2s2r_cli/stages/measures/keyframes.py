@@ -33,13 +33,6 @@ class KeyframeErrors:
         """Root mean square over caps (segment,) [m], NaN where nothing was predicted."""
         return np.sqrt(self.mse)
 
-    @property
-    def per_cap_m(self) -> np.ndarray:
-        """Root mean square over judged segments (cap,) [m]; NaN where no segment was predicted."""
-        if not self.judged.any():
-            return np.full(self.squared.shape[1], np.nan)
-        return np.sqrt(self.squared[self.judged].mean(axis=0))
-
 
 def keyframe_errors(observed: np.ndarray, simulated: np.ndarray) -> KeyframeErrors:
     """Of observed and simulated end caps at the key frames, both (segment, cap, 3) [m].

@@ -39,11 +39,6 @@ class Symmetry:
     turn: np.ndarray
     misfit_m: float
 
-    @property
-    def reverses(self) -> tuple[bool, ...]:
-        """Of each rod, whether its even cap takes the place of an odd one."""
-        return tuple(self.caps[2 * rod] % 2 == 1 for rod in range(len(self.rods)))
-
     def relabelled(self, targets: np.ndarray) -> np.ndarray:
         """Targets or commands (..., actuated) for the robot whose caps have changed places: what motor k did is now
         done by motor motors[k]."""

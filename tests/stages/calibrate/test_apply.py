@@ -9,7 +9,8 @@ import pytest
 
 from r2s2r_cli.errors import InputError, NumericalError
 from r2s2r_cli.stages.calibrate import apply_changes, with_parts, with_sensor_line, with_tendon
-from r2s2r_cli.stages.init.robots import ROBOTS, robot_toml
+from r2s2r_cli.stages.init.facts import FACTS
+from r2s2r_cli.stages.init.robots import robot_toml
 from schemas.results_calibrate import PartsChange, RobotChanges, SensorChange, TendonChange
 from schemas.robot import Lump, Robot
 
@@ -132,7 +133,7 @@ def test_parts_as_inline_tables(robot_text: str) -> None:
     assert load(text).rods[0].parts == PARTS
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", FACTS)
 def test_every_robot_takes_every_change(name: str) -> None:
     """All robots of `init`: a full calibration keeps every comment, and an empty one returns the text itself."""
     text = robot_toml(name)

@@ -12,7 +12,6 @@ from r2s2r_cli.errors import InputError, UsageError
 from r2s2r_cli.stages.init.attachment import (
     Attachment,
     attach,
-    attachment_sites,
     centre_rod,
     paper_labels,
     rod_frames,
@@ -131,9 +130,7 @@ def test_heading_and_place_do_not_matter(name: str) -> None:
     facts, p_WE, found, _ = derived(name)
     c, s = np.cos(0.7), np.sin(0.7)
     moved = p_WE @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T + [1.0, -2.0, 0.3]
-    np.testing.assert_allclose(
-        attachment_sites(moved, facts.cables, RADIUS, guides=facts.guides), found.sites, atol=1e-12
-    )
+    np.testing.assert_allclose(attach(moved, facts.cables, RADIUS, guides=facts.guides).sites, found.sites, atol=1e-12)
 
 
 def test_rod_end_mode_joins_cap_centres() -> None:

@@ -12,11 +12,10 @@ from r2s2r_cli.stages.init.facts import FACTS
 from r2s2r_cli.stages.init.prism import (
     PRISM_CABLES,
     PRISM_SUPPORT,
-    passive_length,
+    TWIST,
     prism_caps,
     prism_caps_rate,
     prism_rest,
-    support_margin,
 )
 from r2s2r_cli.stages.init.sixbar import EDGE_PER_ROD, sixbar_cables, sixbar_rest, sixbar_support
 
@@ -34,6 +33,26 @@ def rod_lengths(p: np.ndarray) -> np.ndarray:
     return np.linalg.norm(p[1::2] - p[0::2], axis=1)
 
 
+def passive_length(p: np.ndarray, edge_odd: float, edge_even: float) -> float:
+    """Length of the passive tendons, cap centre to cap centre [m]: they turn by 180 - 150 = 30 degrees."""
+    odd, even = edge_odd / np.sqrt(3.0), edge_even / np.sqrt(3.0)
+    return float(np.sqrt(np.ptp(p[:, 2]) ** 2 + odd**2 + even**2 + 2 * odd * even * np.cos(TWIST)))
+
+
+def support_margin(p_WE: np.ndarray, support: tuple[int, ...]) -> float:
+    """How far the centre of mass stands inside its support triangle, seen from above [m]; negative: it tips over.
+
+    All rods weigh the same and balance in their middle, so the centre of mass is the centroid of the caps.
+    """
+    com = p_WE.mean(axis=0)[:2]
+    corners = p_WE[list(support), :2]
+    edges = np.roll(corners, -1, axis=0) - corners
+    arms = com - corners
+    cross = edges[:, 0] * arms[:, 1] - edges[:, 1] * arms[:, 0]
+    turn = edges[0, 0] * edges[1, 1] - edges[0, 1] * edges[1, 0]
+    return float((np.sign(turn) * cross / np.linalg.norm(edges, axis=1)).min())
+
+
 @pytest.mark.parametrize(("odd", "even"), [(0.195, 0.195), (0.1, 0.2), (0.2, 0.1)])
 def test_edges_rods_and_passive_tendons(odd: float, even: float) -> None:
     """Rods and actuated edges have exactly the lengths asked for, the passive tendons the closed form's."""
@@ -42,7 +61,7 @@ def test_edges_rods_and_passive_tendons(odd: float, even: float) -> None:
     lengths = cable_lengths(p, PRISM_CABLES)
     np.testing.assert_allclose(lengths[:3], odd, rtol=0, atol=1e-15)
     np.testing.assert_allclose(lengths[3:6], even, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(lengths[6:], passive_length(ROD, odd, even), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(lengths[6:], passive_length(p, odd, even), rtol=0, atol=1e-15)
 
 
 def test_threefold_symmetry() -> None:

@@ -16,10 +16,10 @@ from r2s2r_cli.stages.init.attachment import MODES, Mode, rod_frames, site_point
 from r2s2r_cli.stages.init.facts import FACTS
 from r2s2r_cli.stages.init.init import init_texts
 from r2s2r_cli.stages.init.robot_facts import Fact
-from r2s2r_cli.stages.init.robots import ROBOTS, robot_toml
+from r2s2r_cli.stages.init.robots import robot_toml
 from schemas.robot import Robot
 
-NAMES = sorted(ROBOTS)
+NAMES = sorted(FACTS)
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 GRAMS = {"threebar": 133.4, "threebar-330": 242.9, "sixbar": 133.4}
 

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from r2s2r_cli.stages.init.robots import ROBOTS, robot_toml
+from r2s2r_cli.stages.init.facts import FACTS
+from r2s2r_cli.stages.init.robots import robot_toml
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "concepts" / "robots.md"
 BASE = "threebar"
@@ -70,7 +71,7 @@ def same(words: list[str], values: list[Any]) -> bool:
     return all(word == value if isinstance(value, str) else float(word) == value for word, value in pairs)
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", FACTS)
 def test_every_row_is_what_init_writes(name: str) -> None:
     """Each row of a robot's table has a number of its robot.toml, with that value."""
     values = numbers(name)
@@ -79,7 +80,7 @@ def test_every_row_is_what_init_writes(name: str) -> None:
         assert same(words, values[key]), (key, words, values[key])
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", FACTS)
 def test_every_number_is_on_the_page(name: str) -> None:
     """Each number of robot.toml has a row, in the robot's own table or, where it is the same, in that of threebar."""
     own, base, base_values = listed(name), listed(BASE), numbers(BASE)

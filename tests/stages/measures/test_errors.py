@@ -12,21 +12,19 @@ ZERO = np.zeros((2, 3, 3))
 
 
 def test_an_equal_offset_of_all_caps_is_the_rmse() -> None:
-    """(3, 4, 12) mm everywhere is 13 mm: overall, by segment and by cap."""
+    """(3, 4, 12) mm everywhere is 13 mm: overall and by segment."""
     errors = keyframe_errors(ZERO, ZERO + np.array([0.003, 0.004, 0.012]))
     assert errors.rmse_m == pytest.approx(0.013)
     assert errors.per_segment_m == pytest.approx([0.013] * 2)
-    assert errors.per_cap_m == pytest.approx([0.013] * 3)
 
 
 def test_squares_are_averaged_over_caps_and_segments() -> None:
-    """One cap of six off by 6 mm: 6 / sqrt(6) overall, 6 / sqrt(3) in its segment, 6 / sqrt(2) of its cap."""
+    """One cap of six off by 6 mm: 6 / sqrt(6) overall, 6 / sqrt(3) in its segment."""
     simulated = ZERO.copy()
     simulated[1, 2, 0] = 0.006
     errors = keyframe_errors(ZERO, simulated)
     assert errors.rmse_m == pytest.approx(0.006 / 6**0.5)
     assert errors.per_segment_m == pytest.approx([0.0, 0.006 / 3**0.5])
-    assert errors.per_cap_m == pytest.approx([0.0, 0.0, 0.006 / 2**0.5])
 
 
 def test_a_segment_without_prediction_is_left_out_and_said() -> None:

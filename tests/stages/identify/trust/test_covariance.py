@@ -7,9 +7,9 @@ from r2s2r_cli.stages.identify.free.base import Coordinate, Free
 from r2s2r_cli.stages.identify.solve.levenberg import levenberg_marquardt
 from r2s2r_cli.stages.identify.solve.loss import LOSSES
 from r2s2r_cli.stages.identify.trust.covariance import covariance
-from r2s2r_cli.stages.identify.trust.coverage import bias, clopper_pearson, coverage
 from r2s2r_cli.stages.identify.trust.parts import parts_of, scores_of
 from tests.stages.identify.solve.problems import formula, linear
+from tests.stages.identify.trust.coverage import bias, clopper_pearson, coverage
 from tests.stages.identify.trust.planted import linear_frees, planted, solved
 
 

@@ -182,3 +182,9 @@ def shaken(start: State, batch: int, *, seed: int, position: float, angle: float
         v_WB=start.v_WB + speed * noise(), w_R=start.w_R + spin * noise(),
         rest=start.rest.expand(batch, -1), winding=start.winding.expand(batch, -1),
     )  # fmt: skip
+
+
+def roll_between(a: State, b: State) -> Tensor:
+    """Angle about the rods' own axes by which b is turned against a [rad], (B, rod)."""
+    between = roma.quat_product(roma.quat_conjugation(a.q_WR), b.q_WR)
+    return 2 * torch.atan2(between[..., 2], between[..., 3])

@@ -12,10 +12,8 @@ import pytest
 import typer
 
 from r2s2r_cli.commands.identify import _answer, identify
-from r2s2r_cli.commands.identify_hints import completed, located, typed_options
 from r2s2r_cli.commands.identify_inputs import Asked, parse_fixed
-from r2s2r_cli.commands.identify_run import Clock
-from r2s2r_cli.errors import R2S2RError, UsageError
+from r2s2r_cli.errors import UsageError
 from r2s2r_cli.store.again import command_again
 from r2s2r_cli.store.lock import writing
 from r2s2r_cli.store.project import Project
@@ -207,76 +205,6 @@ def test_a_dry_run_checks_what_is_asked_for(estimated: Path) -> None:
     assert invoke("identify", "--test", "sample:99", "--dry-run").exit_code == 2
 
 
-@pytest.mark.parametrize(
-    "typed",
-    [
-        "--train smaple:1-2 --test smaple:3",
-        "--train smaple --test sampel:2",
-        "--train sample:1-3 --test sample:2-40",
-        "--train sample --test sample --seed 4",
-    ],
-)
-def test_the_hint_of_both_sides_can_be_pasted(estimated: Path, typed: str) -> None:
-    """Whatever is wrong with each of them: one hint, whose command is accepted."""
-    result = invoke("identify", *typed.split(), "--dry-run")
-    assert result.exit_code == 2
-    pasted = shlex.split(result.stderr.splitlines()[-1].removeprefix("hint: r2s2r "))
-    again = invoke(*pasted)
-    assert again.exit_code == 0, (pasted, again.stderr)
-    assert ("--seed" in pasted) == ("--seed" in typed)
-
-
-def refusal(hint: str, where: str = "--free", received: str = "") -> R2S2RError:
-    """An error with that hint."""
-    return UsageError("what", where=where, received=received, hint=hint)
-
-
-@pytest.mark.parametrize(
-    ("typed", "error", "expected"),
-    [
-        ("--train a:1-7 --free mass", refusal("r2s2r identify --fix mass=1"), "--train a:1-7 --fix mass=1"),
-        ("--train a:1-7 --train b", refusal("--train a:1-3"), "--train b --train a:1-3"),
-        ("--free f=3,0..1 --free g", refusal("r2s2r identify --free f=0.5,0..1"), "--free g --free f=0.5,0..1"),
-        ("--free=motor_sped", refusal("r2s2r identify --free motor_speed", received="motor_sped"),
-         "--free motor_speed"),
-        ("--free +motor_sped", refusal("r2s2r identify --free motor_speed", received="motor_sped"),
-         "--free +motor_speed"),
-        ("--method cma --drive closed-loop --seed 1",
-         refusal("r2s2r identify --drive closed-loop   # so", where="--method cma --drive closed-loop"),
-         "--seed 1 --drive closed-loop   # so"),
-        ("--free motor_speed --free motor_speed.2,0.2..0.9 --free mass",
-         refusal("r2s2r identify --free motor_speed.2", received="motor_speed, motor_speed.2"),
-         "--free mass --free motor_speed.2"),
-        ("--method paper --online", refusal("r2s2r identify --online", where="--online, --method"), "--online"),
-        ("--method papier --online", refusal("r2s2r identify --method paper"), "--online --method paper"),
-        ("--fix f=2 --dry-run --force", refusal("--fix g=0.5", received="f"), "--fix g=2 --dry-run --force"),
-        ("--fix f=2", refusal("--fix f=0.5", received="2"), "--fix f=0.5"),
-        ("--resume --seed 1", refusal("r2s2r identify --seed 1", where="iterations/001/30-identify.partial"),
-         "--seed 1"),
-        ("--resume --fix f=2", refusal("--fix g=0.5", received="f"), "--resume --fix g=2"),
-        ("--set identify.start=3", refusal("--set identify.starts=3", received="identify.start"),
-         "--set identify.starts=3"),
-    ],
-)  # fmt: skip
-def test_a_hint_keeps_what_was_asked_for(typed: str, error: R2S2RError, expected: str) -> None:
-    """The wrong option is replaced, the others stay, and the whole can be pasted."""
-    assert completed(error, shlex.split(typed)) == f"r2s2r identify {expected}"
-
-
-def test_a_hint_about_something_else_stays() -> None:
-    """Other commands are left alone; an artifact gets the way to it, once."""
-    assert completed(refusal("r2s2r estimate"), ["--train", "a"]) == "r2s2r estimate"
-    path = Path("iterations/002/20-estimate.h5")
-    shown = "r2s2r inspect iterations/002/20-estimate.h5   # frames"
-    assert located("r2s2r inspect 20-estimate.h5   # frames", [path.absolute()]) == located(shown, [path]) == shown
-
-
-def test_options_as_words() -> None:
-    """Lists repeat, flags stand alone, what was not given is left out."""
-    words = typed_options(train=["a:1", "b"], free=None, online=True, no_draw=False, seed=3, set_=["identify.starts=1"])
-    assert words == ["--train", "a:1", "--train", "b", "--online", "--seed", "3", "--set", "identify.starts=1"]
-
-
 def test_a_run_without_motion_is_looked_at_where_it_lies(estimated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The file that the hint names exists, seen from where the command was given."""
     import r2s2r_cli.stages.identify.load as load
@@ -287,36 +215,6 @@ def test_a_run_without_motion_is_looked_at_where_it_lies(estimated: Path, monkey
     assert result.exit_code == 4 and "nothing moves" in result.stderr
     path = result.stderr.splitlines()[-1].split()[3]
     assert path == "001/20-estimate.h5" and Path(path).is_file()
-
-
-def test_an_interrupt_is_one_statement(estimated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With a checkpoint of this request: what is kept, and the command that goes on; with that of another, which stays:
-    whose it is; without one: run it again."""
-    saves, kept = [True, False, False], "iterations/001/30-identify.partial"
-
-    def stopped(asked: Asked, settings: Any, checkpoint: Any, console: Any) -> None:
-        if saves.pop(0):
-            checkpoint.save({"round": 1})
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("r2s2r_cli.commands.identify_run.compute", stopped)
-    first = "r2s2r identify --train sample:1-2 --seed 4 --no-draw"
-    result = invoke(*first.split()[1:])
-    assert result.exit_code == 130
-    assert result.stderr.splitlines() == [
-        f"interrupted: what was fitted so far is kept in {kept}, nothing else was written",
-        f"hint: {first} --resume",
-    ]
-    result = invoke("identify", "--train", "sample:1-3")  # another request: that checkpoint is not its own
-    assert result.stderr.splitlines() == [
-        f"interrupted: nothing was fitted yet; {kept} is still what another request left: {first}",
-        "hint: r2s2r identify --train sample:1-3",
-    ]
-    assert result.exit_code == 130
-    (estimated / kept).unlink()
-    result = invoke("identify", "--train", "sample:1-3")
-    assert result.stderr == "interrupted: nothing is half-written; run the command again\n"
-    assert result.exit_code == 130
 
 
 def test_a_wrong_request_is_said_while_another_writes(estimated: Path) -> None:
@@ -372,14 +270,3 @@ def test_the_command_that_makes_it_again(estimated: Path) -> None:
     assert (seen["fix"], seen["with_effect"], seen["test"]) == (["restitution=0.1"], ["motor_lag"], ["sample:3"])
     assert command_again(builders.provenance(stage="identify", settings={"flags": asked(estimated).flags()}),
                          estimated / "iterations/001/30-identify.h5") == "r2s2r identify --iteration 1"  # fmt: skip
-
-
-def test_time_is_booked_to_the_part_that_was_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What came before the first part counts to it; the parts add up to the whole."""
-    now = iter([0.0, 2.0, 5.0, 6.0, 9.0, 9.0])
-    monkeypatch.setattr("time.monotonic", lambda: next(now))
-    clock = Clock()
-    for part in ("fit", "fit", "profiles", "fit"):
-        clock.enter(part)
-    assert clock.seconds() == {"fit": 8.0, "profiles": 1.0}
-    assert clock.total() == 9.0

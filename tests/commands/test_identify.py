@@ -17,8 +17,8 @@ from r2s2r_cli.stages.identified import Identified, identified as made_of
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.read import read_artifact
 from tests.commands.conftest import document, invoke
-from tests.support.builders import same
 from tests.support.engine import threebar
+from tests.support.layouts import same
 from tests.support.simulated_log import simulated_project
 
 pytestmark = pytest.mark.slow

@@ -12,7 +12,8 @@ import tomlkit
 
 from tests.commands.conftest import invoke
 from tests.support.import_samples import SIDECAR, frame_json, sample_robot, small_csv
-from tests.support.malformed import Malformed, csv_cases, json_cases, mutated, sidecar_cases
+from tests.support.malformed import Malformed, json_cases, mutated, sidecar_cases
+from tests.support.malformed_csv import csv_cases
 
 REFUSED = (3, 4)
 

@@ -15,7 +15,7 @@ from r2s2r_cli.store.isolated import IsolatedReader
 from r2s2r_cli.store.read import checked_header, load
 from schemas.results import ErrorResult
 from tests.commands.conftest import invoke
-from tests.support.builders import same
+from tests.support.layouts import same
 from tests.support.make_golden import GOLDEN
 from tests.support.mutate import KINDS_OF_DAMAGE, mutate
 from tests.support.soak import drawn

@@ -13,7 +13,8 @@ from r2s2r_cli.artifact import ArtifactData, Blobs, Group
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.write import write_artifact
 from schemas.versions import KINDS
-from tests.support.builders import BUILDERS, filled, materialised, policy, provenance, recording
+from tests.support.builders import BUILDERS, policy, provenance, recording
+from tests.support.layouts import filled, materialised
 
 IN_A_FOLDER = settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 

@@ -20,7 +20,8 @@ from r2s2r_cli.store.seal import seal
 from tests.store.conftest import Copy
 from tests.store.test_seal import check_rows
 from tests.support import recorder
-from tests.support.builders import same, simulation
+from tests.support.builders import simulation
+from tests.support.layouts import same
 from tests.support.nursery import Nursery
 from tests.support.soak import drawn
 from tests.support.versions import current, write_toy

@@ -26,7 +26,8 @@ from tests.store.conftest import Copy
 from tests.store.test_crash import check_record, check_write
 from tests.store.test_seal import check_rows
 from tests.support import recorder
-from tests.support.builders import provenance, recording, same, simulation
+from tests.support.builders import provenance, recording, simulation
+from tests.support.layouts import same
 from tests.support.nursery import Nursery
 from tests.support.small_disk import PAGE, SmallDisk, small_disk
 from tests.support.versions import current, write_toy

@@ -13,7 +13,8 @@ from r2s2r_cli.store import migrate as module
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.migrate import migrate_file, plan
 from r2s2r_cli.store.read import read_artifact
-from tests.support.builders import provenance, same
+from tests.support.builders import provenance
+from tests.support.layouts import same
 from tests.support.versions import IMAGES, LENGTHS_MM, current, write_toy
 
 

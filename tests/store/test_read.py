@@ -18,7 +18,8 @@ from r2s2r_cli.store.read import checked_header, load, read_artifact
 from r2s2r_cli.store.write import write_artifact
 from schemas.versions import KINDS
 from tests.store.conftest import Copy
-from tests.support.builders import policy, provenance, same
+from tests.support.builders import policy, provenance
+from tests.support.layouts import same
 from tests.support.soak import drawn
 
 

@@ -22,7 +22,7 @@ from r2s2r_cli.store.write import write_artifact
 from schemas.versions import KINDS
 from tests.store.conftest import Copy
 from tests.support import builders, recorder
-from tests.support.builders import same
+from tests.support.layouts import same
 from tests.support.mutate import KINDS_OF_DAMAGE, mutate
 from tests.support.soak import drawn
 

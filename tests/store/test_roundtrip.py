@@ -12,7 +12,8 @@ from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Rows
 from r2s2r_cli.store.read import describe, iter_blobs, read_artifact
 from r2s2r_cli.store.write import write_artifact
 from schemas.versions import KINDS
-from tests.support.builders import BUILDERS, filled, provenance, recording, same
+from tests.support.builders import BUILDERS, provenance, recording
+from tests.support.layouts import filled, same
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -18,7 +18,8 @@ from r2s2r_cli.store.read import read_artifact
 from r2s2r_cli.store.seal import Late, seal
 from r2s2r_cli.store.write import write_artifact
 from schemas.versions import KINDS, MIGRATIONS
-from tests.support.builders import materialised, provenance, recording
+from tests.support.builders import provenance, recording
+from tests.support.layouts import materialised
 from tests.support.recorder import COLOR, RUN, append, counts, head, image, write
 
 

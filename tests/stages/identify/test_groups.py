@@ -25,7 +25,8 @@ from r2s2r_cli.store.read import read_artifact
 from r2s2r_cli.store.write import write_artifact
 from schemas.results_identify import IdentifyReport
 from tests.stages.identify.planted import BOUNCE, found
-from tests.support.builders import provenance, same
+from tests.support.builders import provenance
+from tests.support.layouts import same
 
 BARE: dict[str, Any] = {
     "test_segments": (), "test": None, "free_runs": (), "closed_loop_m": None, "covariance": None, "information": None,

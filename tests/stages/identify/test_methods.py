@@ -25,7 +25,7 @@ from r2s2r_cli.stages.identify.trust.identifiability import Trust
 from r2s2r_cli.store.project import Project
 from schemas.config import IdentifySettings
 from tests.stages.identify.planted import SPEED as SPEED_FREE, found as planted
-from tests.support.builders import same
+from tests.support.layouts import same
 from tests.support.simulated_log import SPEED, simulated_project
 
 GAIT = """\

@@ -11,7 +11,8 @@ from r2s2r_cli.stages.import_.authors_json import parse_frame
 from r2s2r_cli.stages.import_.sidecar import check_sidecar, parse_sidecar
 from r2s2r_cli.stages.import_.trajectory import import_trajectory
 from tests.support.import_samples import SIDECAR, frame_json, sample_robot, small_csv
-from tests.support.malformed import Malformed, csv_cases, json_cases, mutated, sidecar_cases
+from tests.support.malformed import Malformed, json_cases, mutated, sidecar_cases
+from tests.support.malformed_csv import csv_cases
 
 ROBOT = sample_robot()
 GOOD_JSON = json.dumps(frame_json()).encode()

@@ -29,7 +29,7 @@ def closed_free_run(
 ) -> tuple[tuple[np.ndarray, ...], list[str]]:  # fmt: skip
     """End caps (frame, cap, 3) [m] of every chain of steps at its frames, at equal times since its start.
 
-    Commands act as late as in command replay. What the controller reads is measured on the training intervals, or, where
+    Commands act as late as in command replay. What the controller reads is measured on the training intervals or, where
     `estimate` has compared camera and sensors, over their whole runs, unless a number of the loop is free or fixed. A
     simulation that is through before the run ends waits where it is. Empty, with the reason in words, where the closed
     loop cannot be simulated: it never judges a fit.

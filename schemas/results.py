@@ -59,6 +59,8 @@ class ArtifactState(Frozen):
     artifact: str
     state: Literal["fresh", "stale", "damaged", "unsealed", "recording", "interrupted", "running"]
     reasons: tuple[str, ...]
+    mend: str = ""
+    """Of a damaged artifact the command that brings it back or makes it again, else empty."""
     notes: tuple[str, ...] = ()
     """What else is to be known of it, whatever its state: runs that were cut off."""
     overrides: dict[str, Any] = Field(default_factory=dict)

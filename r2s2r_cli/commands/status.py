@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import shlex
 import stat
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,12 +13,13 @@ import typer
 
 from r2s2r_cli.commands.mend import Mending, mending
 from r2s2r_cli.commands.next_command import explained, forward
-from r2s2r_cli.commands.unfinished import UNDER_WAY, checkpoints, interrupted, unsealed
+from r2s2r_cli.commands.unfinished import UNDER_WAY, Kept, checkpoints, interrupted, unsealed
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError, GateError
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
+from r2s2r_cli.store.again import stage_at
 from r2s2r_cli.store.brief import brief
-from r2s2r_cli.store.header import CutOff, NotAnArtifact, sealed_header, whole_header
+from r2s2r_cli.store.header import CutOff, NotAnArtifact, read_header, sealed_header, whole_header
 from r2s2r_cli.store.lock import writer
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import Header, Provenance
@@ -53,6 +56,10 @@ def status(
     ]
     if rows:
         console.table("", ["iteration", "stage", "artifact", "state", "size", "why"], rows)
+        # On lines of their own: a cell of the table breaks a command, and the hint below is of one artifact.
+        mends = list(dict.fromkeys(a.mend for a in result.artifacts if a.mend))
+        if len(mends) > 1:
+            console.say("\n".join(["to mend what is damaged, one by one:", *(f"  {mend}" for mend in mends)]))
         if not check:
             console.say("heads and sizes were read, contents were not; to compare every byte: r2s2r status --check")
     gap = _gap(here)
@@ -78,6 +85,7 @@ def status(
 LATER = {KINDS["floor"].filename: 1, KINDS["policy"].filename: 1, KINDS["comparison"].filename: 2,
          KINDS["diagnosis"].filename: 2}  # fmt: skip
 """Artifacts that read others which stand below them in the list."""
+_RECOVER = "r2s2r recover "
 
 
 def survey(project: Project, *, thorough: bool = False) -> StatusResult:
@@ -93,21 +101,19 @@ def survey(project: Project, *, thorough: bool = False) -> StatusResult:
     stale: set[str] = set()
     listed = project.artifacts()
     # As they are read: what is made of the runs of all iterations is after them, and before what reads it.
-    found = {path: _state(project, iterations.get(path.parent), path, stale, thorough)
+    found = {path: _going_on(*_state(project, iterations.get(path.parent), path, stale, thorough), kept)
              for path in sorted(listed, key=lambda path: LATER.get(path.name, 0))}  # fmt: skip
     states = [found[path][0] for path in listed]
     # A stage that reads what is damaged fails: what brings that back comes first, in the order in which it is read.
     damaged = [path for path, (state, _) in found.items() if state.state == "damaged"]
-    for state, mend in (found[path] for path in [*damaged, *(path for path in listed if path not in damaged)]):
-        going_on = kept.get((state.stage, state.iteration))
-        if mend.command:  # made anew, what is kept would be lost
-            again.append(mend.command if going_on is None else going_on.command)
+    for _, mend in (found[path] for path in [*damaged, *(path for path in listed if path not in damaged)]):
+        again += [mend.command] if mend.command else []
         runs += [mend.runs] if mend.runs else []
     busy = writer(project.root) if journals or kept else None
     states += [unsealed(project, iterations.get(path.parent), path, busy) for path in journals]
     states += [interrupted(project, one, busy) for one in kept.values()]
     if busy is None:
-        again = [f"r2s2r recover {shlex.quote(project.relative(path))}" for path in journals] + again
+        again = [f"{_RECOVER}{shlex.quote(project.relative(path))}" for path in journals] + again
         again += [one.command for one in kept.values()]
     return StatusResult(
         project=project.file.name,
@@ -165,11 +171,31 @@ def _state(
         stale.add(name)
     made = header.provenance if header else None
     line = {
-        "stage": made.stage if made else "?", "iteration": iteration.number if iteration else None, "artifact": name,
-        "state": state, "reasons": tuple(why), "notes": _notes(made), "overrides": made.overrides if made else {},
-        "bytes": path.stat().st_size, "content_sha256": header.content_sha256 if header else None,
+        "stage": made.stage if made else _stage(path), "iteration": iteration.number if iteration else None,
+        "artifact": name, "state": state, "reasons": tuple(why), "mend": mend.command if state == "damaged" else "",
+        "notes": _notes(made), "overrides": made.overrides if made else {}, "bytes": path.stat().st_size,
+        "content_sha256": header.content_sha256 if header else None,
     }  # fmt: skip
     return ArtifactState.model_validate(line), mend
+
+
+def _going_on(
+    state: ArtifactState, mend: Mending, kept: Mapping[tuple[str, int | None], Kept]
+) -> tuple[ArtifactState, Mending]:
+    """The same, mended by going on where a checkpoint of it is kept: made anew, that would be lost. Looked at or
+    recovered, it is not."""
+    one = kept.get((state.stage, state.iteration))
+    if one is None or not mend.command or mend.command.startswith((_RECOVER, "ls ")):
+        return state, mend
+    return state.model_copy(update={"mend": one.command if state.mend else ""}), replace(mend, command=one.command)
+
+
+def _stage(path: Path) -> str:
+    """The stage of a damaged artifact: as its head says, which may be whole, else as its place does."""
+    try:
+        return read_header(path).provenance.stage
+    except ArtifactError:
+        return stage_at(path)
 
 
 def _mends(error: ArtifactError, path: Path, name: str) -> str:
@@ -180,10 +206,10 @@ def _mends(error: ArtifactError, path: Path, name: str) -> str:
 
     if isinstance(error.__cause__, OSError):  # what may not be read, `recover` may not read either
         return error.hint
-    if isinstance(error, CutOff) and not error.hint.startswith("r2s2r recover "):
+    if isinstance(error, CutOff) and not error.hint.startswith(_RECOVER):
         return error.hint
     nothing = isinstance(error, NotAnArtifact) and find_body(path) is None
-    return (command_at(path) if nothing else "") or f"r2s2r recover {shlex.quote(name)}"
+    return (command_at(path) if nothing else "") or f"{_RECOVER}{shlex.quote(name)}"
 
 
 def _reasons(

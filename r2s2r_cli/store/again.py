@@ -52,6 +52,22 @@ BARE = {"estimate": "estimate", "identification": "identify", "plan": "plan", "c
 """Stages that need no argument, by what they make: theirs is made by their name alone."""
 
 
+_TOLD_MORE = {"calibration": "calibrate", "simulation": "simulate"}
+"""Stages that make one thing each, and that must be told of what."""
+
+
+def stage_at(path: Path) -> str:
+    """The stage that makes what belongs at `path` of a project, told from its name alone, whatever lies there now. Of a
+    recording it is `import` where its logs can be guessed, else that of a robot; `-` where no stage makes it (policies
+    of another program)."""
+    kind = next((spec.kind for spec in KINDS.values() if path.name in spec.filenames), "")
+    if kind != "recording":
+        return {**BARE, **_TOLD_MORE}.get(kind, "-")
+    if path.name == KINDS[kind].executed:
+        return "execute"
+    return "import" if command_at(path) else "record"
+
+
 def command_at(path: Path) -> str:
     """The command that makes what belongs at `path` of a project, whatever lies there now; empty where no stage makes
     it without being told more (a calibration, a recording whose logs nobody can guess), and outside a project. To be

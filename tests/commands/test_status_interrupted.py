@@ -90,3 +90,13 @@ def test_nothing_is_made_anew_over_what_is_kept(bot: Project, monkeypatch: pytes
     given = iter(states[1:])
     monkeypatch.setattr(Project, "artifacts", lambda _: [place.path / "70-diagnose.h5"])
     assert survey(bot).next == "r2s2r diagnose --iteration 1 --healthy 'a b' --resume"
+
+
+def test_what_can_be_recovered_is_recovered_before_work_goes_on(bot: Project) -> None:
+    """A damaged diagnosis beside a checkpoint of the next: to recover one loses nothing of the other. One with nothing
+    in it is gone on with, since made anew what is kept would be lost."""
+    place = bot.iteration(1).artifact("diagnosis")
+    place.write_bytes(bytes(4096) + b"\x89HDF\r\n\x1a\n" + bytes(100))
+    assert survey(bot).next == "r2s2r recover iterations/001/70-diagnose.h5"
+    place.write_bytes(b"")
+    assert survey(bot).next == "r2s2r diagnose --iteration 1 --healthy 'a b' --resume"

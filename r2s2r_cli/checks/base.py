@@ -19,6 +19,9 @@ IMPORTANCES: dict[Importance, str] = {
     "advice": "nothing is wrong; something could be better",
 }
 Subject = TypeVar("Subject")
+AGAIN = "{again}"
+"""In a fix: the command that makes the artifact again. Who knows the project fills it in (`told_again`)."""
+REPORT = f"{AGAIN}   # report it if that does not help"
 
 
 class Found(NamedTuple):
@@ -47,7 +50,8 @@ class Check:
     what: str
     why: str
     fix: str
-    """One command that can be pasted or a concrete action; `{file}` and `{location}` are filled in."""
+    """A line that can be pasted, with its remark behind it; or, where only a person can mend it, what to do in words
+    without a command. `{file}` and `{location}` are filled in, `AGAIN` by who knows the project."""
     function: Callable[[Any], Iterator[Found]]
     family: str
 

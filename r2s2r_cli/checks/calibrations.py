@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from r2s2r_cli.artifact import Group
-from r2s2r_cli.checks.base import Found, beyond, check, number, worst
+from r2s2r_cli.checks.base import AGAIN, Found, beyond, check, number, worst
 from r2s2r_cli.checks.subjects import Content
 
 RMS_MAX_M = 0.004
@@ -30,7 +30,7 @@ _INDICES = (
     kinds=_KINDS,
     what="every point and change names a set, curve or entry that is there",
     why="a point of a set that is not there was fitted to nothing",
-    fix="r2s2r calibrate again from the tables",
+    fix=AGAIN,
 )
 def calibration_rows_exist(content: Content) -> Iterator[Found]:
     """Row numbers outside their table."""
@@ -123,7 +123,7 @@ def tendons_rise(content: Content) -> Iterator[Found]:
     kinds=_KINDS,
     what="masses and moments of inertia are above 0, and a rod is harder to turn across than about its axis",
     why="a rod is long and thin; other numbers are grams, millimetres or a part in the wrong place",
-    fix="give masses in kg and lengths in m in the parts table, then r2s2r calibrate again",
+    fix=f"{AGAIN}   # first give masses in kg and lengths in m in the parts table",
 )
 def masses_make_a_rod(content: Content) -> Iterator[Found]:
     """Masses that no rod has."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from r2s2r_cli.artifact import Blobs
-from r2s2r_cli.checks.base import Found, check, number, worst
+from r2s2r_cli.checks.base import AGAIN, Found, check, number, worst
 from r2s2r_cli.checks.subjects import Run
 from schemas.recording import ROTATION_TOLERANCE
 
@@ -26,7 +26,7 @@ _KINDS = ("recording",)
     kinds=_KINDS,
     what="every colour frame names a depth frame that is there, or -1",
     why="the wrong depth under a colour is a cap in the wrong place",
-    fix="r2s2r import the source again",
+    fix=AGAIN,
 )
 def depth_pairs_exist(run: Run) -> Iterator[Found]:
     """Pair numbers outside the depth frames."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from r2s2r_cli.checks.base import Found, beyond, check, number, worst
+from r2s2r_cli.checks.base import AGAIN, Found, beyond, check, number, worst
 from r2s2r_cli.checks.subjects import Run
 from r2s2r_cli.control_sign import WRONG_SIGN, cable_response
 
@@ -23,7 +23,7 @@ _KINDS = ("recording", "estimate", "simulation")
     kinds=_KINDS,
     what="target positions lie between 0 (short) and 1 (long)",
     why="percentages or millimetres in their place make every target unreachable",
-    fix="write targets in the source as positions 0 .. 1, then run the stage again",
+    fix=f"{AGAIN}   # first write targets in the source as positions 0 .. 1",
 )
 def targets_in_range(run: Run) -> Iterator[Found]:
     """Targets outside 0 .. 1. NaN (no target at that time) is allowed."""
@@ -42,7 +42,7 @@ def targets_in_range(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="motor commands lie between -1 and +1 (+1 reels in)",
     why="commands are a fraction of the maximum; raw motor values would be replayed as absurd speeds",
-    fix="divide the commands in the source by their maximum, then run the stage again",
+    fix=f"{AGAIN}   # first divide the commands in the source by their maximum",
 )
 def controls_in_range(run: Run) -> Iterator[Found]:
     """Commands outside -1 .. 1. NaN (not logged) is allowed."""
@@ -61,7 +61,7 @@ def controls_in_range(run: Run) -> Iterator[Found]:
     kinds=("recording", "estimate"),
     what="motor commands above 0 shorten their cables",
     why="+1 reels in; with all signs exchanged a replay runs the gait backwards, and identification learns nonsense",
-    fix="negate the control columns of the source, then r2s2r import it again",
+    fix=f"{AGAIN}   # first negate the control columns of the source",
 )
 def controls_shorten_cables(run: Run) -> Iterator[Found]:
     """Commands and cap distances that clearly go against each other over the whole run."""
@@ -118,7 +118,7 @@ def intervals_enough(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="within a target interval every command has the interval's target",
     why="a target interval is a time span of one constant target vector; everything is judged by intervals",
-    fix="run the stage that made the artifact again; the intervals are then found anew",
+    fix=f"{AGAIN}   # the intervals are then found anew",
 )
 def targets_constant(run: Run) -> Iterator[Found]:
     """Commands that contradict the interval they lie in."""

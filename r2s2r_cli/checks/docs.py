@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from r2s2r_cli.checks import CHECKS, FAMILIES
-from r2s2r_cli.checks.base import IMPORTANCES, Check, sentence
+from r2s2r_cli.checks.base import AGAIN, IMPORTANCES, Check, sentence
 
 _HEAD = """\
 # Checks
@@ -17,6 +17,10 @@ check found an error, else 0. Warnings and advice do not
 count. Checks of the values run where the form of the file is right; checks against the robot run where the data are
 of the project's robot by name and have as many caps, rods and cables as it.
 """
+
+
+_STAGE_AGAIN = "r2s2r STAGE --force"
+"""Of the stage that made the artifact; `validate` shows it with the options of then."""
 
 
 def checks_page() -> str:
@@ -37,11 +41,13 @@ def _overview() -> str:
 def _typed(fix: str) -> str:
     """A command as it is typed, with its remark behind it; words as a sentence."""
     command, _, remark = fix.partition("   # ")
-    return f"`{command}`: {sentence(remark)[0].lower()}{sentence(remark)[1:]}" if remark else sentence(fix)
+    if remark:
+        return f"`{command}`: {sentence(remark)[0].lower()}{sentence(remark)[1:]}"
+    return f"`{command}`" if command.startswith("r2s2r ") else sentence(fix)
 
 
 def _section(entry: Check) -> str:
-    fix = entry.fix.replace("{file}", "FILE").replace("{location}", "PLACE")
+    fix = entry.fix.replace("{file}", "FILE").replace("{location}", "PLACE").replace(AGAIN, _STAGE_AGAIN)
     return (
         f"### {entry.name}\n\n"
         f"{entry.importance.capitalize()}; looks at {_scope(entry)}.\n\n"

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from r2s2r_cli.checks.base import Found, beyond, check, number, worst
+from r2s2r_cli.checks.base import AGAIN, REPORT, Found, beyond, check, number, worst
 from r2s2r_cli.checks.subjects import Run
 
 SYMMETRY = 1e-9
@@ -26,6 +26,9 @@ _LOST = 8
 _USED = (0, 3)
 """Codes of `quality` for observations that were used."""
 _KINDS = ("estimate",)
+_DRAWN = f"{AGAIN}   # draws the pictures beside it"
+_NOISE = "r2s2r status   # once the sidecar of the log states noise_sd_m, if you know it: says what to make again"
+"""Of a log nothing is seen that a picture could show."""
 
 
 @check(
@@ -34,7 +37,7 @@ _KINDS = ("estimate",)
     kinds=_KINDS,
     what="covariances are symmetric and have no negative variance in any direction",
     why="a fit weighted with them would divide by a negative number or by nothing",
-    fix="r2s2r estimate --force; report it if that does not help",
+    fix=REPORT,
 )
 def covariances_are_valid(run: Run) -> Iterator[Found]:
     """Matrices that are no covariance."""
@@ -61,7 +64,7 @@ def covariances_are_valid(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="standard deviations are not negative, and the assumed noise is above 0",
     why="a noise of 0 gives its observation infinite weight",
-    fix="r2s2r estimate --force; report it if that does not help",
+    fix=REPORT,
 )
 def deviations_are_positive(run: Run) -> Iterator[Found]:
     """Deviations below 0, noise of 0."""
@@ -87,7 +90,7 @@ def deviations_are_positive(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="probabilities of contact lie between 0 and 1",
     why="they weigh the contacts in every fit that follows",
-    fix="r2s2r estimate --force; report it if that does not help",
+    fix=REPORT,
 )
 def probabilities_in_range(run: Run) -> Iterator[Found]:
     """Probabilities that are none."""
@@ -103,7 +106,7 @@ def probabilities_in_range(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="the normal of the ground has length 1",
     why="every height above the ground is a product with it",
-    fix="r2s2r estimate --force; report it if that does not help",
+    fix=REPORT,
 )
 def ground_normal_is_unit(run: Run) -> Iterator[Found]:
     """A normal that scales heights."""
@@ -119,7 +122,7 @@ def ground_normal_is_unit(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="no rod turns about its own axis, unless the roll was observed",
     why="two equal caps do not show the roll: a number there is noise that looks like a measurement",
-    fix="r2s2r estimate --force; report it if that does not help",
+    fix=REPORT,
 )
 def roll_is_not_invented(run: Run) -> Iterator[Found]:
     """Angular velocity along a rod whose roll nobody saw."""
@@ -142,7 +145,7 @@ def roll_is_not_invented(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="each cap was observed and used in at least four of five frames",
     why="between observations the track is what the smoother believes, with the uncertainty that it states",
-    fix="look at the named cap in the source: its colour, its light, what hides it",
+    fix=f"{_DRAWN}: look there at the named cap, its colour, its light, what hides it",
 )
 def caps_well_observed(run: Run) -> Iterator[Found]:
     """Caps that were mostly guessed."""
@@ -162,8 +165,7 @@ def caps_well_observed(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="what the smoother expects and what it then sees differ by as much as it believes: ratio 0.5 to 2",
     why="below, its uncertainties are too large; above, they are too small, and every interval built on them",
-    fix="camera images: look at the overlay and camera pictures of the run; logs: state noise_sd_m in the sidecar if "
-    "you know the noise of the source",
+    fix=f"{_DRAWN}: look there whether the caps are where they are believed to be",
 )
 def noise_as_assumed(run: Run) -> Iterator[Found]:
     """Innovations far larger or smaller than their variance."""
@@ -174,7 +176,8 @@ def noise_as_assumed(run: Run) -> Iterator[Found]:
         off = beyond(ratio, least, 2.0)
         if (off > 0).any():
             yield Found(run.at("tracks", "innovation_variance"), "the noise is not as large as was assumed",
-                        f"{least:g} .. 2", worst(ratio, off, ("cap",)))  # fmt: skip
+                        f"{least:g} .. 2", worst(ratio, off, ("cap",)),
+                        "" if "sightings" in run.streams else _NOISE)  # fmt: skip
 
 
 @check(
@@ -183,7 +186,7 @@ def noise_as_assumed(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="the robot is lost in at most one frame of twenty",
     why="where some cap is less certain than 30 mm the state is what cables and rods allow, no observation",
-    fix="look at frames/mode and the overlay: what hides the robot, its light, the view of the camera",
+    fix=f"{_DRAWN}: look there at what hides the robot, its light, the view of the camera",
 )
 def seldom_lost(run: Run) -> Iterator[Found]:
     """Camera runs that were mostly guessed."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from r2s2r_cli.checks.base import Found, beyond, check, number, worst
+from r2s2r_cli.checks.base import AGAIN, Found, beyond, check, number, worst
 from r2s2r_cli.checks.subjects import Run, robot_sizes
 
 ROD_LENGTH_TOLERANCE = 0.05
@@ -28,7 +28,7 @@ _FRAMES = ("recording", "estimate", "simulation")
     kinds=_FRAMES,
     what="the run has as many caps, rods and cables as the robot",
     why="index i must mean the same cap or cable everywhere; without it no other comparison with the robot is made",
-    fix="set robot in project.toml to the description of this robot, then run the stage again",
+    fix=f"{AGAIN}   # first set robot in project.toml to the description of this robot",
 )
 def counts_match_robot(run: Run) -> Iterator[Found]:
     """Axes whose length is not the robot's."""
@@ -46,7 +46,7 @@ def counts_match_robot(run: Run) -> Iterator[Found]:
     kinds=("recording",),
     what="every cap of every kept frame was observed",
     why="a frame counts only with all its caps; a missing one belongs among the dropped frames",
-    fix="r2s2r import the source again: it marks such frames as dropped",
+    fix=f"{AGAIN}   # import marks such frames as dropped",
 )
 def kept_frames_observed(run: Run) -> Iterator[Found]:
     """NaN in frames that count."""
@@ -84,7 +84,7 @@ def rod_length_is_the_robots(run: Run) -> Iterator[Found]:
     kinds=("recording",),
     what="the observed length of each rod stays the same within 10 mm (standard deviation)",
     why="rods are rigid: a length that changes is a tracker that confuses caps",
-    fix="r2s2r inspect {file}; look at the rod length over time and leave out the frames in which caps were confused",
+    fix=f"{AGAIN}   # first leave out in the source the frames in which caps were confused",
 )
 def rods_keep_their_length(run: Run) -> Iterator[Found]:
     """Rods whose length wanders."""
@@ -128,7 +128,7 @@ def cable_lengths_in_limits(run: Run) -> Iterator[Found]:
     kinds=_FRAMES,
     what="no cap lies below the ground by more than 10 mm and five standard deviations of its noise",
     why="the world frame is not z up with the ground at 0, the heights are of another unit, or the robot sank in",
-    fix="give the heights above the ground in the source, z up; `r2s2r estimate` then fits what is left",
+    fix="give the heights above the ground in the source, z up; what is left is fitted with the states",
 )
 def caps_above_ground(run: Run) -> Iterator[Found]:
     """Caps in the ground. In a recording the ground is where the lowest caps lie on average."""
@@ -167,7 +167,7 @@ def caps_below_ceiling(run: Run) -> Iterator[Found]:
     kinds=("recording",),
     what="no cap moves faster than 5 m/s between two kept frames",
     why="the tracker jumped, or the stamps are of another unit",
-    fix="look at the named frame in the source; `r2s2r estimate` marks jumps and does not use them",
+    fix="look at the named frame in the source; jumps are marked with the states, and not used",
 )
 def caps_move_like_a_robot(run: Run) -> Iterator[Found]:
     """Jumps between frames."""

@@ -7,11 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from r2s2r_cli.checks.base import Found, beyond, check, number, worst
+from r2s2r_cli.checks.base import REPORT, Found, beyond, check, number, worst
 from r2s2r_cli.checks.subjects import Content
 
 _KINDS = ("identification",)
-_AGAIN = "r2s2r identify again; report it if that does not help"
 ROUNDING = 1e-9
 """Of a correlation, and of a value at its bound, relative."""
 TEST = 2
@@ -31,7 +30,7 @@ _BY_PARAMETER = ("covariance", "identifiability", "trace", "starts", "history")
     kinds=_KINDS,
     what="every row names a parameter or start that is there, and every table has all parameters",
     why="numbers of another table are numbers of other parameters",
-    fix=_AGAIN,
+    fix=REPORT,
 )
 def identification_tables_fit(content: Content) -> Iterator[Found]:
     """Indices outside their table, and axes of another length."""
@@ -66,7 +65,7 @@ def identification_tables_fit(content: Content) -> Iterator[Found]:
     kinds=_KINDS,
     what="every parameter has one name, and every target interval one role",
     why="an interval that was trained on and tested makes the held-out error look better than it is",
-    fix=_AGAIN,
+    fix=REPORT,
 )
 def identification_rows_unique(content: Content) -> Iterator[Found]:
     """Doubles."""
@@ -89,7 +88,7 @@ def identification_rows_unique(content: Content) -> Iterator[Found]:
     kinds=_KINDS,
     what="every identified value lies within its bounds and its own 95 % interval",
     why="a value outside was not found by this fit",
-    fix=_AGAIN,
+    fix=REPORT,
 )
 def identified_values_inside(content: Content) -> Iterator[Found]:
     """Values outside."""
@@ -107,7 +106,7 @@ def identified_values_inside(content: Content) -> Iterator[Found]:
     kinds=_KINDS,
     what="what is identifiable has a standard deviation above 0, what is not has none",
     why="a number with a narrow interval that the runs do not say is worse than no number",
-    fix=_AGAIN,
+    fix=REPORT,
 )
 def identified_deviations_honest(content: Content) -> Iterator[Found]:
     """Deviations that are missing, not positive, or there for what nobody knows."""
@@ -132,7 +131,7 @@ def identified_deviations_honest(content: Content) -> Iterator[Found]:
     kinds=_KINDS,
     what="the covariance is symmetric and nowhere negative, and its correlations lie within -1 .. 1",
     why="otherwise no numbers have this covariance",
-    fix=_AGAIN,
+    fix=REPORT,
 )
 def identified_covariance_valid(content: Content) -> Iterator[Found]:
     """Covariances that cannot be, over the parameters that have one."""
@@ -162,7 +161,7 @@ def identified_covariance_valid(content: Content) -> Iterator[Found]:
     kinds=_KINDS,
     what="no parameter ends on a bound",
     why="the runs ask for more than the bound allows: it is wrong, or the parameter makes up for what is missing",
-    fix="widen a wrong bound with r2s2r identify --free NAME=START,LOWER..UPPER, else look for what is missing",
+    fix="r2s2r identify --help   # --free NAME=START,LOWER..UPPER widens a wrong bound; else look for what is missing",
 )
 def identified_within_bounds(content: Content) -> Iterator[Found]:
     """Parameters on a bound."""

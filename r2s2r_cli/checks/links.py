@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from r2s2r_cli.checks.base import Found, check
 from r2s2r_cli.checks.subjects import Journals, Links
-from r2s2r_cli.errors import UPDATE_CLONE
+from r2s2r_cli.errors import UPDATE_CLONE, quoted
 from schemas.versions import KINDS
 
 _IN_BODY = {"kind", "schema_version", "title", "created_by", "content_sha256", "seal_sha256"}
@@ -108,13 +108,14 @@ def stage_not_newer(links: Links) -> Iterator[Found]:
     Links,
     what="an artifact in the place of one kind is of that kind",
     why="the next stage looks for its input by file name",
-    fix="mv {file} to the name of its kind, or make the artifact again",
+    fix="mv -n {file} {file}.aside && r2s2r status   # says what makes again what belongs there",
 )
 def name_fits_kind(links: Links) -> Iterator[Found]:
     """A recording under the name of an estimate, and the like."""
     wanted = {name: spec.kind for spec in KINDS.values() for name in spec.filenames}.get(links.filename)
     if wanted is not None and wanted != links.kind:
-        yield Found("kind", "the file has the name of another kind", f"{wanted} in {links.filename}", links.kind)
+        hint = f"mv -n {{file}} {quoted(links.belongs)}" if links.belongs else ""
+        yield Found("kind", "the file has the name of another kind", f"{wanted} in {links.filename}", links.kind, hint)
 
 
 @check(

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from r2s2r_cli.checks.base import Found, beyond, check, number, worst
+from r2s2r_cli.checks.base import AGAIN, REPORT, Found, beyond, check, number, worst
 from r2s2r_cli.checks.geometry import SPEED_MAX_M_PER_S
 from r2s2r_cli.checks.subjects import Run
 
@@ -29,7 +29,7 @@ _KINDS = ("estimate", "simulation")
     kinds=("recording", *_KINDS),
     what="quaternions have length 1",
     why="another length scales what it rotates; 0 rotates nothing",
-    fix="run the stage that made the artifact again; quaternions are xyzw, scalar last",
+    fix=f"{AGAIN}   # quaternions are xyzw, scalar last",
 )
 def quaternions_are_unit(run: Run) -> Iterator[Found]:
     """Quaternions that are no rotation."""
@@ -48,7 +48,7 @@ def quaternions_are_unit(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="the caps of each rod keep their distance within 1 mm, in every frame",
     why="rods are rigid; states with other lengths are no states of the robot",
-    fix="run the stage that made the artifact again; report it if that does not help",
+    fix=REPORT,
 )
 def rods_are_rigid(run: Run) -> Iterator[Found]:
     """Rods that stretch."""
@@ -70,7 +70,7 @@ def rods_are_rigid(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="the pose of each rod puts its middle and its axis where its caps are",
     why="caps and rod poses are two views of one state; where they differ, results depend on which one is read",
-    fix="run the stage that made the artifact again; z of a rod points to its odd cap, quaternions are xyzw",
+    fix=f"{AGAIN}   # z of a rod points to its odd cap, quaternions are xyzw",
 )
 def poses_match_caps(run: Run) -> Iterator[Found]:
     """Poses of other rods, other quaternion order, other direction."""
@@ -122,7 +122,7 @@ def speeds_are_sane(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="a cap in contact is at most 20 mm above the ground",
     why="contact forces and friction are fitted where contact is said to be",
-    fix="compare estimate.contact_clearance_m in project.toml with the noise of the run, then r2s2r estimate --force",
+    fix=f"{AGAIN}   # first compare estimate.contact_clearance_m in project.toml with the noise of the run",
 )
 def contacts_near_ground(run: Run) -> Iterator[Found]:
     """Contacts in the air."""
@@ -143,7 +143,7 @@ def contacts_near_ground(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="the length of each cable is the distance of its caps within 1 mm",
     why="another length means other cables than in robot.toml, or another order",
-    fix="compare [[cables]] in robot.toml with the robot, then run the stage again",
+    fix=f"{AGAIN}   # first compare [[cables]] in robot.toml with the robot",
 )
 def lengths_match_caps(run: Run) -> Iterator[Found]:
     """Lengths that are not between the caps of their cable."""

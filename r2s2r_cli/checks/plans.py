@@ -7,11 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from r2s2r_cli.checks.base import Found, beyond, check, number, worst
+from r2s2r_cli.checks.base import REPORT, Found, beyond, check, number, worst
 from r2s2r_cli.checks.subjects import Content
 
 _KINDS = ("plan",)
-_AGAIN = "r2s2r plan again; report it if that does not help"
 TURN = 1e-6
 """How far a rotation may be from one, by any number of it."""
 RELIABLE = 0.5
@@ -24,7 +23,7 @@ RELIABLE = 0.5
     kinds=_KINDS,
     what="every gait and long policy has one name, and the policy of that name",
     why="what is executed is the policy, what was judged is the row: they must be the same",
-    fix=_AGAIN,
+    fix=REPORT,
 )
 def plan_policies_exist(content: Content) -> Iterator[Found]:
     """Rows without their policy, and doubles."""
@@ -47,7 +46,7 @@ def plan_policies_exist(content: Content) -> Iterator[Found]:
     kinds=_KINDS,
     what="every symmetry changes places one for one, the first changes none, and each is a rotation",
     why="a gait that is relabelled by anything else is another gait",
-    fix=_AGAIN,
+    fix=REPORT,
 )
 def plan_symmetries_valid(content: Content) -> Iterator[Found]:
     """Rows that are no permutation, turns that are no rotation."""
@@ -79,7 +78,7 @@ def plan_symmetries_valid(content: Content) -> Iterator[Found]:
     kinds=_KINDS,
     what="every gait ends as one of the symmetries, and every share lies within 0 .. 1",
     why="a sequence is made of what its gaits do to the robot",
-    fix=_AGAIN,
+    fix=REPORT,
 )
 def plan_gaits_sound(content: Content) -> Iterator[Found]:
     """Elements without a row, shares that are none."""
@@ -102,7 +101,7 @@ def plan_gaits_sound(content: Content) -> Iterator[Found]:
     kinds=_KINDS,
     what="long policies come back to rest in most of the drawn simulators",
     why="the robot is one more of them: where a target is given up, what follows is relabelled for another triangle",
-    fix="execute its gaits one by one, or learn more of the robot first: r2s2r identify",
+    fix="r2s2r inspect {file}   # names its gaits: execute them one by one, or learn more of the robot first",
 )
 def plan_policies_reliable(content: Content) -> Iterator[Found]:
     """Long policies that mostly do not."""

@@ -65,7 +65,7 @@ def rest_pose_on_ground(robot: Robot) -> Iterator[Found]:
     Robot,
     what="cables are attached to their end caps: at most 1.5 cap radii from the centre",
     why="attachment points decide the torque on a rod; one at a wrong rod end turns it the wrong way",
-    fix="correct sites_m of the named cable in {file}, or derive them again with r2s2r init in another directory",
+    fix="correct sites_m of the named cable in {file}",
 )
 def sites_on_their_caps(robot: Robot) -> Iterator[Found]:
     """Attachment points away from their cap."""
@@ -148,7 +148,7 @@ def parts_on_their_rod(robot: Robot) -> Iterator[Found]:
     Robot,
     what="the robot is one that was measured",
     why="numbers of an illustrative robot were made up, and so is everything computed with them",
-    fix="r2s2r init --robot threebar in another directory, or measure your robot and set illustrative = false",
+    fix="r2s2r init ../threebar --robot threebar   # a measured one; or measure yours, and set illustrative = false",
 )
 def robot_was_measured(robot: Robot) -> Iterator[Found]:
     """A made-up robot."""

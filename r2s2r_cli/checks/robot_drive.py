@@ -92,7 +92,7 @@ def sensors_are_calibrated(robot: Robot) -> Iterator[Found]:
     Robot,
     what="the line of every sensor rises, and gives 0.1 pF to 1000 pF over the lengths of the limits",
     why="slope or offset in pF reads every length wrong by many orders of magnitude",
-    fix="r2s2r calibrate writes both in farads; by hand: 1 pF = 1e-12 F, 1 pF/mm = 1e-9 F/m",
+    fix="r2s2r calibrate --points points.csv   # writes both in farads; by hand: 1 pF = 1e-12 F, 1 pF/mm = 1e-9 F/m",
 )
 def sensor_lines_plausible(robot: Robot) -> Iterator[Found]:
     """Lines of another unit, and lines that fall."""

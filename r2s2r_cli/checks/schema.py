@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from r2s2r_cli.artifact import Blobs
-from r2s2r_cli.checks.base import Found, check, worst
+from r2s2r_cli.checks.base import AGAIN, Found, check, worst
 from r2s2r_cli.checks.subjects import Content
 from schemas.base import DatasetSpec
 
@@ -19,7 +19,7 @@ _IMAGE_STARTS = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")
     Content,
     what="every group, dataset and attribute is one of the schema, with its dtype, axes, unit and frame",
     why="a reader that trusts the schema would read another quantity, unit or axis",
-    fix="make the artifact again; schemas/LAYOUT.md has the layout of every kind",
+    fix=f"{AGAIN}   # schemas/LAYOUT.md has the layout of every kind",
 )
 def layout_matches(content: Content) -> Iterator[Found]:
     """What the layout check of the store said."""
@@ -32,7 +32,7 @@ def layout_matches(content: Content) -> Iterator[Found]:
     Content,
     what="no infinity, and NaN only where the schema says what NaN means",
     why="one silent NaN spreads through every mean, fit and plot after it",
-    fix="look at the named place in the source of the data, then run the stage again",
+    fix=f"{AGAIN}   # first look at the named place in what it was made from",
 )
 def values_finite(content: Content) -> Iterator[Found]:
     """Infinity anywhere, NaN where it has no meaning."""
@@ -67,7 +67,7 @@ def codes_known(content: Content) -> Iterator[Found]:
     Content,
     what="text datasets hold UTF-8",
     why="names of sets, curves and files are shown and compared as text",
-    fix="write the names in the source as UTF-8, then run the stage again",
+    fix=f"{AGAIN}   # first write the names in what it was made from as UTF-8",
 )
 def text_readable(content: Content) -> Iterator[Found]:
     """Bytes that are not UTF-8."""
@@ -87,7 +87,7 @@ def text_readable(content: Content) -> Iterator[Found]:
     Content,
     what="every stored image begins as a PNG or JPEG does",
     why="an empty or torn image stops `estimate` in the middle of a run",
-    fix="r2s2r import the source again; frames whose image is broken are better left out there",
+    fix=f"{AGAIN}   # first leave out in the source the frames whose image is broken",
 )
 def images_begin_right(content: Content) -> Iterator[Found]:
     """Encoded frames that no decoder will take."""

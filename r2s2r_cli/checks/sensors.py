@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from r2s2r_cli.checks.base import Found, beyond, check, number, worst
+from r2s2r_cli.checks.base import AGAIN, Found, beyond, check, number, worst
 from r2s2r_cli.checks.subjects import Run
 
 UNINITIALISED_F = 0.20e-12
@@ -49,7 +49,7 @@ def sensor_chip_initialised(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="capacitances are in farads",
     why="picofarads taken for farads give lengths of billions of metres",
-    fix="give the unit of the capacitances in the source as the format asks, then r2s2r import it again",
+    fix=f"{AGAIN}   # first give the unit of the capacitances in the source as the format asks",
 )
 def capacitance_in_farads(run: Run) -> Iterator[Found]:
     """Capacitances that no stretch sensor has."""
@@ -136,7 +136,7 @@ def sensor_lengths_in_limits(run: Run) -> Iterator[Found]:
     Run,
     what="every sensor names a cable of the robot, and no cable has two",
     why="its length would be compared with another cable",
-    fix="compare [[sensors]] in robot.toml with the wiring, then run the stage again",
+    fix=f"{AGAIN}   # first compare [[sensors]] in robot.toml with the wiring",
     kinds=("recording", "estimate"),
 )
 def sensor_cables_exist(run: Run) -> Iterator[Found]:

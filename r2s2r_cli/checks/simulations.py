@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from r2s2r_cli.checks.base import Found, beyond, check, number, worst
+from r2s2r_cli.checks.base import AGAIN, REPORT, Found, beyond, check, number, worst
 from r2s2r_cli.checks.subjects import Run
 
 PUSH_N = 1e-9
@@ -17,7 +17,7 @@ PUSH_N = 1e-9
     kinds=("simulation",),
     what="cables pull or are slack, they never push",
     why="a cable that pushes is a rod; damping that is not limited does that to a slack cable",
-    fix="r2s2r simulate again; report it if that does not help",
+    fix=REPORT,
 )
 def cables_never_push(run: Run) -> Iterator[Found]:
     """Negative tensions."""
@@ -35,7 +35,7 @@ def cables_never_push(run: Run) -> Iterator[Found]:
     kinds=("simulation",),
     what="rest lengths are above 0",
     why="a winch that reels in a whole cable has no cable left to pull with",
-    fix="compare pid.min_length_m and the targets of the policy with the robot, then r2s2r simulate again",
+    fix=f"{AGAIN}   # first compare pid.min_length_m and the targets of the policy with the robot",
 )
 def rest_lengths_positive(run: Run) -> Iterator[Found]:
     """Cables without length."""
@@ -51,7 +51,7 @@ def rest_lengths_positive(run: Run) -> Iterator[Found]:
     kinds=("simulation",),
     what="the time step of the engine is above 0 and not longer than the gap between stored frames",
     why="frames between two steps were made up",
-    fix="r2s2r simulate again; report it if that does not help",
+    fix=REPORT,
 )
 def step_fits_frames(run: Run) -> Iterator[Found]:
     """A step that the frames contradict."""

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from r2s2r_cli.checks.base import Found, check, number
+from r2s2r_cli.checks.base import AGAIN, Found, check, number
 from r2s2r_cli.checks.subjects import Run
 
 STAMP_TOLERANCE_S = 1e-9
 _ONE = {"intervals": "target interval", "segments": "segment"}
-_FIX = "run the stage that made the artifact again; intervals and segments are then found anew"
+_FIX = f"{AGAIN}   # intervals and segments are then found anew"
 
 
 @check(

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from r2s2r_cli.checks.base import Found, check, number
+from r2s2r_cli.checks.base import AGAIN, Found, check, number
 from r2s2r_cli.checks.subjects import Run
 
 MIN_GAP_S = 0.020
@@ -22,7 +22,7 @@ _SAMPLED = (("commands", "t"), ("sensors", "t"), ("motors", "t"), ("camera", "t"
     Run,
     what="the stamps of the frames that count increase",
     why="velocities, intervals and key frames are built on their order",
-    fix="sort the rows of the source by time, then r2s2r import it again",
+    fix=f"{AGAIN}   # first sort the rows of the source by time",
 )
 def time_increases(run: Run) -> Iterator[Found]:
     """Stamps of kept frames that stand still or run backwards."""
@@ -40,7 +40,7 @@ def time_increases(run: Run) -> Iterator[Found]:
     kinds=("recording",),
     what="kept frames are at least 20 ms apart",
     why="two frames closer than that are one observation stamped twice, and their difference is noise",
-    fix="r2s2r import the source again: it marks such frames as dropped",
+    fix=f"{AGAIN}   # import marks such frames as dropped",
 )
 def kept_frames_apart(run: Run) -> Iterator[Found]:
     """Duplicates that were not dropped."""
@@ -58,7 +58,7 @@ def kept_frames_apart(run: Run) -> Iterator[Found]:
     Run,
     what="the stamps of every sampled stream are in order",
     why="samples out of order are interpolated wrongly",
-    fix="sort the samples of the source by time, then r2s2r import it again",
+    fix=f"{AGAIN}   # first sort the samples of the source by time",
 )
 def samples_ordered(run: Run) -> Iterator[Found]:
     """Streams whose clock runs backwards. Equal stamps are allowed: two samples may share one."""
@@ -82,7 +82,7 @@ def samples_ordered(run: Run) -> Iterator[Found]:
     kinds=("estimate",),
     what="the frames of an estimate are rows of the recording, in its order",
     why="row k must be kept frame k, as intervals and segments count them",
-    fix="r2s2r estimate --force",
+    fix=AGAIN,
 )
 def source_frames_increase(run: Run) -> Iterator[Found]:
     """Row numbers that are negative or out of order."""

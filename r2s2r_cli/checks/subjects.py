@@ -93,6 +93,8 @@ class Links:
     """The newest version of each stage that this r2s2r knows."""
     filename: str = ""
     """Name of the file, where it lies in a project's place for artifacts."""
+    belongs: str = ""
+    """Where it lies under another name than that of its kind: path of the place of its kind, if that is free."""
 
     @property
     def kind(self) -> str:

@@ -75,8 +75,10 @@ def choose(select: str | None, ignore: str | None) -> list[Check]:
     wanted, unwanted = _names(select, "--select"), _names(ignore, "--ignore")
     required = {entry.name for entry in ALWAYS if entry.importance == "error"}
     for name in sorted(required & unwanted):
+        others = ",".join(sorted(unwanted - required))
         raise UsageError(f"{name} cannot be ignored: a file that cannot be read has not passed", where="--ignore",
-                         expected="another check", received=name, hint="leave the file out of the command")  # fmt: skip
+                         expected="another check", received=name,
+                         hint="r2s2r validate" + (f" --ignore {others}" if others else ""))  # fmt: skip
     return [entry for entry in CHECKS if (not wanted or entry.name in wanted) and entry.name not in unwanted]
 
 
@@ -112,6 +114,7 @@ def _here(project: Path | None, places: Places) -> Place:
 def _check(
     names: Sequence[str], chosen: Sequence[Check], project: Path | None, places: Places, console: Console
 ) -> list[Finding]:
+    from r2s2r_cli.commands.validate_again import told_again
     from r2s2r_cli.commands.validation import findings_of, gather
     from r2s2r_cli.store.isolated import IsolatedReader
 
@@ -124,7 +127,9 @@ def _check(
                 if remark not in told:
                     told.add(remark)
                     console.say(remark)
-            found += findings_of(gather(Path(name), place, reader), name, chosen)
+            gathered = gather(Path(name), place, reader)
+            header = gathered.links.header if gathered.links is not None else None
+            found += told_again(findings_of(gathered, name, chosen), Path(name), header, place)
             advance(1)
     return found
 

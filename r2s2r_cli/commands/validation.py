@@ -23,7 +23,7 @@ from r2s2r_cli.checks.subjects import (
     policies_of,
     runs_of,
 )
-from r2s2r_cli.commands.places import ROBOT_FILE, Place
+from r2s2r_cli.commands.places import ROBOT_FILE, Place, shown
 from r2s2r_cli.commands.sources import MASSES, is_masses, what_source
 from r2s2r_cli.errors import ArtifactError, InputError, R2S2RError, quoted
 from r2s2r_cli.store.canonical import source_sha256
@@ -31,11 +31,11 @@ from r2s2r_cli.store.examine import Examined, examine
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.isolated import IsolatedReader
 from r2s2r_cli.store.layout import Mismatch
-from r2s2r_cli.store.project import CONFIG_FILE, PROJECT_FILE
+from r2s2r_cli.store.project import CONFIG_FILE, ITERATIONS, PROJECT_FILE
 from r2s2r_cli.store.toml import model_problems, read_toml
 from schemas.base import Frozen
 from schemas.config import ProjectFile, RunConfig
-from schemas.header import InputRef
+from schemas.header import Header, InputRef
 from schemas.policy import PolicyFile
 from schemas.results import Finding
 from schemas.robot import Robot
@@ -128,12 +128,28 @@ def _gather_artifact(path: Path, found: Examined, place: Place | None) -> Gather
     links = Links(
         header=found.header, body=found.body, robots=robots, project_robot=robot.name if robot else None,
         inputs=tuple(_inputs(found.header.provenance.inputs, place)), stage_versions=STAGE_VERSIONS,
-        filename=path.name if place is not None else "",
+        filename=path.name if place is not None else "", belongs=_belongs(path, found.header, place),
     )  # fmt: skip
     if found.layout:
         return Gathered(reading, links, content)
     subjects = (*(runs_of(data, robot) if "runs" in _roots(data.groups) else ()), *policies_of(data, robot))
     return Gathered(reading, links, content, subjects)
+
+
+def _belongs(path: Path, header: Header, place: Place | None) -> str:
+    """The place of the kind of a misnamed artifact, as it is typed here; empty where something lies there."""
+    spec = KINDS.get(header.kind)
+    if place is None or spec is None or path.name in spec.filenames:
+        return ""
+    project = spec.level == "project"
+    if not project and path.absolute().parent.parent != place.root / ITERATIONS:
+        return ""
+    executed = header.provenance.stage == "execute" or any(
+        ref.path.endswith(f"/{KINDS['recording'].executed}") for ref in header.provenance.inputs
+    )
+    name = spec.executed if spec.executed and executed else spec.filename
+    found = place.root / name if project else path.with_name(name)
+    return "" if found.exists() else shown(found) if found.is_absolute() else str(found)
 
 
 def _differences(places: tuple[Mismatch, ...]) -> tuple[Difference, ...]:
@@ -215,7 +231,7 @@ def _model_of(path: Path, values: Mapping[str, object], place: Place | None) -> 
     if scores[best] < 1:
         raise InputError("this is none of the TOML files that r2s2r reads", where=str(path), expected=", ".join(_TOML),
                          received=f"a file with the keys {', '.join(sorted(values)[:5]) or '(none)'}",
-                         hint="see docs/reference/checks.md for what validate looks at")  # fmt: skip
+                         hint="r2s2r validate --help   # docs/reference/checks.md has what it looks at")  # fmt: skip
     return _TOML[best]
 
 

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from collections.abc import Callable
 
 import pytest
+from typer.main import get_command
 
+from r2s2r_cli.app import app
 from r2s2r_cli.checks import CHECKS, FAMILIES
-from r2s2r_cli.checks.base import IMPORTANCES, Check
+from r2s2r_cli.checks.base import AGAIN, IMPORTANCES, Check
 from tests.checks.case import Case, Edge
 from tests.checks.cases import EDGES, FAILS
 from tests.support.check_subjects import SOUND
 
+COMMANDS = ("r2s2r", "mv", "ls", "git", "pip")
 BY_NAME = {entry.name: entry for entry in CHECKS}
 
 
@@ -29,7 +34,7 @@ def test_a_wrong_subject_fails_with_exactly_this_message(case: Case) -> None:
     found = entry.run(subject, "a.h5")
     assert tuple((f.location, f.what, f.expected, f.received) for f in found) == case.found
     assert {(f.check, f.importance, f.file) for f in found} == {(entry.name, entry.importance, "a.h5")}
-    assert all(f.hint and "{" not in f.hint for f in found)
+    assert all(f.hint and "{" not in f.hint.replace(AGAIN, "") for f in found)
 
 
 @pytest.mark.parametrize("edge", EDGES, ids=lambda edge: f"{edge.check}: {edge.why}")
@@ -71,3 +76,24 @@ def test_every_check_says_what_why_and_how_to_fix(entry: Check) -> None:
     for text in (entry.what, entry.why, entry.fix):
         assert len(text) > 5 and not text.endswith(".")
     assert (entry.function.__doc__ or "").strip()
+
+
+@pytest.mark.parametrize("entry", CHECKS, ids=lambda entry: entry.name)
+def test_a_fix_is_a_line_to_paste_or_names_no_command(entry: Check) -> None:
+    """A command stands first, and its remark behind it as a shell skips it; words alone hold none, half of which
+    would be pasted."""
+    said = entry.fix.replace(AGAIN, "r2s2r estimate --force")
+    if said.split()[0] not in COMMANDS:
+        assert not re.search(rf"\b({'|'.join(COMMANDS)}) |run the stage|make the artifact", said)
+        return
+    words = shlex.split(said, comments=True)
+    assert said.partition("   # ")[0].split() == words
+    if words[0] == "r2s2r":
+        command = get_command(app).commands[words[1]]  # type: ignore[attr-defined]
+        command.make_context(words[1], [word for word in words[2:] if word != "--help"])
+
+
+def test_what_a_picture_shows_is_drawn() -> None:
+    """The three fixes of states that a camera saw: each draws its pictures."""
+    names = ("caps_well_observed", "noise_as_assumed", "seldom_lost")
+    assert {BY_NAME[name].fix.partition(":")[0] for name in names} == {f"{AGAIN}   # draws the pictures beside it"}

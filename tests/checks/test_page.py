@@ -35,6 +35,6 @@ def test_every_check_has_its_section(entry: Check) -> None:
 def test_what_mends_sensors_is_a_command() -> None:
     """That can be pasted: its words stand behind it as a remark."""
     hints = [entry.fix for entry in CHECKS if entry.fix.startswith("r2s2r calibrate --")]
-    assert len(hints) == 3
+    assert len(hints) == 4
     assert all(shlex.split(hint, comments=True) == ["r2s2r", "calibrate", "--points", "points.csv"] for hint in hints)
     assert not [entry.name for entry in CHECKS if entry.fix.startswith("r2s2r calibrate with")]

@@ -59,13 +59,14 @@ def test_people_get_one_block_a_finding_and_a_summary(estimated: Path) -> None:
     """The same as text: importance, sentence, name of the check, where, expected, received, hint; then the count."""
     forge(RECORDING, put("runs/sample/commands/target", (9, 2), 1.5))
     result = invoke("validate", str(RECORDING), "--select", "targets_in_range")
+    again = "r2s2r import sample.csv --iteration 1 --force"
     assert result.exit_code == 3
     assert result.stdout.splitlines() == [
         "error: a target position is out of range  [targets_in_range]",
         f"  where:    {RECORDING}: runs/sample/commands/target",
         "  expected: 0 (short) .. 1 (long)",
         "  received: 1.5 at row 9, cable 2",
-        "  hint:     write targets in the source as positions 0 .. 1, then run the stage again",
+        f"  hint:     {again}   # first write targets in the source as positions 0 .. 1",
         "",
         "1 file, 1 kind of check: 1 error, 0 warnings, 0 advice",
     ]

@@ -48,7 +48,8 @@ def test_what_cannot_be_read_is_never_passed(estimated: Path) -> None:
         (("--ignore", "rods_rigid"), "r2s2r validate --ignore rods_are_rigid"),
         (("--select", "qqqq"), "r2s2r validate --help   # docs/reference/checks.md lists the checks"),
         (("--select", ","), "r2s2r validate --select file_opens"),
-        (("--ignore", "content_intact"), "leave the file out of the command"),
+        (("--ignore", "content_intact"), "r2s2r validate"),
+        (("--ignore", "content_intact,seldom_lost,file_opens"), "r2s2r validate --ignore seldom_lost"),
         (("robot.toml", "--iteration", "1"), "r2s2r validate --iteration 1"),
     ],
 )

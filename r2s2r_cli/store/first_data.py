@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from r2s2r_cli.errors import quoted
 from r2s2r_cli.reached import reached
+from r2s2r_cli.store.log_folders import log_folders, some_files
 
 if TYPE_CHECKING:
     from schemas.config import LinkSettings
@@ -34,12 +35,10 @@ def first_data(root: Path, link: LinkSettings | None = None, *, options: str = "
 
 
 def _logs(root: Path, here: Path) -> Iterator[str]:
-    """Trajectories in the project's folder, else in `here`, as they are typed there."""
-    for folder in dict.fromkeys((root, here)):
-        try:
-            found = [path for path in sorted(folder.glob("*.csv")) if path.is_file() and _is_log(path)]
-        except OSError:
-            continue
+    """Trajectories of the first folder that has some, as they are typed in `here`: the project's, `here`, and where
+    else logs lie."""
+    for folder in dict.fromkeys((root, here, *log_folders(root))):
+        found = [path for path in some_files(folder, ".csv") if _is_log(path)]
         if found:
             yield from (quoted(os.path.relpath(path, here)) for path in found)
             return

@@ -93,6 +93,20 @@ def read_header(path: Path) -> Header:
         raise _damaged(path, error.errors()[0]["msg"]) from error
 
 
+def peeked_header(path: Path) -> Header | None:
+    """The header of an artifact; None where it cannot be read. It says of none what is wrong with it, and so can be
+    asked while what mends one is looked for, in the heads of others."""
+    try:
+        with path.open("rb") as file:
+            line = file.read(_LINE)
+            digest, length = line.removeprefix(MAGIC).split()
+            body = file.read(max(0, min(int(length), MAX_BLOCK)))
+        intact = line.startswith(MAGIC) and hashlib.sha256(body).hexdigest().encode() == digest
+        return Header.model_validate_json(body) if intact else None
+    except (OSError, ValueError):
+        return None
+
+
 def whole_header(path: Path) -> Header:
     """The header of an artifact that has all its bytes. Raises ArtifactError, also where the file was cut off.
 

@@ -11,13 +11,17 @@ import shlex
 from pathlib import Path
 
 from r2s2r_cli.errors import ArtifactError, quoted
+from r2s2r_cli.store.canonical import source_sha256
 from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.log_folders import MOST_FILES, SOURCES, log_folders
 from r2s2r_cli.store.project import ITERATIONS, iteration_number, root_of
 from schemas.header import Provenance
 from schemas.versions import KINDS
 
 GUESSED = "a guess, from the names of its runs: what it was made from cannot be read"
 _LOG = ".csv"
+_MOST_BYTES = 1 << 28
+"""Of a log that is compared with what was read then, in a second or so."""
 
 
 def import_again(path: Path, made: Provenance | None = None) -> str:
@@ -32,9 +36,10 @@ def import_again(path: Path, made: Provenance | None = None) -> str:
     if made is not None:
         from r2s2r_cli.store.again import command_again
 
-        logs = [root / ref.path for ref in made.inputs if ref.kind in ("file", "folder")]
-        if made.stage != "import" or not logs or not all(log.exists() for log in logs):
+        made = _found_again(made, root) if made.stage == "import" else None
+        if made is None:
             return ""
+        logs = [root / ref.path for ref in made.inputs if ref.kind in SOURCES]
         if root == Path.cwd():
             return command_again(made, path, force=True)
     else:
@@ -52,11 +57,38 @@ def look_at(path: Path) -> str:
     return f"file {quoted(path)}" + "   # if it was imported: r2s2r import LOG --force" * recording
 
 
+def _found_again(made: Provenance, root: Path) -> Provenance | None:
+    """How it was made, with the logs where they lie now: one that was moved to another folder of logs is known by its
+    bytes. None where one is gone, and where there was none."""
+    inputs = []
+    for ref in made.inputs:
+        place = root / ref.path
+        if ref.kind in SOURCES and not place.exists():
+            elsewhere = (folder / place.name for folder in log_folders(root))
+            moved = next((log for log in elsewhere if ref.kind == "file" and _holds(log, ref.sha256)), None)
+            if moved is None:
+                return None
+            ref = ref.model_copy(update={"path": Path(os.path.relpath(moved, root.resolve())).as_posix()})
+        inputs.append(ref)
+    return made.model_copy(update={"inputs": tuple(inputs)}) if any(ref.kind in SOURCES for ref in inputs) else None
+
+
+def _holds(log: Path, sha256: str) -> bool:
+    try:
+        return log.is_file() and log.stat().st_size <= _MOST_BYTES and source_sha256(log) == sha256
+    except OSError:
+        return False
+
+
 def _guessed(path: Path, root: Path) -> list[Path]:
-    """A log in the project's folder for each run; none where one is missing."""
+    """A log for each run, in a folder where logs lie; none where one is missing."""
+    runs, folders = _runs(path)[: MOST_FILES + 1], log_folders(root)
+    if len(runs) > MOST_FILES:  # nobody pastes a line of so many
+        return []
     logs = []
-    for run in _runs(path):
-        found = next((one for one in (root / f"{run}{_LOG}", root / run) if one.exists()), None)
+    for run in runs:
+        candidates = (log for folder in folders for log in (folder / f"{run}{_LOG}", folder / run))
+        found = next((log for log in candidates if log.exists()), None)
         if found is None:
             return []
         logs.append(found)

@@ -103,6 +103,44 @@ def test_an_empty_recording_is_imported_again(estimated: Path, command: str) -> 
     assert invoke("validate", RECORDING).exit_code == 0
 
 
+@pytest.mark.parametrize("folder", ["data", "logs", "recordings", "../shelf"])
+def test_its_log_is_found_where_logs_are_kept(estimated: Path, folder: str) -> None:
+    """Beside the project's folder the usual ones are looked at, and those that another recording was imported from;
+    pasted, the command works."""
+    place = estimated / folder
+    place.mkdir()
+    for name in ("sample.csv", "sample.toml"):
+        (estimated / name).rename(place / name)
+    if folder == "../shelf":
+        second = place / "second.csv"
+        second.write_bytes((place / "sample.csv").read_bytes())
+        second.with_suffix(".toml").write_bytes((place / "sample.toml").read_bytes())
+        assert invoke("import", f"{folder}/second.csv", "--iteration", "2", "--no-draw").exit_code == 0
+    (estimated / RECORDING).write_bytes(b"")
+    said = document("status")
+    again = f"r2s2r import {folder}/sample.csv --iteration 1 --force   # {GUESSED}"
+    assert again in [said["next"], *(one["mend"] for one in said["artifacts"])]
+    assert invoke(*shlex.split(again, comments=True)[1:], "--no-draw").exit_code == 0
+
+
+def test_a_log_that_was_moved_is_known_by_its_bytes(estimated: Path) -> None:
+    """Where the head can be read it is no guess: another log of that name is none, and the options stay."""
+    tolerance = "import.rod_length_tolerance=0.06"
+    assert invoke("import", "sample.csv", "--set", tolerance, "--no-draw", "--force").exit_code == 0
+    (estimated / "data").mkdir()
+    (estimated / "logs").mkdir()
+    (estimated / "data/sample.csv").write_text("another\n")
+    for name in ("sample.csv", "sample.toml"):
+        (estimated / name).rename(estimated / "logs" / name)
+    (estimated / RECORDING).write_bytes((estimated / RECORDING).read_bytes()[:-2000])
+    again = document("status")["next"]
+    assert again == f"r2s2r import logs/sample.csv --set {tolerance} --iteration 1 --force"
+    assert invoke(*shlex.split(again)[1:], "--no-draw").exit_code == 0
+    (estimated / RECORDING).write_bytes((estimated / RECORDING).read_bytes()[:-2000])
+    (estimated / "logs/sample.csv").unlink()
+    assert document("status")["next"] == f"r2s2r recover {RECORDING}"
+
+
 def test_what_nobody_can_guess_is_no_command(estimated: Path) -> None:
     """No log of that name: what to do with one is said behind the command that looks. Of a robot's recording it would
     be the wrong one."""

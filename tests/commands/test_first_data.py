@@ -5,10 +5,12 @@ from __future__ import annotations
 import shlex
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from r2s2r_cli.reached import ROBOT
+from r2s2r_cli.store import log_folders
 from r2s2r_cli.store.first_data import first_data
 from schemas.config import LinkSettings
 from tests.commands.conftest import document, invoke
@@ -51,6 +53,34 @@ def test_a_log_in_the_working_folder_counts(project: Path, monkeypatch: pytest.M
     (project / "sample.csv").unlink()
     monkeypatch.chdir(elsewhere)
     assert hint("import", "--project", str(project)) == "r2s2r import 'a b.csv' --project ../robot   # or z.csv"
+
+
+@pytest.mark.parametrize("folder", log_folders.USUAL)
+def test_a_log_in_a_folder_of_logs_is_named(project: Path, folder: str) -> None:
+    """Where the project's own folder has none; pasted, the command brings data."""
+    (project / folder).mkdir()
+    for name in ("sample.csv", "sample.toml"):
+        (project / name).rename(project / folder / name)
+    assert hint("estimate") == f"r2s2r import {folder}/sample.csv"
+    assert hint("run") == f"r2s2r run {folder}/sample.csv"
+    assert invoke("import", f"{folder}/sample.csv", "--no-draw").exit_code == 0
+
+
+def test_few_files_of_a_folder_are_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A hint does not read through a folder of many thousands: as many as are said are listed, and no more opened."""
+    monkeypatch.setattr(log_folders, "MOST_FILES", 5)
+    for number in range(9):
+        (tmp_path / f"{number}.csv").write_text("no log\n")
+    opened: list[str] = []
+    really = Path.open
+
+    def counted(path: Path, *how: Any, **more: Any) -> Any:
+        opened.append(path.name)
+        return really(path, *how, **more)
+
+    monkeypatch.setattr(Path, "open", counted)
+    assert first_data(tmp_path, here=tmp_path).startswith(RECORD)
+    assert len(opened) == 5 and log_folders.some_files(tmp_path / "none", ".csv") == []
 
 
 def test_a_robot_that_the_project_knows_is_not_named_again(tmp_path: Path) -> None:

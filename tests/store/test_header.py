@@ -11,7 +11,7 @@ import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.errors import ArtifactError, InputError
-from r2s2r_cli.store.header import MAGIC, block, block_size, read_header
+from r2s2r_cli.store.header import MAGIC, block, block_size, peeked_header, read_header
 from r2s2r_cli.store.read import checked_header
 from r2s2r_cli.store.write import write_artifact
 from tests.store.conftest import Copy
@@ -34,6 +34,7 @@ def check_flips(path: Path, bits: Iterator[tuple[int, int]]) -> None:
     noticed = flips = 0
     for _ in flipped(path, bits):
         flips += 1
+        assert peeked_header(path) in (None, sealed)
         try:
             assert read_header(path) == sealed
         except ArtifactError as error:

@@ -115,6 +115,7 @@ def import_(
 
 
 def _refs(project: Project, sources: list[Path], format_: Format) -> list[InputRef]:
+    from r2s2r_cli.commands.sources import other_than_log
     from r2s2r_cli.commands.typed import typed_instead
     from r2s2r_cli.stages.import_ import check_source
     from r2s2r_cli.stages.import_.files import Missing
@@ -123,6 +124,10 @@ def _refs(project: Project, sources: list[Path], format_: Format) -> list[InputR
 
     refs: list[InputRef] = []
     for path in sources:
+        other = other_than_log(path) if format_.value == "auto" else None
+        if other is not None:
+            raise InputError("this is no log that can be imported", where=str(path), received=other.words,
+                             expected="a trajectory CSV or a recorder folder", hint=other.command)  # fmt: skip
         try:
             check_source(path, format_.value)
         except Missing as error:

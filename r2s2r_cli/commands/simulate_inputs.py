@@ -63,7 +63,7 @@ class Asked:
             except OSError as error:
                 raise InputError("the policy cannot be read", where=str(path), expected="a policy file or an artifact",
                                  received=error.strerror or str(error),
-                                 hint="r2s2r simulate --random 15") from error  # fmt: skip
+                                 hint=_meant(path)) from error  # fmt: skip
             refs[ref.path] = ref
         if self.model is not None:
             ref = artifact_ref(self.project, self.model, require_model(self.project, self.model, "simulate"))
@@ -196,3 +196,15 @@ def read_policies(text: str, command: str = "simulate") -> Iterator[PolicyFile]:
             hint=typed_instead(command, name, near) if near else f"r2s2r inspect {quoted(path)}",
         )  # fmt: skip
     yield from [found[name]] if name else found.values()
+
+
+def _meant(path: Path) -> str:
+    """The command with the policy file that was probably meant: without a name behind it, which an artifact alone has,
+    or of a near name; else with none."""
+    from r2s2r_cli.commands.typed import typed_instead
+    from r2s2r_cli.store.log_folders import some_files
+
+    bare = Path(str(path).rpartition(":")[0])
+    near = nearest(path.name, [one.name for ending in (".toml", ARTIFACT) for one in some_files(path.parent, ending)])
+    right = bare if bare.is_file() else path.with_name(near) if near else None
+    return "r2s2r simulate --random 15" if right is None else typed_instead("simulate", str(path), str(right))

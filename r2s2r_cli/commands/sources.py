@@ -42,6 +42,21 @@ def what_source(path: Path) -> SourceFile | None:
     return None
 
 
+def other_than_log(path: Path) -> SourceFile | None:
+    """What a file is that somebody took for a log, and the command that takes it; None where it may be a log."""
+    if not path.is_file():
+        return None
+    suffix, name = path.suffix.lower(), quoted(path)
+    if suffix == ".h5":
+        return SourceFile("an HDF5 file", f"r2s2r inspect {name}")
+    if suffix == ".toml":
+        return SourceFile("a TOML file", f"r2s2r validate {name}")
+    found = what_source(path)
+    if found is None or "r2s2r import" in found.command or "cap0_" in _head(path).partition("\n")[0].lower():
+        return None
+    return found
+
+
 def is_masses(values: Mapping[str, object]) -> bool:
     """Whether a TOML file holds weighed parts for `calibrate`."""
     return set(values) == {"part"} and isinstance(values["part"], list)

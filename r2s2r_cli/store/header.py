@@ -21,6 +21,8 @@ MAGIC = NAME + b"1 "
 MIN_BLOCK = 4096
 MAX_BLOCK = 1 << 22
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+TEXTS = (".toml", ".csv", ".json")
+"""Endings of files that are no artifacts, and of which `validate` says what they are and which command takes them."""
 _LINE = len(MAGIC) + 64 + 1 + 10 + 1
 _READ = 1 << 20
 
@@ -178,7 +180,7 @@ def mends(path: Path, or_else: str = "recover") -> str:
     with contextlib.suppress(OSError):
         if find_body(path) is not None:
             return f"r2s2r recover {quoted(path)}"
-    return command_at(path) or f"r2s2r {or_else} {quoted(path)}"
+    return command_at(path) or f"r2s2r {'validate' if path.suffix.lower() in TEXTS else or_else} {quoted(path)}"
 
 
 def mends_cut_off(path: Path, header: Header) -> str:

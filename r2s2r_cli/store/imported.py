@@ -12,7 +12,7 @@ from pathlib import Path
 
 from r2s2r_cli.errors import ArtifactError, quoted
 from r2s2r_cli.store.canonical import source_sha256
-from r2s2r_cli.store.header import read_header
+from r2s2r_cli.store.header import TEXTS, read_header
 from r2s2r_cli.store.log_folders import MOST_FILES, SOURCES, log_folders
 from r2s2r_cli.store.project import ITERATIONS, iteration_number, root_of
 from schemas.header import Provenance
@@ -53,6 +53,8 @@ def import_again(path: Path, made: Provenance | None = None) -> str:
 
 def look_at(path: Path) -> str:
     """The hint for a file in which there is nothing of ours, and that no known command makes again."""
+    if path.suffix.lower() in TEXTS:
+        return f"r2s2r validate {quoted(path)}"
     recording = path.name == KINDS["recording"].filename and root_of(path.absolute()) is not None
     return f"file {quoted(path)}" + "   # if it was imported: r2s2r import LOG --force" * recording
 

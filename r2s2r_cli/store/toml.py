@@ -105,7 +105,7 @@ def _wrong_value(problem: Any, where: str, mend: Mend) -> InputError:
     return InputError(
         f"the value of {key} is not allowed" if key else "the values do not fit together",
         where=f"{where}, key {key}" if key else where,
-        expected=problem["msg"].removeprefix("Value error, "),
+        expected=problem["msg"].removeprefix("Value error, ").removeprefix("Input should be "),
         received=received,
         hint=mend(problem["loc"], ""),
     )

@@ -70,6 +70,9 @@ class World(Section):
         return camera
 
 
+_EXAMPLE = "r2s2r rig --help   # docs/reference/world.md has an example of a world file"
+
+
 def load_world(path: Path) -> World:
     """Read a world file. Raises InputError: no such file, no TOML, an unknown key, a value that cannot be."""
     try:
@@ -82,7 +85,7 @@ def load_world(path: Path) -> World:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(
             f"{path} is no TOML", where=str(path), expected="a world file (TOML)", received=str(error),
-            hint="docs/reference/world.md has an example",
+            hint=_EXAMPLE,
         ) from error  # fmt: skip
     try:
         return World.model_validate(raw)
@@ -92,5 +95,7 @@ def load_world(path: Path) -> World:
         raise InputError(
             f"{path} is no world file: {first['msg']}", where=f"{path}: {key}",
             expected="the keys and bounds of docs/reference/world.md",
-            received=repr(first["input"])[:80], hint=f"correct {key} in {path}",
+            received=repr(first["input"])[:80],
+            # Nothing in another program's file, or in that of a project, is to be corrected into a world.
+            hint=f"correct {key} in {path}" if set(raw) & set(World.model_fields) else _EXAMPLE,
         ) from error  # fmt: skip

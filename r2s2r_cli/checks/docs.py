@@ -19,8 +19,8 @@ of the project's robot by name and have as many caps, rods and cables as it.
 """
 
 
-_STAGE_AGAIN = "r2s2r STAGE --force"
-"""Of the stage that made the artifact; `validate` shows it with the options of then."""
+_MAKE_AGAIN = "Make the artifact again with `--force`, by the line that `validate` shows"
+"""That line has the stage, the iteration and the options of then."""
 
 
 def checks_page() -> str:
@@ -41,13 +41,15 @@ def _overview() -> str:
 def _typed(fix: str) -> str:
     """A command as it is typed, with its remark behind it; words as a sentence."""
     command, _, remark = fix.partition("   # ")
+    if command == AGAIN:
+        return f"{_MAKE_AGAIN}: {sentence(remark)[0].lower()}{sentence(remark)[1:]}" if remark else f"{_MAKE_AGAIN}."
     if remark:
         return f"`{command}`: {sentence(remark)[0].lower()}{sentence(remark)[1:]}"
     return f"`{command}`" if command.startswith("r2s2r ") else sentence(fix)
 
 
 def _section(entry: Check) -> str:
-    fix = entry.fix.replace("{file}", "FILE").replace("{location}", "PLACE").replace(AGAIN, _STAGE_AGAIN)
+    fix = entry.fix.replace("{file}", "FILE").replace("{location}", "PLACE")
     return (
         f"### {entry.name}\n\n"
         f"{entry.importance.capitalize()}; looks at {_scope(entry)}.\n\n"

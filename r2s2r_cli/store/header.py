@@ -79,33 +79,21 @@ def read_header(path: Path) -> Header:
         if path.exists() and not path.is_dir() and not path.is_file():
             raise NotAnArtifact("this is no regular file", where=str(path), expected="an artifact",
                                 received="a pipe, socket or device", hint=f"ls -la {quoted(path)}")  # fmt: skip
-        with path.open("rb") as file:
-            line = file.read(_LINE)
-            if not line.startswith(MAGIC):
-                raise not_an_artifact(path, line)
-            digest, length = _parse(path, line)
-            body = file.read(length)
+        return _head(path)
     except OSError as error:
         raise unreadable(path, error) from error
-    if hashlib.sha256(body).hexdigest() != digest:
-        raise _damaged(path, "its digest does not match its text")
-    try:
-        return Header.model_validate_json(body)
-    except ValidationError as error:
-        raise _damaged(path, error.errors()[0]["msg"]) from error
+    except _Foreign as error:
+        raise not_an_artifact(path, error.line) from error
+    except _Damage as error:
+        raise _damaged(path, str(error)) from error
 
 
 def peeked_header(path: Path) -> Header | None:
     """The header of an artifact; None where it cannot be read. It says of none what is wrong with it, and so can be
     asked while what mends one is looked for, in the heads of others."""
     try:
-        with path.open("rb") as file:
-            line = file.read(_LINE)
-            digest, length = line.removeprefix(MAGIC).split()
-            body = file.read(max(0, min(int(length), MAX_BLOCK)))
-        intact = line.startswith(MAGIC) and hashlib.sha256(body).hexdigest().encode() == digest
-        return Header.model_validate_json(body) if intact else None
-    except (OSError, ValueError):
+        return _head(path)
+    except (OSError, _Foreign, _Damage):
         return None
 
 
@@ -216,14 +204,42 @@ def _encode(header: Header) -> bytes:
     return canonical_json(header.model_dump(mode="json")).encode()
 
 
-def _parse(path: Path, line: bytes) -> tuple[str, int]:
+class _Foreign(Exception):
+    """The file begins as no artifact does. line: its first bytes."""
+
+    def __init__(self, line: bytes) -> None:
+        super().__init__(line)
+        self.line = line
+
+
+class _Damage(Exception):
+    """What is wrong with a head, in words."""
+
+
+def _head(path: Path) -> Header:
+    """The header, checked against its own digest. Raises OSError, _Foreign, _Damage."""
+    with path.open("rb") as file:
+        line = file.read(_LINE)
+        if not line.startswith(MAGIC):
+            raise _Foreign(line)
+        digest, length = _parse(line)
+        body = file.read(length)
+    if hashlib.sha256(body).hexdigest() != digest:
+        raise _Damage("its digest does not match its text")
+    try:
+        return Header.model_validate_json(body)
+    except ValidationError as error:
+        raise _Damage(error.errors()[0]["msg"]) from error
+
+
+def _parse(line: bytes) -> tuple[str, int]:
     try:
         digest, length = line[len(MAGIC) :].split()
         size = int(length)
     except ValueError as error:
-        raise _damaged(path, f"its first line reads {line!r}") from error
+        raise _Damage(f"its first line reads {line!r}") from error
     if not 0 < size <= MAX_BLOCK:
-        raise _damaged(path, f"it claims a length of {size} bytes")
+        raise _Damage(f"it claims a length of {size} bytes")
     return digest.decode("ascii", "replace"), size
 
 

@@ -63,10 +63,12 @@ def _found_again(made: Provenance, root: Path) -> Provenance | None:
     """How it was made, with the logs where they lie now: one that was moved to another folder of logs is known by its
     bytes. None where one is gone, and where there was none."""
     inputs = []
+    folders: list[Path] | None = None  # heads of recordings are read for them: once, and where a log is missing
     for ref in made.inputs:
         place = root / ref.path
         if ref.kind in SOURCES and not place.exists():
-            elsewhere = (folder / place.name for folder in log_folders(root))
+            folders = log_folders(root) if folders is None else folders
+            elsewhere = (folder / place.name for folder in folders)
             moved = next((log for log in elsewhere if ref.kind == "file" and _holds(log, ref.sha256)), None)
             if moved is None:
                 return None

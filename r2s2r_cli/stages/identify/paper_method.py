@@ -56,7 +56,7 @@ def paper_engines(task: Task) -> tuple[Preset, Predictor]:
     request = task.request
     frees = select(specs_asked(request, task.settings, PAPER_FREE), task.robot, request.effects, request.fixed)
     made = preset(
-        task.robot, frees, effects=request.effects, fixed=dict(request.fixed),
+        task.robot, frees, effects=request.effects, fixed=task.given,
         structure=replace(structure_of(task.robot), rod_contact=task.settings.rod_contact), step=task.recipe.step,
         cache_dir=task.cache_dir,
     )  # fmt: skip

@@ -79,6 +79,10 @@ def make(
     gaits: Annotated[
         int | None, typer.Option("--gaits", min=2, max=8, help="Of every set; default: 3, 5 or 8 by chance.")
     ] = None,
+    noise: Annotated[
+        float | None,
+        typer.Option("--noise", metavar="MM", min=0.1, max=50, help="Of the caps [mm]; default: 2, 5 or 10 by chance."),
+    ] = None,
     oracle: Annotated[
         bool, typer.Option("--oracle/--no-oracle", help="Compute how well each effect can be told; half of the time.")
     ] = True,
@@ -106,13 +110,18 @@ def make(
     if camera and tier is Tier.A:
         raise UsageError("tier A has no camera", where="--camera", expected="--tier B, the rig, which has one",
                          received="--tier A", hint=f"r2s2r blind make --camera --key {key} {out}")  # fmt: skip
+    if camera and noise is not None:
+        raise UsageError("pictures have the noise of the tracker", where="--noise", expected="--noise without --camera",
+                         received=f"--noise {noise:g} --camera",
+                         hint=f"r2s2r blind make --camera --key {key} {out}")  # fmt: skip
     if first is not None:
         _check_first(first, count, bank, console)
     asked = ["--out", str(out), "--key", str(key), "--bank", bank.value, "--tier", tier.value, "--count", str(count),
              "--commissioning", str(commissioning), "--observed", str(observed), "--executor", executor,
              "--workers", str(workers), *(["--effect", effect] if effect else []),
              *([] if first is None else ["--first", str(first)]),
-             *(["--gaits", str(gaits)] if gaits else []), *([] if oracle else ["--no-oracle"]),
+             *(["--gaits", str(gaits)] if gaits else []), *(["--noise", str(noise)] if noise else []),
+             *([] if oracle else ["--no-oracle"]),
              *(["--camera"] if camera else [])]  # fmt: skip
     with console.progress("blind sets", count) as advance:
         make_sets(asked, advance)

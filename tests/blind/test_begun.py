@@ -27,6 +27,7 @@ from tests.support.blind_folder import CODE
 OTHERS: list[tuple[dict[str, Any], str]] = [
     ({"count": 13}, "--count"), ({"count": 8}, "--count"), ({"bank": Bank.REGRESSION}, "--bank"),
     ({"tier": "A"}, "--tier"), ({"camera": True}, "--camera"), ({"gaits": 3}, "--gaits"),
+    ({"noise_mm": 1.0}, "--noise"),
     ({"effect": "payload"}, "--effect"), ({"commissioning": 1}, "--commissioning"), ({"oracle": False}, "--no-oracle"),
     ({"observed": 1}, "--observed"), ({"first": 12}, "--first"),
 ]  # fmt: skip

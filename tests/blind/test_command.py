@@ -42,6 +42,12 @@ def test_the_key_may_not_lie_in_the_bank(bank: Path) -> None:
     assert code == 2 and not (bank / "a.key").exists()
 
 
+def test_pictures_have_no_noise_of_their_own(tmp_path: Path) -> None:
+    """What a tracker makes of them is what it is."""
+    code, _ = refusal("make", tmp_path / "bank", "--key", tmp_path / "a.key", "--camera", "--noise", "1")
+    assert code == 2 and not (tmp_path / "a.key").exists()
+
+
 @pytest.mark.parametrize(
     "extra",
     [("--set", "with_parity"), ("--set", "=3"), ("--set", "x=]"), ("--set", "x=1\ny=2"), ("--without", "ghosts")],

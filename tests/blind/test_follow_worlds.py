@@ -47,6 +47,7 @@ def labelled(world: Hidden) -> dict[str, Any]:
         {"kind": Kind.SINGLE, "effects": ("tendon_set",)},
         {"kind": Kind.SINGLE, "effects": ("sensor_bias",), "gaits": 4},
         {"kind": Kind.PAIR, "gaits": 2},
+        {"kind": Kind.PAIR, "noise_m": 0.001},
         {"kind": Kind.OUTSIDE, "commissioning": 1},
         {"kind": Kind.OUTSIDE, "tier": "A", "gaits": 3},
     ],

@@ -78,6 +78,17 @@ def test_worlds_of_a_seed_differ_in_what_is_wrong_alone() -> None:
     assert other.friction != plain.friction and 0.45 <= other.friction <= 1.0
 
 
+def test_other_noise_is_the_same_world() -> None:
+    """`--noise`: below 10 mm sizes are drawn alike, so that what is wrong is what it was, and as large."""
+    drawn = next(
+        world for seed in range(SEED, SEED + 40)
+        if (world := hidden(Bank.CALIBRATION, seed, Kind.SINGLE)).noise_m == 0.005
+    )  # fmt: skip
+    told = hidden(Bank.CALIBRATION, drawn.seed, Kind.SINGLE, noise_m=0.001)
+    assert told.noise_m == 0.001 and np.array_equal(told.day, drawn.day)
+    assert replace(told, noise_m=0.005, day=drawn.day) == drawn
+
+
 @pytest.mark.parametrize("gaits", [3, 5, 8])
 def test_what_begins_late_begins_in_a_gait_that_is_fitted(gaits: int) -> None:
     """A knock, or a push, that only the judged gaits have could be learned of by nobody."""

@@ -36,6 +36,7 @@ def _make(arguments: list[str]) -> int:
     parser.add_argument("--observed", type=int, default=0)
     parser.add_argument("--effect", choices=sorted(STARRED))
     parser.add_argument("--gaits", type=int)
+    parser.add_argument("--noise", type=float)
     parser.add_argument("--no-oracle", action="store_true")
     parser.add_argument("--camera", action="store_true")
     parser.add_argument("--workers", type=int, default=1)
@@ -47,8 +48,8 @@ def _make(arguments: list[str]) -> int:
         check_key(given.out, given.key)
         key = read_key(given.key) if given.key.exists() else new_key(given.key)
         asked = Asked(given.bank, given.count, given.out, key, given.first, given.commissioning, given.observed,
-                      given.effect, given.gaits, given.tier, not given.no_oracle,
-                      given.camera, str(given.key))  # fmt: skip
+                      given.effect, given.gaits, given.noise, given.tier,
+                      not given.no_oracle, given.camera, str(given.key))  # fmt: skip
         return make(asked, executor=given.executor, workers=given.workers)
 
     return _told(names, given.count)

@@ -15,16 +15,18 @@ from r2s2r_cli.errors import InputError
 def world_of(label: dict[str, Any], *, where: str) -> Hidden:
     """The world that a label is of.
 
-    Whether the maker was told the number of gaits and the effects (`--gaits`, `--effect`) is in no label, and decides
-    what else is drawn from the seed: each way is tried until one says what the label says. where: of the label, for
-    people. Raises InputError where none does: another version of the maker made the set.
+    Whether the maker was told the number of gaits, the effects and the noise (`--gaits`, `--effect`, `--noise`) is in
+    no label, and decides what else is drawn from the seed: each way is tried until one says what the label says.
+    where: of the label, for people. Raises InputError where none does: another version of the maker made the set.
     """
     ids = tuple(str(one["id"]) for one in label["effects"])
-    for effects, gaits in product(dict.fromkeys(((), ids)), (None, int(label["gaits"]))):
+    for effects, gaits, noise in product(
+        dict.fromkeys(((), ids)), (None, int(label["gaits"])), dict.fromkeys((None, label["noise_m"]))
+    ):
         found = hidden(
             Bank(label["bank"]), int(label["seed"]), Kind(label["kind"]), effects=effects, gaits=gaits,
             commissioning=int(label["commissioning"]), tier=label["tier"],
-            camera=bool(label.get("camera", False)),
+            camera=bool(label.get("camera", False)), noise_m=noise,
         )  # fmt: skip
         if _facts(found) == _told(label):
             return found

@@ -31,8 +31,8 @@ class Asked:
     """A bank. first: number of its first set; None: of a blind bank a secret one that the key decides, else 0, so that
     nobody can make its worlds again who has not the key. commissioning: runs of the healthy robot a set. observed:
     which draw of the camera's noise. effect: its single sets all have this effect; None: any of the first release.
-    gaits: of every set; None: 3, 5 or 8 by chance. tier: A, our engine; B, the rig. camera: sets have pictures.
-    key_file: where the key lies, for people.
+    gaits: of every set; None: 3, 5 or 8 by chance. noise_mm: of its caps [mm]; None: 2, 5 or 10 by chance. tier: A, our
+    engine; B, the rig. camera: sets have pictures. key_file: where the key lies, for people.
     """
 
     bank: Bank
@@ -44,6 +44,7 @@ class Asked:
     observed: int = 0
     effect: str | None = None
     gaits: int | None = None
+    noise_mm: float | None = None
     tier: Literal["A", "B"] = "B"
     oracle: bool = True
     camera: bool = False
@@ -56,7 +57,7 @@ class Asked:
         return {
             "--bank": self.bank.value, "--tier": self.tier, "--count": self.count, "--first": first,
             "--commissioning": self.commissioning, "--observed": self.observed, "--effect": self.effect,
-            "--gaits": self.gaits, "--no-oracle": not self.oracle, "--camera": self.camera,
+            "--gaits": self.gaits, "--noise": self.noise_mm, "--no-oracle": not self.oracle, "--camera": self.camera,
         }  # fmt: skip
 
 
@@ -71,7 +72,8 @@ def worlds(asked: Asked) -> tuple[Hidden, ...]:
     effects = () if asked.effect is None else (asked.effect,)
     return tuple(
         hidden(asked.bank, seed, kind, commissioning=asked.commissioning, gaits=asked.gaits, tier=asked.tier,
-               effects=effects if kind.value == "single" else (), camera=asked.camera)
+               effects=effects if kind.value == "single" else (), camera=asked.camera,
+               noise_m=None if asked.noise_mm is None else 1e-3 * asked.noise_mm)
         for seed, kind in zip(own, drawn, strict=True)
     )  # fmt: skip
 

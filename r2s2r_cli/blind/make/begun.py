@@ -95,6 +95,7 @@ def _differences(world: Hidden, label: Mapping[str, Any], options: Options) -> d
         "--count": label.get("kind", world.kind.value) != world.kind.value,
         "--commissioning": label.get("commissioning", world.commissioning) != world.commissioning,
         "--gaits": label.get("gaits", world.gaits) != world.gaits,
+        "--noise": label.get("noise_m") not in (None, world.noise_m),
         "--effect": [one["id"] for one in label.get("effects", ())] != [one.id for one in world.planted]
         if "effects" in label
         else False,

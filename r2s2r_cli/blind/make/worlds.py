@@ -101,10 +101,10 @@ class _Day(Law):
 def hidden(
     bank: Bank, seed: int, kind: Kind, *, effects: tuple[str, ...] = (), strange: str | None = None,
     commissioning: int = 2, gaits: int | None = None, factor: float | None = None, tier: Literal["A", "B"] = "B",
-    camera: bool = False,
+    noise_m: float | None = None, camera: bool = False,
 ) -> Hidden:  # fmt: skip
-    """The world of a seed. effects, strange, gaits, factor: instead of what the seed would draw. camera: the same, seen
-    in pictures."""
+    """The world of a seed. effects, strange, gaits, factor, noise_m: instead of what the seed would draw. camera: the
+    same, seen in pictures."""
     rng = np.random.default_rng([seed, 10])
     count = int(rng.choice(GAITS)) if gaits is None else gaits
     plain = Hidden(
@@ -113,6 +113,8 @@ def hidden(
         noise_m=float(rng.choice(NOISE_M)), ar1=float(rng.choice(AR1)), rate_hz=float(rng.choice(RATES_HZ)),
         gaits=count, commissioning=commissioning, tier=tier,
     )  # fmt: skip
+    if noise_m is not None:
+        plain = replace(plain, noise_m=noise_m)
     if camera:
         plain = replace(plain, noise_m=TRACKED_M, ar1=TRACKED_AR1, rate_hz=CAMERA_HZ, camera=True)
     wrong = np.random.default_rng([seed, 11])

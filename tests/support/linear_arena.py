@@ -29,7 +29,7 @@ class LinearArena:
         self.y = self.A @ [0.3, -0.2] + self.B[:, 0] * truth + noise * rng.standard_normal(M)
         self.mean, self.precision = np.zeros(2), np.eye(2)
         self.lower, self.upper = np.full(2, -10.0), np.full(2, 10.0)
-        self.by_nuisance = _kinds(self.A.T).T
+        self.by_nuisance = kinds_of(self.A.T).T
         self.engine, self.shared = [0, 1], 2
         self.many = tuple(SimpleNamespace(run="a", interval=k + 1, caps=np.zeros((1, 1, 3))) for k in range(STRETCHES))
         self.whole = self.many
@@ -94,7 +94,8 @@ class LinearArena:
         return np.asarray(found.transpose(0, 2, 1))
 
 
-def _kinds(residual: np.ndarray) -> np.ndarray:
+def kinds_of(residual: np.ndarray) -> np.ndarray:
+    """Rows (n, M) under every kind of error, (n, kind M)."""
     return np.concatenate([residual / factor for factor in FACTORS], axis=1)
 
 

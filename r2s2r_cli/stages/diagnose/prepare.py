@@ -2,44 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.diagnose.evidence import Evidence, FloorGiven, Run, whole
-from r2s2r_cli.stages.diagnose.floors import NUMERICS_M, floor_for, healthy_floor
+from r2s2r_cli.stages.diagnose.floors import floor_for, healthy_floor
+from r2s2r_cli.stages.diagnose.nominal import begun, calibrated, nominal
 from r2s2r_cli.stages.diagnose.parity.fitted import unheard
 from r2s2r_cli.stages.diagnose.parity.lengths import late_readings
 from r2s2r_cli.stages.diagnose.starts import Starts, as_known
 from r2s2r_cli.stages.diagnose.which.arena import Arena
 from r2s2r_cli.stages.diagnose.which.before import Healthy
 from r2s2r_cli.stages.diagnose.which.fit import Fits
-from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
+from r2s2r_cli.stages.diagnose.which.hypothesis import Fit
 from r2s2r_cli.stages.diagnose.which.numbers import SENSOR_LAG
 from r2s2r_cli.stages.diagnose.which.pieces import pieces
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
-from r2s2r_cli.stages.diagnose.which.shake import shaken
 from r2s2r_cli.stages.diagnose.which.stretches import stretches
 from r2s2r_cli.stages.identify.data import Selection
 
-FLOORS_M = (0.8e-3, 1.6e-3, 3.2e-3, 6.4e-3, 13e-3)
-"""Floors that healthy runs are tried with."""
-NOISES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
-LASTING = (0.0, 0.1, 0.3)
-"""[s] Times that errors of the caps may last."""
-NEAR = (0.7, 1.0, 1.4)
-"""Factors on the floor and the noise, where something is known of them."""
-FLOOR_SPREAD = 0.5
-"""Of the logarithm of the floor, before healthy runs are looked at: noisy ones say little of it."""
 ROUNDS = 2
 """Times that start states are made anew with the refitted numbers, where nothing is known of these to begin with."""
 NO_FLOOR_M = 1e-4
 FROZEN = 1e8
 """Times its prior's precision that a nuisance has which is not fitted."""
-JACOBIANS = 2
-"""Times that derivatives are taken anew with the last start states."""
 AGED = 0.35
 """Of a nuisance's own prior: how far it may have moved since the healthy runs, and how wrong their fit may be: where
 robots fall over, two fits of the same runs differ by as much."""
@@ -114,9 +103,7 @@ def _fitted(
     told: Told | None = None, calibrate: bool = False,
 ) -> tuple[Arena, Fit]:  # fmt: skip
     """Nuisances and start states in turns. errs: factor on the noise, and how long it lasts [s]. begin: nuisances to
-    begin with; late: of the sensors [s], where there are none. calibrate: with them
-    the floor and the noise, of healthy runs: under a noise that is too small every piece looks like a fall, and a fit
-    of falls learns nothing."""
+    begin with; late: of the sensors [s], where there are none. calibrate: with them the floor and the noise."""
     model = replayer.model
     noise, lasts = errs
     named = {run.name: run for run in runs}
@@ -140,32 +127,16 @@ def _fitted(
                 hint="r2s2r record --random 15 --port /dev/ttyUSB0   # other shapes",
             )  # fmt: skip
         arena = Arena(replayer, many, floor_m=simulator, noise=noise, lasts=lasts, prior=prior, whole=intervals)
-        z = _begun(arena, z, late)
-        for again in range(JACOBIANS if number == rounds - 1 else 1):
-            if again:
-                arena.move_starts(arena.away)
-            arena.prepare(z)
-            if calibrate:
-                _calibrate(arena, z, first=number == 0)
-            base = _from(arena, z)
-            solver = Fits(arena)
-            solver.run([base])
-            # Before the last derivatives: they are to be those of the best place.
-            if number == rounds - 1 and not again:
-                base = shaken(solver, base)
-            z, arena.away = base.z, base.away
+        z = _first(arena, z, late)
+        base = nominal(arena, z, calibrate=calibrate, first=number == 0, ends=number == rounds - 1)
+        z, arena.away = base.z, base.away
         simulator, noise, lasts = arena.floor_m, arena.noise, arena.lasts
     if calibrate:
-        _calibrate(arena, base.z)
-        base = _from(arena, base.z)
+        calibrated(arena, base.z)
+        base = begun(arena, base.z)
     if told is not None:
         told("refit", rounds, rounds)
     return arena, base
-
-
-def _from(arena: Arena, z: np.ndarray) -> Fit:
-    """The refit nominal model at nuisances z, not moved yet."""
-    return Fits(arena).begun([(Hypothesis(), z, np.zeros(0))])[0]
 
 
 def _frozen(arena: Arena) -> tuple[Arena, Fit]:
@@ -173,10 +144,10 @@ def _frozen(arena: Arena) -> tuple[Arena, Fit]:
     z = arena.mean.copy()
     arena.precision = FROZEN * arena.precision
     arena.prepare(z)
-    return arena, _from(arena, z)
+    return arena, begun(arena, z)
 
 
-def _begun(arena: Arena, z: np.ndarray | None, late: float) -> np.ndarray:
+def _first(arena: Arena, z: np.ndarray | None, late: float) -> np.ndarray:
     """Nuisances to begin with: those of before, as far as they are the same ones; else the prior's, with sensors that
     are late by so much [s]."""
     found = arena.mean.copy()
@@ -186,26 +157,6 @@ def _begun(arena: Arena, z: np.ndarray | None, late: float) -> np.ndarray:
         count = len(z) if len(z) == len(found) else arena.shared
         found[:count] = z[:count]
     return np.clip(found, arena.lower, arena.upper)
-
-
-def _calibrate(arena: Arena, z: np.ndarray, *, first: bool = False) -> None:
-    """Whitens with the floor, the factor on the noise and how long it lasts under which healthy residuals at z are most
-    likely. first: nothing is known of them; else near what they are."""
-    raw = arena.raw(arena.values(z[None]), z[None])
-
-    def best(some: Iterable[tuple[float, float, float]]) -> tuple[float, float, float]:
-        found = {}
-        for floor, noise, lasts in some:
-            arena.whiten(floor_m=floor, noise=noise, lasts=lasts, trial=True)
-            unusual = np.log(floor / NUMERICS_M) / FLOOR_SPREAD
-            found[floor, noise, lasts] = float(arena.log_densities(raw).sum()) - 0.5 * unusual**2
-        return max(found, key=lambda one: found[one])
-
-    floor, noise, lasts = best((floor, arena.noise, arena.lasts) for floor in FLOORS_M)
-    around = NOISES if first else tuple(factor * noise for factor in NEAR)
-    floor, noise, lasts = best((floor, noise, lasts) for noise in around for lasts in LASTING)
-    floor, noise, lasts = best((factor * floor, noise, lasts) for factor in NEAR)
-    arena.whiten(floor_m=floor, noise=noise, lasts=lasts)
 
 
 def _posterior(arena: Arena, base: Fit) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from r2s2r_cli.stages.diagnose.which import which as module
 from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.screen import Response, screen
-from tests.support.linear_arena import EACH, STRETCHES, LinearArena, _kinds, candidate
+from tests.support.linear_arena import EACH, STRETCHES, LinearArena, kinds_of, candidate
 
 KNOWN = [candidate("right", 0), candidate("wrong", 1)]
 
@@ -27,7 +27,7 @@ class Floored(LinearArena):
         row = np.arange(STRETCHES * EACH) % EACH
         by = np.where(row < EACH // 2, 1.0, self.floor_m / floor_m)
         self.A, self.B, self.y = by[:, None] * self.A, by[:, None] * self.B, by * self.y
-        self.by_nuisance, self.floor_m = _kinds(self.A.T).T, floor_m
+        self.by_nuisance, self.floor_m = kinds_of(self.A.T).T, floor_m
 
 
 def compared(monkeypatch: pytest.MonkeyPatch, wider: float, by_chance: float = 0.0) -> tuple[Floored, Fit, list]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import R2S2RError
+from r2s2r_cli.errors import R2S2RError, quoted
 from r2s2r_cli.store.again import MEASURED, command_again
+from r2s2r_cli.store.from_here import project_option
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
 from schemas.header import Provenance
@@ -36,10 +36,7 @@ def robot_again(project: Project, target: Path, typed: Typed) -> str:
     made = read_header(target).provenance
     if made.stage in MEASURED:
         made = _measured(project, made, target, typed)
-    words = [command_again(made, target, force=True)]
-    if not Path.cwd().resolve().is_relative_to(project.root.resolve()):
-        words.append(shlex.join(["--project", os.path.relpath(project.root)]))
-    return " ".join(words)
+    return " ".join([command_again(made, target, force=True), *map(quoted, project_option(project.root))])
 
 
 def warn_of_old(project: Project, target: Path, typed: Typed, console: Console) -> None:

@@ -12,6 +12,7 @@ from r2s2r_cli.checks.base import AGAIN
 from r2s2r_cli.commands.mend import mending
 from r2s2r_cli.commands.places import Place
 from r2s2r_cli.errors import R2S2RError, quoted
+from r2s2r_cli.store.from_here import project_option
 from r2s2r_cli.store.project import ITERATIONS
 from schemas.header import Header
 from schemas.results import Finding
@@ -33,8 +34,8 @@ def told_again(findings: Iterable[Finding], path: Path, header: Header | None, p
         if AGAIN in hint:
             again = again or _again(path, header, place)
             hint = again.joined(hint.replace(AGAIN, "", 1).removeprefix(_REMARK))
-        elif place is not None and not Path.cwd().resolve().is_relative_to(place.root.resolve()):
-            hint = hint.replace(_STATUS, f"{_STATUS} --project {quoted(_way(place.root))}")
+        elif place is not None:
+            hint = hint.replace(_STATUS, shlex.join([*_STATUS.split(), *project_option(place.root)]))
         told[index] = finding.model_copy(update={"hint": hint})
     return told
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from r2s2r_cli.store.from_here import project_option
 from r2s2r_cli.store.project import ITERATIONS, iteration_number, root_of
 from schemas.header import Provenance
 from schemas.versions import KINDS, STAGE_VERSIONS
@@ -88,7 +88,7 @@ def command_at(path: Path) -> str:
         words += [*(["--of", "execute"] * (path.name == kind.executed)), "--iteration", str(number)]
     elif path.parent != root:
         return ""
-    return shlex.join([*words, *([] if Path.cwd().is_relative_to(root) else ["--project", os.path.relpath(root)])])
+    return shlex.join([*words, *project_option(root)])
 
 
 def command_again(made: Provenance, artifact: Path, *, force: bool = False, dry_run: bool = False) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from r2s2r_cli.errors import quoted
 from r2s2r_cli.reached import reached
+from r2s2r_cli.store.from_here import project_option
 from r2s2r_cli.store.log_folders import log_folders, some_files
 
 if TYPE_CHECKING:
@@ -26,8 +27,7 @@ def first_data(root: Path, link: LinkSettings | None = None, *, options: str = "
     here = (here or Path.cwd()).resolve()
     logs = list(_logs(root.resolve(), here))
     more = f" {options}" if options else ""
-    if root.resolve() not in (here, *here.parents):  # not found from here
-        more += f" --project {quoted(os.path.relpath(root.resolve(), here))}"
+    more += "".join(f" {quoted(word)}" for word in project_option(root, here))
     if not logs:
         return f"{RECORD}{more} {reached(link)}"
     others = f"   # or {' or '.join(logs[1:])}" if logs[1:] else ""

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from r2s2r_cli.errors import ArtifactError, quoted
 from r2s2r_cli.store.canonical import source_sha256
+from r2s2r_cli.store.from_here import project_option
 from r2s2r_cli.store.header import TEXTS, read_header
 from r2s2r_cli.store.log_folders import MOST_FILES, SOURCES, log_folders
 from r2s2r_cli.store.project import ITERATIONS, iteration_number, root_of
@@ -32,7 +33,6 @@ def import_again(path: Path, made: Provenance | None = None) -> str:
     root, number = root_of(path), iteration_number(path.parent)
     if root is None or number is None or path != root / ITERATIONS / path.parent.name / KINDS["recording"].filename:
         return ""
-    here = Path.cwd().is_relative_to(root)
     if made is not None:
         from r2s2r_cli.store.again import command_again
 
@@ -47,7 +47,7 @@ def import_again(path: Path, made: Provenance | None = None) -> str:
         if not logs:
             return ""
     words = ["r2s2r", "import", *(os.path.relpath(log) for log in logs), "--iteration", str(number), "--force"]
-    line = shlex.join([*words, *([] if here else ["--project", os.path.relpath(root)])])
+    line = shlex.join([*words, *project_option(root)])
     return line if made is not None else f"{line}   # {GUESSED}"
 
 

@@ -16,7 +16,7 @@ from typer.core import TyperGroup
 
 from r2s2r_cli import __version__
 from r2s2r_cli.commands import COMMANDS, GROUPS
-from r2s2r_cli.console import PipeClosed, print_error
+from r2s2r_cli.console import PipeClosed, print_error, tell
 from r2s2r_cli.errors import DamageWarning, ExitCode, GateError, InputError, Interrupted, R2S2RError, UsageError
 
 BUG_MESSAGE = "this is a bug in r2s2r, please report it with the lines above"
@@ -79,7 +79,7 @@ def _run_guarded(call: Callable[[], object], as_json: bool, arguments: Sequence[
         sys.stdout.flush()
         return code
     except Interrupted as error:
-        print(f"interrupted: {error.what}\nhint: {error.hint}", file=sys.stderr)
+        tell(f"interrupted: {error.what}\nhint: {error.hint}")
         return error.exit_code
     except R2S2RError as error:
         from r2s2r_cli.commands.whole import whole
@@ -94,7 +94,7 @@ def _run_guarded(call: Callable[[], object], as_json: bool, arguments: Sequence[
         print_error(usage_error(error, arguments), as_json=as_json)
         return ExitCode.USAGE
     except (KeyboardInterrupt, typer.Abort):
-        print("interrupted: nothing is half-written; run the command again", file=sys.stderr)
+        tell("interrupted: nothing is half-written; run the command again")
         return ExitCode.INTERRUPTED
     except (PipeClosed, BrokenPipeError):
         return ExitCode.DONE

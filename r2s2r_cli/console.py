@@ -41,6 +41,13 @@ def out(text: str) -> None:
                          received=error.strerror or str(error), hint="df -h .") from error  # fmt: skip
 
 
+def tell(text: str) -> None:
+    """A line on stderr. One that takes no more (a closed terminal, a full disk) is left out: work that is under way
+    must not end of what is said about it, nor an error be lost for the want of somebody who hears it."""
+    with suppress(OSError):
+        print(text, file=sys.stderr)
+
+
 class Console:
     """The two streams of one command. Colours follow the terminal and NO_COLOR; nothing is said by colour alone."""
 
@@ -76,11 +83,11 @@ class Console:
     def say(self, text: str) -> None:
         """A remark on stderr; silent with --quiet."""
         if not self.quiet:
-            print(text, file=sys.stderr)
+            tell(text)
 
     def warn(self, text: str) -> None:
         """A warning on stderr, never silenced."""
-        print(f"warning: {text}", file=sys.stderr)
+        tell(f"warning: {text}")
 
     def hint(self, command: str) -> None:
         """What to run next; silent with --quiet."""
@@ -216,5 +223,4 @@ def print_error(error: R2S2RError, *, as_json: bool) -> None:
         )  # fmt: skip
         with suppress(PipeClosed, InputError):
             out(_as_json(document))
-    with suppress(OSError):
-        print("\n".join([f"error: {error.what}", *error.lines()[1:]]), file=sys.stderr)
+    tell("\n".join([f"error: {error.what}", *error.lines()[1:]]))

@@ -97,10 +97,15 @@ def shown(live: Live, console: Console) -> Iterator[None]:
     def picture() -> Text:
         return Text("\n".join(live.lines()))
 
-    with RichLive(
+    drawn = RichLive(
         get_renderable=picture, console=RichConsole(stderr=True), refresh_per_second=_REFRESH_HZ, transient=True
-    ):
+    )
+    drawn.start()
+    try:
         yield
+    finally:
+        with contextlib.suppress(OSError):  # the terminal was closed, which ends the run: what there is must be sealed
+            drawn.stop()
 
 
 @contextlib.contextmanager
@@ -126,10 +131,14 @@ def stop_key(halt: Callable[[], None], *, stream: Any = None) -> Iterator[None]:
     ended = threading.Event()
 
     def listen() -> None:
-        while not ended.is_set():
-            ready, _, _ = select.select([descriptor], [], [], 0.05)
-            if ready and os.read(descriptor, 1) == STOP_KEY.encode():
-                halt()
+        with contextlib.suppress(OSError):  # the terminal was closed
+            while not ended.is_set():
+                ready, _, _ = select.select([descriptor], [], [], 0.05)
+                key = os.read(descriptor, 1) if ready else None
+                if key == b"":  # so it looks as well
+                    return
+                if key == STOP_KEY.encode():
+                    halt()
 
     thread = threading.Thread(target=listen, name="stop-key", daemon=True)
     try:
@@ -140,4 +149,5 @@ def stop_key(halt: Callable[[], None], *, stream: Any = None) -> Iterator[None]:
         ended.set()
         if thread.ident is not None:
             thread.join()
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        with contextlib.suppress(termios.error):  # as above
+            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)

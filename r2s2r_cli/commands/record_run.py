@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.commands.record_journal import Recording
 from r2s2r_cli.commands.record_live import Live, shown, stop_key
 from r2s2r_cli.commands.record_wish import Wish, guarded, remarks
-from r2s2r_cli.console import Console
-from r2s2r_cli.errors import HardwareError, Interrupted, R2S2RError, quoted
+from r2s2r_cli.console import Console, PipeClosed
+from r2s2r_cli.errors import HardwareError, InputError, Interrupted, R2S2RError, quoted
 
 if TYPE_CHECKING:
     from r2s2r_cli.devices.camera import CameraFeed
@@ -57,8 +57,8 @@ def carry_out(wish: Wish, console: Console) -> None:
             ended = error
         assert session is not None  # noqa: S101 - an error without a session was raised above
         signals.standing()
-        result = _seal(wish, recording, session, console)
-    _finish(session.report(), result, ended, console)
+        result, unsealed = _seal(wish, recording, session)
+    _finish(session.report(), result, unsealed, ended, console)
 
 
 def _camera(spec: str | None, stack: ExitStack) -> tuple[CameraFeed | None, CameraFacts | None]:
@@ -97,59 +97,73 @@ def _groups(wish: Wish, link: LinkFacts) -> dict[str, Mapping[str, Any]]:
     }
 
 
-def _seal(wish: Wish, recording: Recording, session: Session, console: Console) -> StageResult | None:
-    """The artifact of what was recorded; None where nothing was, or where the disk refuses it (the journal stays)."""
+def _seal(wish: Wish, recording: Recording, session: Session) -> tuple[StageResult | None, R2S2RError | None]:
+    """The artifact of what was recorded, None where nothing was; or why it is not sealed: its journal stays."""
     from r2s2r_cli.commands.record_run_pictures import draw_recorded, drawing_names
     from schemas.results import StageResult
 
     report = session.report()
     names = drawing_names(recording.target, report) if wish.draw else []
+    again = f"r2s2r recover {quoted(f'{recording.target}.journal')}"
     try:
-        with _not_interrupted():
-            sealed = recording.seal(report, session.started, names)
+        sealed = recording.seal(report, session.started, names)
+    except KeyboardInterrupt:  # an impatient second one
+        return None, Interrupted("the recording is not sealed yet, all of it is in its journal", hint=again)
     except R2S2RError as error:
-        console.warn(f"what was recorded is not sealed yet: {error.what} ({error.where})")
-        console.hint(f"r2s2r recover {quoted(f'{recording.target}.journal')}   # once: {error.hint}")
-        return None
+        error.what = f"what was recorded is not sealed yet: {error.what}"
+        error.hint = f"{again}   # once: {error.hint}"
+        return None, error
     if sealed.header is None:
-        return None
+        return None, None
     drawings = draw_recorded(wish.project, recording.target, report) if wish.draw else []
     return StageResult(
         stage=wish.stage, state="done", artifact=wish.project.relative(recording.target), reasons=(), inputs=(),
         content_sha256=sealed.header.content_sha256, drawings=tuple(drawings), report=report.model_dump(mode="json"),
-    )  # fmt: skip
+    ), None  # fmt: skip
 
 
-@contextmanager
-def _not_interrupted() -> Iterator[None]:
-    """An impatient second Ctrl-C while sealing: the journal stays whole either way, and is said where."""
+def _finish(
+    report: RecordReport, result: StageResult | None, unsealed: R2S2RError | None, ended: BaseException | None,
+    console: Console,
+) -> None:  # fmt: skip
+    """Say what there is; then raise what ended the recording early, else why it is not sealed."""
     try:
-        yield
-    except KeyboardInterrupt as error:
-        raise Interrupted("the recording is not sealed yet, all of it is in its journal",
-                          hint="r2s2r recover") from error  # fmt: skip
+        _show(report, result, console, whole=ended is None)
+    except (InputError, PipeClosed):  # stdout takes no more, which is the lesser one of two things that went wrong
+        if ended is None and unsealed is None:
+            raise
+    for run in report.runs:
+        for text in run.warnings:
+            console.warn(f"{run.run}: {text}")
+    if ended is None and unsealed is not None:
+        raise unsealed
+    if ended is None:
+        return
+    if unsealed is not None:
+        console.warn(f"{unsealed.what} ({unsealed.where})" if unsealed.where else unsealed.what)
+        console.hint(unsealed.hint)
+    if isinstance(ended, KeyboardInterrupt):
+        kept = (
+            "what was recorded is in its journal" if unsealed is not None
+            else "what was recorded is sealed" if result is not None
+            else "nothing was recorded"
+        )  # fmt: skip
+        hint = "r2s2r status" if unsealed is None else unsealed.hint
+        raise Interrupted(f"the motors were told to stop; {kept}", hint=hint) from ended
+    if isinstance(ended, HardwareError) and result is not None:
+        ended.hint = f"{ended.hint}   # what came before is in {result.artifact}"
+    raise ended
 
 
-def _finish(report: RecordReport, result: StageResult | None, ended: BaseException | None, console: Console) -> None:
-    """Say what there is; then raise what ended the recording early."""
+def _show(report: RecordReport, result: StageResult | None, console: Console, *, whole: bool) -> None:
+    """What was recorded. whole: nothing ended it early."""
     from r2s2r_cli.commands.outcome import show_outcome
     from r2s2r_cli.views.record_page import report_tables
 
-    if ended is None and result is not None:
+    if whole and result is not None:
         show_outcome(result, console)
     elif result is not None:
         console.say(f"sealed what there is: {result.artifact}")
     if report.runs:
         for table in report_tables(report):
             console.table(table.title, table.columns, table.rows)
-    for run in report.runs:
-        for text in run.warnings:
-            console.warn(f"{run.run}: {text}")
-    if ended is None:
-        return
-    if isinstance(ended, KeyboardInterrupt):
-        kept = "what was recorded is sealed" if result is not None else "nothing was recorded"
-        raise Interrupted(f"the motors were told to stop; {kept}", hint="r2s2r status") from ended
-    if isinstance(ended, HardwareError) and result is not None:
-        ended.hint = f"{ended.hint}   # what came before is in {result.artifact}"
-    raise ended

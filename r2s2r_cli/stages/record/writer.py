@@ -14,6 +14,8 @@ MAX_ROWS = 4000
 """Rows that may wait: about 20 s of a run without camera; half a minute of a disk that stands still is too long."""
 MAX_PICTURES_BYTES = 256 << 20
 """Encoded pictures that may wait: some 400 frames."""
+PATIENCE_S = 60.0
+"""For which a robot in lock-step waits for a disk that takes nothing, before that is an error."""
 
 
 class Sink(Protocol):
@@ -44,12 +46,12 @@ class Writer:
         self.check()
         with self._lock:
             self._waiting_bytes += _size(row)
-            too_much = self._waiting_bytes > MAX_PICTURES_BYTES
+            too_much = self._waiting_bytes > MAX_PICTURES_BYTES and not self._lossless
         try:
-            self._rows.put((stream, row), block=self._lossless, timeout=60.0 if self._lossless else None)
+            self._rows.put((stream, row), block=self._lossless, timeout=PATIENCE_S if self._lossless else None)
         except queue.Full:
             too_much = True
-        if too_much and not self._lossless:
+        if too_much:
             raise HardwareError(
                 "the disk is too slow for this recording, the motors were stopped",
                 where=f"{self._rows.qsize()} rows wait",

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,7 +14,7 @@ import pytest
 from r2s2r_cli.devices.camera import CameraError, FeedStatistics, Frame
 from r2s2r_cli.devices.link import Sample
 from r2s2r_cli.errors import ArtifactError, HardwareError
-from r2s2r_cli.stages.record import Session, plans
+from r2s2r_cli.stages.record import Session, plans, writer as record_writer
 from r2s2r_cli.stages.record.camera import LATE_S, Pictures, encode_color, encode_depth
 from r2s2r_cli.stages.record.run import RunLoop
 from r2s2r_cli.stages.record.writer import Writer
@@ -259,6 +260,29 @@ def test_a_disk_that_stands_still_is_an_error_not_a_wait() -> None:
         for i in range(10_000):
             writer.put("s", {"i": i})
     assert len(rows.of["s"]) == 10_000
+
+
+def test_in_lock_step_no_row_is_dropped_in_silence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk that takes nothing for longer than a robot in lock-step waits ends the run: every row that was taken until
+    then is with the sink."""
+    import threading
+
+    monkeypatch.setattr(record_writer, "MAX_ROWS", 3)
+    monkeypatch.setattr(record_writer, "PATIENCE_S", 0.05)
+    gate, rows, taken = threading.Event(), Rows(), 0
+
+    def stuck(stream: str, row: Mapping[str, Any]) -> None:
+        gate.wait(5.0)
+        rows(stream, row)
+
+    with pytest.raises(HardwareError, match="too slow"), Writer(stuck, lossless=True) as writer:
+        try:
+            for i in range(10):
+                writer.put("s", {"i": i})
+                taken += 1
+        finally:
+            gate.set()
+    assert 0 < taken < 10 and rows.column("s", "i").tolist() == list(range(taken))
 
 
 def test_in_lock_step_a_frame_that_has_waited_shifts_no_clock() -> None:

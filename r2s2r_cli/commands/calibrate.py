@@ -97,7 +97,8 @@ def calibrate(
         not_applied=lambda said: _not_applied(here, said),
     )  # fmt: skip
     result, report = run.run(
-        lambda: _compute(here, asked, flags.get("use") if "points" in asked else None, overrides, kept),
+        # What an earlier run chose is chosen again with its points; what is typed now must have its points with it.
+        lambda: _compute(here, asked, flags.get("use") if "points" in asked else use, overrides, kept),
         (lambda data, said: _draw(data, said, here.robot())) if draw else None,
         lambda said: _apply(here, said),
     )

@@ -86,6 +86,17 @@ def test_a_choice_stands_until_another_is_made(points: Path) -> None:
     assert document("calibrate", "--points", "points.csv", "--no-draw")["state"] == "fresh"
 
 
+def test_a_choice_needs_its_points(points: Path) -> None:
+    """--use beside masses alone: refused with the points that it lacks, not noted down as a choice that was made; so
+    that the points with it are fitted afterwards."""
+    assert invoke("calibrate", "--points", "points.csv", "--no-draw").exit_code == 0
+    Path("masses.toml").write_text(MASSES)
+    result = invoke("calibrate", "--masses", "masses.toml", "--use", "friday", "--no-draw")
+    assert result.exit_code == 2 and "r2s2r calibrate --points points.csv --use friday" in result.stderr
+    assert document("calibrate", "--points", "points.csv", "--use", "friday", "--no-draw")["state"] == "done"
+    assert sensor_zero()["offset_f"] == pytest.approx((OFFSET_PF + 1) * 1e-12, rel=1e-3)
+
+
 def test_a_later_part_keeps_the_earlier_one(points: Path) -> None:
     """Masses given later join the sensor lines in calibration.h5; both sources are its inputs."""
     assert invoke("calibrate", "--points", "points.csv", "--no-draw").exit_code == 0

@@ -167,12 +167,14 @@ def _entry(entry: Any, where: str, n_sensors: int) -> _Row:
 def _time(text: str, where: str) -> float:
     try:
         date = datetime.fromisoformat(text)
-    except ValueError:
+        time = (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
+        date_text(time)  # its zone may lead out of the years that there are
+    except (ValueError, OverflowError):
         raise InputError(
             "not a date", where=f"{where}, date", expected="an ISO date, 2025-01-14 18:27:20", received=repr(text)[:80],
             hint="write the date as year-month-day hours:minutes:seconds",
         ) from None  # fmt: skip
-    return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
+    return time
 
 
 def _numbers(values: Any, where: str, n_sensors: int) -> list[float]:

@@ -147,6 +147,8 @@ def test_the_working_range_of_the_robot(robot: Robot) -> None:
         ([entry(1, b_pF=[True] * 9)], "not a finite number"),
         ([entry(1, b_pF=[10**400] * 9)], "not a finite number"),
         ([entry(1, date="14.1.2025")], "not a date"),
+        ([entry(1, date="0001-01-01T00:00:00+14:00")], "not a date"),
+        ([entry(1, date="9999-12-31T23:59:59-14:00")], "not a date"),
         ([entry(1, date=20250114)], "not a text"),
         ([entry(1, m_pf_per_mm=[])], "did you mean m_pF_per_mm"),
         ([{"date": "2025-01-01"}], "m_pF_per_mm is missing"),

@@ -116,6 +116,23 @@ def test_a_host_that_nobody_knows_is_named(monkeypatch: pytest.MonkeyPatch) -> N
     assert caught.value.received == "nohost" and "nohost" in caught.value.hint
 
 
+def test_an_address_of_our_own_that_nobody_knows_is_none_of_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of UDP as well no number of the resolver, which the operating system's list calls unknown."""
+
+    class Nameless:
+        def __init__(self, *_: object) -> None: ...
+
+        def bind(self, _: object) -> None:
+            raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+
+        def close(self) -> None: ...
+
+    monkeypatch.setattr(socket, "socket", Nameless)
+    with pytest.raises(LinkError, match="does not have that address") as caught:
+        transport("udp://nohost:2390").open()
+    assert "Unknown error" not in caught.value.received and caught.value.hint == "ip -brief address"
+
+
 def test_what_cannot_be_opened_is_told_with_its_remedy(tmp_path: Path) -> None:
     """No such port, no port at all, nobody listening, a name that is none."""
     (tmp_path / "file").write_text("")

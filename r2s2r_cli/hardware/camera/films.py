@@ -23,6 +23,8 @@ RATE_HZ = 30.0
 _HALF_PIXEL = 0.5
 """OpenCV, librealsense and Open3D put the centre of the first pixel at 0, this project at 0.5."""
 _MAX_JSON_BYTES = 1 << 20
+_MAX_S = 1e15
+"""[s]: a larger stamp, or one that is no number, is none."""
 
 
 def folder_film(folder: Path, *, depth_scale: float | None = None) -> Film:
@@ -48,7 +50,7 @@ def folder_film(folder: Path, *, depth_scale: float | None = None) -> Film:
     def pictures() -> Iterator[tuple[bytes, bytes | None, float]]:
         for key, path in color.items():
             if key in times:
-                yield path.read_bytes(), depth[key].read_bytes() if key in depth else None, times[key]
+                yield _picture(path), _picture(depth[key]) if key in depth else None, times[key]
 
     rate = RATE_HZ
     if len(times) > 1:
@@ -117,6 +119,14 @@ def _images(folder: Path) -> dict[str, Path]:
     return {p.stem: p for p in sorted(found, key=lambda p: [int(x) for x in re.findall(r"\d+", p.stem)] or [0])}
 
 
+def _picture(path: Path) -> bytes:
+    """Its bytes. Raises CameraError where it is gone, or may not be read: films are read while they are played."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise _wrong(path, "a picture", error.strerror or str(error), f"ls -l {quoted(path.parent)}") from error
+
+
 def _stamps(folder: Path, color: dict[str, Path]) -> dict[str, float]:
     """Stamps [s] of the frames from `data/NNNN.json` (header.secs), from the first; empty where there are none."""
     found: dict[str, float] = {}
@@ -126,7 +136,7 @@ def _stamps(folder: Path, color: dict[str, Path]) -> dict[str, float]:
             continue
         header = _json(path).get("header")
         secs = header.get("secs") if isinstance(header, dict) else None
-        if isinstance(secs, int | float) and math.isfinite(secs):
+        if isinstance(secs, int | float) and abs(secs) < _MAX_S:
             found[key] = float(secs)
     first = next(iter(found.values()), 0.0)
     rising: dict[str, float] = {}
@@ -147,7 +157,7 @@ def _configuration(path: Path, tree: dict[str, Any]) -> tuple[Intrinsics, float 
             K = np.array(tree["intrinsic_matrix"], dtype=float).reshape(3, 3).T  # column by column
             width, height = int(tree["width"]), int(tree["height"])
         counts = float(tree["depth_scale"]) if "depth_scale" in tree else None
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise _wrong(path, "cam_intr, or intrinsic_matrix, width and height", f"{type(error).__name__} {error}",
                      f"head {quoted(path)}") from None  # fmt: skip
     if not (np.isfinite(K).all() and K[0, 0] > 0 and K[1, 1] > 0 and width > 0 and height > 0):

@@ -100,7 +100,10 @@ class RealSenseCamera(Closing):
 
     def _there(self) -> bool:
         """Whether the device is still plugged in; the pipeline itself only says that nothing came."""
-        serials = [d.get_info(self._rs.camera_info.serial_number) for d in self._rs.context().query_devices()]
+        try:
+            serials = [d.get_info(self._rs.camera_info.serial_number) for d in self._rs.context().query_devices()]
+        except RuntimeError:  # unplugged at this very moment
+            return False
         return self.name.rpartition(" ")[2] in serials
 
     def _gone(self, what: str) -> CameraError:

@@ -69,11 +69,11 @@ class RigCamera(Closing):
             self._socket = socket.create_connection(self._address, timeout=CONNECT_S)
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
             line = self._line(self._socket)
-        except OSError as error:
+        except (OSError, UnicodeError) as error:  # the latter for a name that no host can have
             self.close()
             raise CameraError(
                 "the rig's camera does not answer", where=self._where, expected="a greeting",
-                received=error.strerror or str(error) or "nothing",
+                received=getattr(error, "strerror", None) or str(error) or "nothing",
                 hint="start the rig with a camera, and take the address that it prints: r2s2r rig --camera-port 0",
             ) from error  # fmt: skip
         try:

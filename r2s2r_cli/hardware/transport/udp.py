@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import select
 import socket
 import time
@@ -30,8 +31,10 @@ class UdpSocket:
             self._socket = socket.socket(family, socket.SOCK_DGRAM)
             try:
                 self._socket.bind(self._address)
-            except OSError:
+            except OSError as error:
                 self.close()
+                if isinstance(error, socket.gaierror):  # its number is none of the operating system's
+                    raise OSError(errno.EADDRNOTAVAIL, "no such host") from error
                 raise
             self._socket.setblocking(False)
 

@@ -102,6 +102,20 @@ def test_a_late_frame_is_none_and_a_lost_device_an_error() -> None:
         assert fake.stopped == 1
 
 
+def test_a_device_that_goes_while_it_is_looked_for_is_gone() -> None:
+    """The library cannot even list its devices: the camera's own error, which the reader's thread knows."""
+
+    class Going(FakeRealSense):
+        def context(self) -> Any:
+            raise RuntimeError("failed to set power state")
+
+    with (
+        RealSenseCamera(library=Going(("Frame didn't arrive within 5000",))) as camera,
+        pytest.raises(CameraError, match="gone"),
+    ):
+        camera.read(0.1)
+
+
 def test_no_device_is_a_clear_error() -> None:
     """What librealsense says is passed on, with what to do."""
     with pytest.raises(CameraError) as caught, RealSenseCamera(library=FakeRealSense(start="No device connected")):

@@ -100,15 +100,40 @@ def test_a_folder_of_open3d_is_played_back(tmp_path: Path) -> None:
     assert [t for _, _, t in made.pictures()] == pytest.approx([0, 1 / 30, 2 / 30])
 
 
+K = [[10.0, 0, 4.0], [0, 11.0, 3.0], [0, 0, 1]]
+
+
 @pytest.mark.parametrize(
-    "config", [{}, {"cam_intr": [1, 2]}, {"cam_intr": np.zeros((3, 3)).tolist()}], ids=["none", "few", "zero"]
-)
+    "config",
+    [
+        {}, {"cam_intr": [1, 2]}, {"cam_intr": np.zeros((3, 3)).tolist()}, {"cam_intr": K, "im_w": float("inf")},
+        {"cam_intr": K, "depth_scale": 10**400},
+    ],
+    ids=["none", "few", "zero", "endless", "huge"],
+)  # fmt: skip
 def test_a_folder_without_geometry_is_refused(tmp_path: Path, config: dict[str, Any]) -> None:
     """No intrinsics, or such that no camera has."""
     root = folder(tmp_path)
     (root / "config.json").write_text(json.dumps(config))
     with pytest.raises(CameraError):
         folder_film(root)
+
+
+def test_a_stamp_beyond_all_numbers_is_none(tmp_path: Path) -> None:
+    """Its frame is left out, as one without a stamp."""
+    root = folder(tmp_path)
+    (root / "data" / "0001.json").write_text(json.dumps({"header": {"secs": 10**400}}))
+    assert [t for _, _, t in folder_film(root).pictures()] == pytest.approx([0, 0.2])
+
+
+def test_a_picture_that_goes_while_it_is_played_is_an_error_of_the_camera(tmp_path: Path) -> None:
+    """Films are read in the thread of the feed, which hears no other error."""
+    root = folder(tmp_path)
+    camera = ReplayCamera(folder_film(root), paced=False)
+    (root / "depth" / "0001.png").unlink()
+    with pytest.raises(CameraError, match="played back") as caught:
+        played(camera)
+    assert "0001.png" in caught.value.where
 
 
 def test_the_depth_scale_must_be_known(tmp_path: Path) -> None:

@@ -162,3 +162,9 @@ def test_nobody_listens() -> None:
     with pytest.raises(CameraError, match="does not answer") as caught:
         RigCamera(*address).open()
     assert "r2s2r rig" in caught.value.hint
+
+
+def test_a_name_that_no_host_can_have() -> None:
+    """The same error: its characters are not at fault."""
+    with pytest.raises(CameraError, match="does not answer"):
+        RigCamera("a..b", 9000).open()

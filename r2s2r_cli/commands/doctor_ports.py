@@ -101,8 +101,10 @@ def _listen(robot: Robot, port: str, protocol: str, seconds: float, reset: bool)
 
 
 def _robot(robot: Robot, health: LinkHealth) -> Iterator[Probe]:
+    from r2s2r_cli.hardware.look import look_at
+
     facts, counts, rate = health.facts, health.statistics, robot.pid.rate_hz
-    again = f"r2s2r doctor ports {facts.port} --protocol {facts.protocol}"
+    again = look_at(facts.port, facts.protocol)
     version = f" {facts.version}" if facts.version else ""
     device = f", {facts.robot}, firmware {facts.device}" if facts.device else ""
     yield Probe(name="protocol", state="ok", found=f"{facts.protocol}{version}{device}")

@@ -27,6 +27,7 @@ import numpy as np
 
 from r2s2r_cli.devices.lengths import Lengths
 from r2s2r_cli.devices.link import LinkFacts, LinkState, LinkStatistics, RobotLink, SafetyStop, Sample
+from r2s2r_cli.hardware.look import look_at
 from r2s2r_cli.hardware.pace import Pace
 from r2s2r_cli.hardware.watch import STALE, Watch
 
@@ -43,6 +44,8 @@ BACKLOG = 100_000
 """Messages that are thrown away at the beginning of a run at most."""
 SILENT = 5.0
 """[s] of the wall's clock without any message in lock-step, where the world's clock stands still."""
+EMERGENCY = "emergency stop"
+"""The reason that the device may have latched as well."""
 
 
 class GuardedLink:
@@ -166,7 +169,7 @@ class GuardedLink:
 
     def emergency_stop(self) -> None:
         """Stop and latch, here and on the device where it can."""
-        self._reason = self._reason or "emergency stop"
+        self._reason = self._reason or EMERGENCY
         self.inner.emergency_stop()
 
     def reset(self) -> None:
@@ -229,5 +232,6 @@ class GuardedLink:
 
     def _refuse(self) -> None:
         if self._reason:
+            look = look_at(self.facts.port, self.facts.protocol, reset=self._reason == EMERGENCY)
             raise SafetyStop(f"the robot is stopped: {self._reason}", where=self.facts.port, expected="a healthy robot",
-                             received=self._reason, hint=f"r2s2r doctor ports {self.facts.port}")  # fmt: skip
+                             received=self._reason, hint=look)  # fmt: skip

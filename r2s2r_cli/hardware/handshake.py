@@ -12,6 +12,7 @@ from r2s2r_cli.hardware.codec import PROTOCOLS
 from r2s2r_cli.hardware.codec.base import Ack, Beat, Corrupt, DeviceState, Event, Greeting, LockStep, Reading, Status
 from r2s2r_cli.hardware.codec.checked import VERSION
 from r2s2r_cli.hardware.lock_step import LockStepClock
+from r2s2r_cli.hardware.look import look_at
 
 if TYPE_CHECKING:
     from r2s2r_cli.hardware.link import Link
@@ -103,7 +104,7 @@ def _refuse(link: Link, heard: _Heard) -> None:
     port, greeting = link.transport.name, heard.greeting
     if heard.acked == 1 or (greeting is not None and greeting.state is DeviceState.ESTOP):
         raise SafetyStop("the robot's emergency stop is latched", where=port, expected="an explicit reset",
-                         received="latched", hint=f"r2s2r doctor ports {port} --reset")  # fmt: skip
+                         received="latched", hint=look_at(port, link.codec.name, reset=True))  # fmt: skip
     if greeting is None:
         return
     ours = (VERSION, len(link.robot.motors), len(link.robot.sensors))
@@ -114,7 +115,7 @@ def _refuse(link: Link, heard: _Heard) -> None:
                    f"the robot has another number of {name} than robot.toml"  # fmt: skip
             raise LinkError(what, where=f"{port}, handshake", expected=f"{name} {expected}",
                             received=f"{name} {received} ({greeting.robot}, firmware {greeting.firmware})",
-                            hint=f"r2s2r doctor ports {port}")  # fmt: skip
+                            hint=look_at(port, link.codec.name))  # fmt: skip
 
 
 def _nobody(link: Link, heard: _Heard) -> LinkError:
@@ -126,7 +127,7 @@ def _nobody(link: Link, heard: _Heard) -> LinkError:
         told = f"; a board says {heard.status!r}" if heard.status else ""
         return LinkError(
             "not all boards of the robot are there", where=where, expected=f"boards 0 to {link.codec.boards - 1}",
-            received=f"nothing from board {', '.join(silent)} in {limit}{told}", hint=f"r2s2r doctor ports {port}",
+            received=f"nothing from board {', '.join(silent)} in {limit}{told}", hint=look_at(port, protocol),
         )  # fmt: skip
     strange = heard.corrupt or heard.odd  # to a protocol with status texts, lines of another one are such texts
     other = next((name for name in PROTOCOLS if strange and name != protocol and _fits(link, name, strange)), None)
@@ -134,7 +135,7 @@ def _nobody(link: Link, heard: _Heard) -> LinkError:
         return LinkError(
             f"what comes is not the protocol {protocol}", where=where, expected=f"lines of {protocol}",
             received=repr(strange[:40].decode("ascii", "replace")) + (f", which is {other}" if other else ""),
-            hint=f"r2s2r doctor ports {port} --protocol {other or protocol}",
+            hint=look_at(port, other or protocol),
         )  # fmt: skip
     received = f"{heard.lines} lines, none of them an answer" if heard.lines else f"nothing in {limit}"
     if heard.status:
@@ -202,7 +203,7 @@ def unlatch(link: Link) -> None:
             return shake(link)
         raise LinkError("the robot refuses the reset", where=port, expected="code 0",
                         received=f"code {event.code}: {CODES.get(event.code, 'unknown')}",
-                        hint=f"r2s2r doctor ports {port}")  # fmt: skip
+                        hint=look_at(port, link.codec.name))  # fmt: skip
     raise LinkError("the robot does not confirm the reset", where=port, expected="code 0",
                     received=f"nothing in {link.handshake_timeout:g} s",
-                    hint=f"r2s2r doctor ports {port} --reset")  # fmt: skip
+                    hint=look_at(port, link.codec.name, reset=True))  # fmt: skip

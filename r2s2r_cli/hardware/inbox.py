@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from r2s2r_cli.devices.link import LinkError, LinkState, Sample
 from r2s2r_cli.hardware.codec.base import Ack, Beat, Corrupt, DeviceState, Event, Greeting, LockStep, Reading, Status
 from r2s2r_cli.hardware.handshake import CODES
+from r2s2r_cli.hardware.look import look_at
 from r2s2r_cli.hardware.transport import Message
 from r2s2r_cli.hardware.wiring import Picture, Wiring
 
@@ -79,7 +80,7 @@ class Inbox:
                 if link.state is LinkState.RUNNING and event.state is DeviceState.WAIT and not link.lock_step:
                     raise LinkError("the robot started anew", where=f"{link.transport.name}, reading",
                                     expected="a robot that stays switched on", received="its greeting, in mid-run",
-                                    hint=f"r2s2r doctor ports {link.transport.name}")  # fmt: skip
+                                    hint=look_at(link.transport.name, link.codec.name))  # fmt: skip
             case Status():
                 tally.other += 1
                 tally.last_status = event.text
@@ -111,4 +112,4 @@ class Inbox:
         if ack.code in (2, 3, 5, 7):
             raise LinkError("the robot refuses commands", where=port, expected="code 0",
                             received=f"code {ack.code}: {CODES[ack.code]}",
-                            hint=f"r2s2r doctor ports {port}")  # fmt: skip
+                            hint=look_at(port, self._link.codec.name))  # fmt: skip

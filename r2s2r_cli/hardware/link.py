@@ -21,6 +21,7 @@ from r2s2r_cli.hardware import farewell, handshake
 from r2s2r_cli.hardware.codec.base import Codec, Greeting, Outgoing
 from r2s2r_cli.hardware.inbox import Inbox
 from r2s2r_cli.hardware.lock_step import LockStepClock
+from r2s2r_cli.hardware.look import look_at
 from r2s2r_cli.hardware.routes import Routes
 from r2s2r_cli.hardware.statistics import Tally
 from r2s2r_cli.hardware.transport import Address, Transport
@@ -116,10 +117,11 @@ class Link:
             self._state = LinkState.HANDSHAKE
             self.stop()
             begin(self)
-        except BaseException:
+        except BaseException as error:
             self.stop()
             self.transport.close()
             self._state = LinkState.LOST
+            self._in_our_words(error)
             raise
         self._state = LinkState.RUNNING
         self.tally.reconnects += self._ever
@@ -206,10 +208,10 @@ class Link:
         if self._latched:
             raise SafetyStop(f"the robot is stopped: {self._latched}", where=self.transport.name,
                              expected="an explicit reset", received="latched",
-                             hint=f"r2s2r doctor ports {self.transport.name} --reset")  # fmt: skip
+                             hint=look_at(self.transport.name, self.codec.name, reset=True))  # fmt: skip
         if self._state is not LinkState.RUNNING:
             raise LinkError("there is no link to the robot", where=self.transport.name, expected="running",
-                            received=self._state.value, hint=f"r2s2r doctor ports {self.transport.name}")  # fmt: skip
+                            received=self._state.value, hint=look_at(self.transport.name, self.codec.name))  # fmt: skip
 
     @contextlib.contextmanager
     def _dying(self) -> Iterator[None]:
@@ -219,4 +221,11 @@ class Link:
         except LinkError as error:
             self._state = LinkState.LOST
             error.received += f"; {farewell.rescue(self)}"
+            self._in_our_words(error)
             raise
+
+    def _in_our_words(self, error: BaseException) -> None:
+        """A port knows no protocol; whoever is told to look at it needs ours."""
+        port = self.transport.name
+        if isinstance(error, LinkError) and error.hint == look_at(port):
+            error.hint = look_at(port, self.codec.name)

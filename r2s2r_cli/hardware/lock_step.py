@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from r2s2r_cli.devices.link import LinkError, Sample
 from r2s2r_cli.hardware.codec.base import Reading, TickDone
+from r2s2r_cli.hardware.look import look_at
 
 if TYPE_CHECKING:
     from r2s2r_cli.hardware.link import Link
@@ -58,5 +59,5 @@ class LockStepClock:
             if time.monotonic() > end:
                 raise LinkError(
                     "the rig does not answer", where=f"{link.transport.name}, tick {k}", expected="the end of the tick",
-                    received=f"nothing in {GIVE_UP:g} s", hint=f"r2s2r doctor ports {link.transport.name}",
+                    received=f"nothing in {GIVE_UP:g} s", hint=look_at(link.transport.name, link.codec.name),
                 )  # fmt: skip

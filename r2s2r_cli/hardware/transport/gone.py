@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from r2s2r_cli.devices.link import LinkError
+from r2s2r_cli.errors import quoted
+from r2s2r_cli.hardware.look import look_at
 
 _REASONS: dict[int, tuple[str, str, str]] = {
     errno.ENOENT: ("there is no such port", "plugged in, or `r2s2r rig` running", "r2s2r doctor ports"),
@@ -48,20 +50,20 @@ def not_taken(port: str, seconds: float) -> LinkError:
     """The other side does not read: what we write stays in the buffer."""
     return LinkError(
         "the robot does not take what it is sent", where=f"{port}, writing", expected=f"room within {seconds:g} s",
-        received="a full buffer", hint=f"r2s2r doctor ports {port}",
+        received="a full buffer", hint=look_at(port),
     )  # fmt: skip
 
 
 def no_such_host(port: str, host: str) -> LinkError:
     """The name of an address means nothing."""
     return LinkError("there is no such host", where=f"{port}, opening", expected="the address of the robot",
-                     received=host, hint=f"getent hosts {host}   # or give its number")  # fmt: skip
+                     received=host, hint=f"getent hosts {quoted(host)}   # or give its number")  # fmt: skip
 
 
 def hung_up(port: str) -> LinkError:
     """The other side closed the connection."""
     return LinkError("the robot closed the connection", where=f"{port}, reading", expected="an open connection",
-                     received="end of the stream", hint=f"r2s2r doctor ports {port}")  # fmt: skip
+                     received="end of the stream", hint=look_at(port))  # fmt: skip
 
 
 def _link_error(port: str, doing: str, error: Exception) -> LinkError:
@@ -71,7 +73,7 @@ def _link_error(port: str, doing: str, error: Exception) -> LinkError:
     return LinkError(
         what or ("the port cannot be opened" if doing == "opening" else "the link to the robot broke"),
         where=f"{port}, {doing}", expected=expected or "a port that works", received=text,
-        hint=(hint or "r2s2r doctor ports {port}").format(port=port),
+        hint=hint.format(port=quoted(port)) or look_at(port),
     )  # fmt: skip
 
 

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import re
 import shlex
+import signal
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+from r2s2r_cli.devices.link import Sample
+from r2s2r_cli.hardware import open_link
 from r2s2r_cli.stages.import_.authors_json import parse_frame
 from tests.commands.conftest import document, invoke
+from tests.support.fake_robot import FakeLink, calibrated
 
 GUIDES = Path(__file__).resolve().parents[2] / "docs" / "guides"
 
@@ -29,6 +35,32 @@ def test_the_policy_of_the_guide_validates(project: Path) -> None:
     assert "0 errors, 0 warnings" in result.stdout + result.stderr
     Path("policies/crawl.toml").write_text(_block("policy.md", "toml").replace("1.0, 0.1", "1.5, 0.1"))
     assert invoke("validate").exit_code != 0
+
+
+def test_the_scripts_of_the_guides_leave_no_motor_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While the caller of the check of signs prints, and after both, all motors are off; inside a closed terminal ends
+    them as Ctrl-C does: a robot without a watchdog would drive on."""
+    robot = calibrated()
+    link, heard = FakeLink(robot), []
+
+    def look(number: int, sample: Sample) -> Sample:
+        heard.append(signal.getsignal(signal.SIGHUP))
+        return sample
+
+    link.on_read = look
+    monkeypatch.setattr(open_link, "open_link", lambda *_, **__: link)
+    before = signal.getsignal(signal.SIGHUP)
+    signs: dict[str, Any] = {"__name__": "signs"}
+    exec(_block("record.md", "python"), signs)
+    found = []
+    for change in signs["changes"]("fake", robot, "legacy"):
+        assert not link.driven.any()
+        found.append(change)
+    assert np.array_equal(np.array(found) < -1e-3, np.eye(6, dtype=bool))  # each motor shortens its own cable
+    library: dict[str, Any] = {"__name__": "library"}
+    exec(_block("connect.md", "python"), library)
+    library["to_target"]("fake", robot, np.full(6, 0.5))
+    assert not link.driven.any() and before not in heard and signal.getsignal(signal.SIGHUP) == before
 
 
 def test_the_frame_of_the_guide_is_read() -> None:

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 
 _LOCK = 0.05
 """[s] for which a stop waits for a write of another thread, before it writes all the same."""
+_FLOOD = 0.05
+"""[s] beyond its time-out for which a read goes through lines that are no samples: behind a few of them one may wait,
+but a device gone mad that sends them without end must not keep a guard from its clock."""
 
 
 class Link:
@@ -144,7 +147,7 @@ class Link:
                 message = self.transport.receive(max(0.0, left))
                 if message is not None:
                     self.inbox.take(message)
-                elif left <= 0:
+                if left <= (0.0 if message is None else -_FLOOD):
                     self.tally.silent(time.monotonic())
                     break
             return sample

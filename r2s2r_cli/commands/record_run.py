@@ -57,8 +57,8 @@ def carry_out(wish: Wish, console: Console) -> None:
             ended = error
         assert session is not None  # noqa: S101 - an error without a session was raised above
         signals.standing()
-        result, unsealed = _seal(wish, recording, session)
-    _finish(session.report(), result, unsealed, ended, console)
+        result, trouble = _seal(wish, recording, session)
+    _finish(session.report(), result, trouble, ended, console)
 
 
 def _camera(spec: str | None, stack: ExitStack) -> tuple[CameraFeed | None, CameraFacts | None]:
@@ -98,7 +98,8 @@ def _groups(wish: Wish, link: LinkFacts) -> dict[str, Mapping[str, Any]]:
 
 
 def _seal(wish: Wish, recording: Recording, session: Session) -> tuple[StageResult | None, R2S2RError | None]:
-    """The artifact of what was recorded, None where nothing was; or why it is not sealed: its journal stays."""
+    """The artifact of what was recorded, and what went wrong with it: without an artifact it is not sealed, and its
+    journal stays; with one, its pictures are not drawn. Neither where nothing was recorded."""
     from r2s2r_cli.commands.record_run_pictures import draw_recorded, drawing_names
     from schemas.results import StageResult
 
@@ -115,40 +116,48 @@ def _seal(wish: Wish, recording: Recording, session: Session) -> tuple[StageResu
         return None, error
     if sealed.header is None:
         return None, None
-    drawings = draw_recorded(wish.project, recording.target, report) if wish.draw else []
+    drawings: list[str] = []
+    trouble: R2S2RError | None = None
+    try:
+        drawings = draw_recorded(wish.project, recording.target, report) if wish.draw else []
+    except KeyboardInterrupt:
+        trouble = Interrupted("the recording is sealed, its pictures are not drawn", hint="r2s2r status")
+    except R2S2RError as error:
+        error.what = f"the recording is sealed, its pictures are not drawn: {error.what}"
+        trouble = error
     return StageResult(
         stage=wish.stage, state="done", artifact=wish.project.relative(recording.target), reasons=(), inputs=(),
         content_sha256=sealed.header.content_sha256, drawings=tuple(drawings), report=report.model_dump(mode="json"),
-    ), None  # fmt: skip
+    ), trouble  # fmt: skip
 
 
 def _finish(
-    report: RecordReport, result: StageResult | None, unsealed: R2S2RError | None, ended: BaseException | None,
+    report: RecordReport, result: StageResult | None, trouble: R2S2RError | None, ended: BaseException | None,
     console: Console,
 ) -> None:  # fmt: skip
-    """Say what there is; then raise what ended the recording early, else why it is not sealed."""
+    """Say what there is; then raise what ended the recording early, else what went wrong with its artifact."""
+    whole = ended is None and trouble is None
     try:
-        _show(report, result, console, whole=ended is None)
+        _show(report, result, console, whole=whole)
     except (InputError, PipeClosed):  # stdout takes no more, which is the lesser one of two things that went wrong
-        if ended is None and unsealed is None:
+        if whole:
             raise
     for run in report.runs:
         for text in run.warnings:
             console.warn(f"{run.run}: {text}")
-    if ended is None and unsealed is not None:
-        raise unsealed
+    if ended is None and trouble is not None:
+        raise trouble
     if ended is None:
         return
-    if unsealed is not None:
-        console.warn(f"{unsealed.what} ({unsealed.where})" if unsealed.where else unsealed.what)
-        console.hint(unsealed.hint)
+    if trouble is not None:
+        console.warn(f"{trouble.what} ({trouble.where})" if trouble.where else trouble.what)
+        console.hint(trouble.hint)
     if isinstance(ended, KeyboardInterrupt):
-        kept = (
-            "what was recorded is in its journal" if unsealed is not None
-            else "what was recorded is sealed" if result is not None
-            else "nothing was recorded"
-        )  # fmt: skip
-        hint = "r2s2r status" if unsealed is None else unsealed.hint
+        kept, hint = "nothing was recorded", "r2s2r status"
+        if result is not None:
+            kept = "what was recorded is sealed"
+        elif trouble is not None:
+            kept, hint = "what was recorded is in its journal", trouble.hint
         raise Interrupted(f"the motors were told to stop; {kept}", hint=hint) from ended
     if isinstance(ended, HardwareError) and result is not None:
         ended.hint = f"{ended.hint}   # what came before is in {result.artifact}"
@@ -156,7 +165,7 @@ def _finish(
 
 
 def _show(report: RecordReport, result: StageResult | None, console: Console, *, whole: bool) -> None:
-    """What was recorded. whole: nothing ended it early."""
+    """What was recorded. whole: nothing went wrong."""
     from r2s2r_cli.commands.outcome import show_outcome
     from r2s2r_cli.views.record_page import report_tables
 

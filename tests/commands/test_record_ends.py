@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 import pytest
 
 from r2s2r_cli import console
+from r2s2r_cli.commands import record_run_pictures
 from r2s2r_cli.commands.record_journal import Recording
 from r2s2r_cli.commands.record_live import Live, shown, stop_key
 from r2s2r_cli.console import Console, PipeClosed
@@ -24,7 +25,10 @@ from tests.commands.test_record import ASK, RECORDING, Maker, link, robot_projec
 
 __all__ = ["link", "robot_project"]  # fixtures
 
-FULL = ArtifactError("the disk is full", where="its disk", hint="df -h .")
+
+def full() -> ArtifactError:
+    """A new one, as below."""
+    return ArtifactError("the disk is full", where="its disk", hint="df -h .")
 
 
 def stopping(error: BaseException | None) -> Callable[[int, Sample], Sample]:
@@ -46,10 +50,10 @@ def dead_link() -> LinkError:
 @pytest.mark.parametrize(
     ("sealing", "ended", "code"),
     [
-        (FULL, None, 4),
+        (full(), None, 4),
         (KeyboardInterrupt(), None, 130),
-        (FULL, KeyboardInterrupt(), 130),
-        (FULL, dead_link(), 5),
+        (full(), KeyboardInterrupt(), 130),
+        (full(), dead_link(), 5),
     ],
 )
 def test_a_recording_that_is_not_sealed_is_no_success(
@@ -70,6 +74,27 @@ def test_a_recording_that_is_not_sealed_is_no_success(
     assert result.exit_code == code, result.stderr
     assert f"r2s2r recover {journal}" in result.stderr and "nothing was recorded" not in result.stderr
     assert invoke("recover", str(journal)).exit_code == 0
+    assert read_artifact(robot_project / RECORDING, "recording")[1].runs() == ["random-0"]
+
+
+@pytest.mark.parametrize(
+    ("drawing", "ended", "code"),
+    [(full(), None, 4), (KeyboardInterrupt(), None, 130), (full(), KeyboardInterrupt(), 130), (full(), dead_link(), 5)],
+)
+def test_pictures_that_cannot_be_drawn_hide_nothing(
+    robot_project: Path, link: Maker, monkeypatch: pytest.MonkeyPatch,
+    drawing: BaseException, ended: BaseException | None, code: int,
+) -> None:  # fmt: skip
+    """The recording is sealed before: it is said so, and what ended it early counts more."""
+
+    def refuse(*_: Any) -> NoReturn:
+        raise drawing
+
+    link(on_read=stopping(ended))
+    monkeypatch.setattr(record_run_pictures, "draw_recorded", refuse)
+    result = invoke(*ASK)
+    assert result.exit_code == code and "the recording is sealed" in result.stderr, result.stderr
+    assert ("the port is gone" in result.stderr) == isinstance(ended, LinkError)
     assert read_artifact(robot_project / RECORDING, "recording")[1].runs() == ["random-0"]
 
 

@@ -51,18 +51,15 @@ EMERGENCY = "emergency stop"
 class GuardedLink:
     """A link that stops the robot by itself. dry_run: sensors are read and watched, motors never move.
 
-    time_limit [s]: of a run, from entering or `restart`. calibrated: False where sensors have no calibration yet and
-    lengths cannot be watched (a robot that is held in the hand, not driven).
+    time_limit [s]: of a run, from entering or `restart`. Raises InputError where a winched cable's sensor has no line:
+    its length could not be watched.
     """
 
-    def __init__(
-        self, link: RobotLink, robot: Robot, *, time_limit: float = math.inf, dry_run: bool = False,
-        calibrated: bool = True,
-    ) -> None:  # fmt: skip
+    def __init__(self, link: RobotLink, robot: Robot, *, time_limit: float = math.inf, dry_run: bool = False) -> None:
         self.inner = link
         self.dry_run = dry_run
         self.time_limit = time_limit
-        self._watch = Watch(robot, Lengths.of(robot) if calibrated else None)
+        self._watch = Watch(robot, Lengths.of(robot))
         self._pace = Pace(1 / robot.pid.rate_hz)
         self._reason = ""
         self._start = self._heard = self._wall = -math.inf

@@ -35,7 +35,7 @@ MARGIN = 0.02
 class Watch:
     """The sensors of the winched cables, and the boards."""
 
-    def __init__(self, robot: Robot, lengths: Lengths | None) -> None:
+    def __init__(self, robot: Robot, lengths: Lengths) -> None:
         by_cable = {sensor.cable: i for i, sensor in enumerate(robot.sensors)}
         self._cables = [cable for cable in robot.actuated if cable in by_cable]
         self._sensors = np.array([by_cable[cable] for cable in self._cables], dtype=np.int64)
@@ -99,8 +99,6 @@ class Watch:
         return f"stale sensors: no good reading of cable {self._name(late)} for {STALE * 1e3:.0f} ms"
 
     def _range(self, capacitance: np.ndarray, good: np.ndarray) -> str:
-        if self._lengths is None:
-            return ""
         length = self._lengths(capacitance)[self._cables]
         low, high = self._limits.cable_length_min_m - MARGIN, self._limits.cable_length_max_m + MARGIN
         out = good & ~((length >= low) & (length <= high))

@@ -178,7 +178,7 @@ def read_policies(text: str, command: str = "simulate") -> Iterator[PolicyFile]:
     """The policies of a TOML file (one) or an artifact (all, or the one named). command: that was typed, for hints.
     Raises InputError, UsageError."""
     from r2s2r_cli.commands.typed import typed_instead
-    from r2s2r_cli.stages.simulate.policies import stored_policies
+    from r2s2r_cli.stages.simulate.policies import policy_names, stored_policies
     from r2s2r_cli.store.read import read_artifact
     from r2s2r_cli.store.toml import load_model
     from schemas.policy import PolicyFile
@@ -187,7 +187,8 @@ def read_policies(text: str, command: str = "simulate") -> Iterator[PolicyFile]:
     if path.suffix != ARTIFACT:
         yield load_model(path, PolicyFile)
         return
-    found = stored_policies(read_artifact(path)[1])
+    data = read_artifact(path)[1]
+    found = policy_names(data)
     if not found or (name and name not in found):
         near = nearest(name, found)
         raise UsageError(
@@ -195,7 +196,7 @@ def read_policies(text: str, command: str = "simulate") -> Iterator[PolicyFile]:
             expected=" | ".join(found) or "a policy, or runs with targets", received=name or "none",
             hint=typed_instead(command, name, near) if near else f"r2s2r inspect {quoted(path)}",
         )  # fmt: skip
-    yield from [found[name]] if name else found.values()
+    yield from stored_policies(data, [name] if name else None).values()
 
 
 def _meant(path: Path) -> str:

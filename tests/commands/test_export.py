@@ -11,12 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from r2s2r_cli.artifact import ArtifactData
-from r2s2r_cli.stages.export.tables import column_names
+from r2s2r_cli.artifact import ArtifactData, Blobs, Group
+from r2s2r_cli.stages.export.tables import column_names, csv_names
 from r2s2r_cli.store.read import read_artifact
 from r2s2r_cli.store.write import write_artifact
 from schemas.base import Unit, column
 from schemas.policy import PolicyFile
+from schemas.versions import KINDS
 from tests.commands.conftest import document, invoke
 
 RECORD = "iterations/001/10-record.h5"
@@ -133,6 +134,26 @@ def test_a_policy_holds_the_targets_in_order(estimated: Path) -> None:
     targets = data.groups["runs/sample/intervals"]["target"]
     np.testing.assert_array_equal([step.target for step in policy.steps], targets)
     assert invoke("validate", name).exit_code == 0
+
+
+def test_a_run_without_a_target_is_no_policy(estimated: Path) -> None:
+    """A policy needs a step: a file without one would be refused wherever it is read, so none is written."""
+    header, data = read_artifact(Path(RECORD))
+    intervals = {name: value[:0] for name, value in data.groups["runs/sample/intervals"].datasets.items()}  # type: ignore[index]
+    groups = {**data.groups, "runs/sample/intervals": Group(intervals)}
+    write_artifact(Path("bare.h5"), ArtifactData("recording", groups), header.provenance)
+    refused = invoke("export", "bare.h5", "--to", "policy", "--out", "out")
+    assert refused.exit_code == 4 and "expected: one target interval at least" in refused.stderr
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize(("first", "ending"), [(b"\xff\xd8\xff\xfe", "jpg"), (b"\xff\xd8\xff\xe2", "jpg"),
+                                               (b"\xff\xd8\xff\xe0", "jpg"), (b"\x89PNG", "png"), (b"GIF8", "bin")])  # fmt: skip
+def test_images_are_named_by_what_they_are(first: bytes, ending: str) -> None:
+    """Every JPEG that `import` takes, whoever wrote it: with a comment or a colour profile first as well."""
+    camera = Group({"color": Blobs([first + b"rest"], 1)})
+    names = csv_names(ArtifactData("recording", {"runs/walk/camera": camera}), KINDS["recording"], "10-record")
+    assert names[0] == f"10-record/runs/walk/camera/color/000000.{ending}"
 
 
 def test_nothing_is_overwritten(estimated: Path) -> None:

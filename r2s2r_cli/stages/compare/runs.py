@@ -138,7 +138,7 @@ def _targets(
     for data in (recording, estimate):
         group = None if data is None else data.group(run, "policy")
         if data is not None and group is not None:
-            return sequence(stored_policies(data)[run], robot)
+            return sequence(stored_policies(data, [run])[run], robot)
     none = np.zeros(len(intervals))
     return Targets(intervals.target, none, none + robot.pid.step_timeout_s)
 

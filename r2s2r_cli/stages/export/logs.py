@@ -10,6 +10,7 @@ import numpy as np
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.errors import InputError, quoted
 from r2s2r_cli.stages.frames import in_order
+from r2s2r_cli.stages.simulate.policies import run_policy
 
 _STATED = {"frame_stated": "frame", "start_unix": "start_unix_s"}
 _PID = {
@@ -60,20 +61,22 @@ def _lengths(data: ArtifactData, run: str, t: np.ndarray, source: str) -> list[t
 
 def policy_file(data: ArtifactData, run: str, *, source: str) -> tuple[str, bytes]:
     """`<run>.policy.toml`: the target intervals of a run as a policy. source: the artifact's file. Raises InputError
-    where it has none."""
+    where it has none, or one that no policy can have."""
     import tomlkit
 
-    targets = _need(data, run, "intervals", source)["target"]
+    if not len(_need(data, run, "intervals", source)["target"]):
+        raise _cannot(run, "one target interval at least", "none", source)
+    policy = run_policy(data, run)
     document = tomlkit.document()
-    document["schema_version"] = 1
-    document["robot"] = str(data.groups[f"runs/{run}"].attributes["robot"])
-    document["name"] = run
-    document["description"] = f"targets of the run {run}, in their order"
-    document["repeat"] = 1
+    document["schema_version"] = policy.schema_version
+    document["robot"] = policy.robot
+    document["name"] = policy.name
+    document["description"] = policy.description
+    document["repeat"] = policy.repeat
     steps = tomlkit.aot()
-    for target in targets:
+    for one in policy.steps:
         step = tomlkit.table()
-        step["target"] = [float(value) for value in target]
+        step["target"] = list(one.target)
         steps.append(step)
     document["steps"] = steps
     return f"{run}.policy.toml", tomlkit.dumps(document).encode()

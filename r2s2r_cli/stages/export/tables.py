@@ -16,7 +16,8 @@ from schemas.base import ArtifactSpec, DatasetSpec, GroupSpec
 _NO_UNIT = ("1", "index", "code", "bool", "count")
 _COMPONENTS = {"xyz": "xyz", "xyz2": "xyz", "quat": "xyzw", "pair": "01", "mat4": "0123"}
 """Axes that are no rows of a table but parts of one value, and the names of these parts."""
-_IMAGE_ENDING = {b"\x89PNG": "png", b"\xff\xd8\xff\xe0": "jpg", b"\xff\xd8\xff\xe1": "jpg", b"\xff\xd8\xff\xdb": "jpg"}
+_IMAGE_ENDING = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
+"""By the first bytes. What follows those of a JPEG says who wrote it: JFIF, EXIF, a comment, a colour profile."""
 
 
 def csv_files(data: ArtifactData, spec: ArtifactSpec, stem: str) -> Iterator[tuple[str, bytes]]:
@@ -120,4 +121,5 @@ def _frames(group: Group, folder: str) -> Iterator[tuple[str, Callable[[], bytes
     for name, value in group.datasets.items():
         if isinstance(value, Blobs):
             for i, image in enumerate(value.items):
-                yield f"{folder}/{name}/{i:06d}.{_IMAGE_ENDING.get(image[:4], 'bin')}", partial(bytes, image)
+                ending = next((one for first, one in _IMAGE_ENDING.items() if image.startswith(first)), "bin")
+                yield f"{folder}/{name}/{i:06d}.{ending}", partial(bytes, image)

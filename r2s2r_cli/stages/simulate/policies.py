@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,8 @@ from schemas.robot import Robot
 
 RANDOM_MAX = 10_000
 """Targets of a random policy: ten thousand take some eight hours of robot time."""
+ROUNDING = 1e-6
+"""Logs may write a target so far outside 0 .. 1, and `import` stores it as it stands. Beyond, no cable goes there."""
 
 
 @dataclass(frozen=True)
@@ -69,18 +73,47 @@ def random_policy(robot: Robot, steps: int, seed: int) -> PolicyFile:
     )  # fmt: skip
 
 
-def stored_policies(data: ArtifactData) -> dict[str, PolicyFile]:
-    """The policies that an artifact holds, by name: of its own, of its runs, or the targets that its runs had."""
-    found: dict[str, PolicyFile] = {}
+def stored_policies(data: ArtifactData, names: Collection[str] | None = None) -> dict[str, PolicyFile]:
+    """The policies that an artifact holds, by name: of its own, of its runs, or the targets that its runs had.
+
+    names: only these. Raises InputError as `run_policy`.
+    """
+    return {name: make() for name, make in _stored(data).items() if names is None or name in names}
+
+
+def policy_names(data: ArtifactData) -> list[str]:
+    """Names of the policies that an artifact holds, whether or not each of them can be run."""
+    return list(_stored(data))
+
+
+def run_policy(data: ArtifactData, run: str) -> PolicyFile:
+    """The targets that a run had, one step a target interval; it has one at least.
+
+    Raises InputError where a target is none that a cable can have: the folder of the authors may hold any number.
+    """
+    target = data.groups[f"runs/{run}/intervals"]["target"]
+    outside = target[np.abs(target - 0.5) > 0.5 + ROUNDING]
+    if len(outside):
+        raise InputError(
+            f"the targets of run {run} make no policy", where=f"runs/{run}/intervals/target",
+            expected="cable positions, 0 short .. 1 long", received=f"{outside[0]:g}",
+            hint=f"r2s2r simulate --replay {run}   # the motor commands that it had",
+        )  # fmt: skip
+    robot = str(data.groups[f"runs/{run}"].attributes["robot"])
+    return _policy(run, robot, f"targets of the run {run}, in their order", np.clip(target, 0.0, 1.0))
+
+
+def _stored(data: ArtifactData) -> dict[str, Callable[[], PolicyFile]]:
+    """What makes each policy: one that cannot be run must not keep the others from it."""
+    found: dict[str, Callable[[], PolicyFile]] = {}
     for path, group in data.groups.items():
         parts = path.split("/")
         if parts[0] == "policies" or parts[2:] == ["policy"]:
-            found[parts[1]] = _from_group(parts[1], group)
+            found[parts[1]] = partial(_from_group, parts[1], group)
     for run in data.runs():
         intervals = data.group(run, "intervals")
         if run not in found and intervals is not None and len(intervals["target"]):
-            robot = str(data.groups[f"runs/{run}"].attributes["robot"])
-            found[run] = _policy(run, robot, f"targets of the run {run}, in their order", intervals["target"])
+            found[run] = partial(run_policy, data, run)
     return found
 
 

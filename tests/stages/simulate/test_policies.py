@@ -7,7 +7,7 @@ import pytest
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.errors import InputError, UsageError
-from r2s2r_cli.stages.simulate.policies import policy_group, random_policy, sequence, stored_policies
+from r2s2r_cli.stages.simulate.policies import policy_group, policy_names, random_policy, sequence, stored_policies
 from schemas.policy import PolicyFile
 from tests.support import builders
 
@@ -72,3 +72,31 @@ def test_a_run_without_a_policy_gives_the_targets_it_had() -> None:
     found = stored_policies(bare)["walk"]
     assert [step.target for step in found.steps] == [tuple(t) for t in data.groups["runs/walk/intervals"]["target"]]
     assert stored_policies(ArtifactData("recording", {"runs/walk": Group()})) == {}
+
+
+def _with_targets(value: float) -> ArtifactData:
+    """A run `walk` without a policy whose first target is `value`, and a sound run `other`."""
+    data = builders.recording(images=False)
+    intervals = data.groups["runs/walk/intervals"]
+    target = intervals["target"].copy()
+    target[0] = value
+    groups = {key: group for key, group in data.groups.items() if not key.endswith("policy")}
+    other = {key.replace("walk", "other", 1): group for key, group in groups.items()}
+    bad = Group({**intervals.datasets, "target": target}, intervals.attributes)
+    return ArtifactData("recording", {**groups, "runs/walk/intervals": bad, **other})
+
+
+@pytest.mark.parametrize(("value", "meant"), [(1 + 5e-7, 1.0), (-5e-7, 0.0)])
+def test_targets_of_a_log_may_be_rounded(value: float, meant: float) -> None:
+    """What `import` takes for 0 or 1 is one here as well."""
+    assert stored_policies(_with_targets(value))["walk"].steps[0].target == (meant,) * 6
+
+
+def test_targets_that_no_cable_can_have_are_refused_where_they_are_asked_for() -> None:
+    """The run is named, and the other runs of the recording are policies all the same."""
+    data = _with_targets(1.2)
+    assert policy_names(data) == ["walk", "other"]
+    assert list(stored_policies(data, ["other"])) == ["other"]
+    with pytest.raises(InputError, match="run walk") as caught:
+        stored_policies(data)
+    assert caught.value.received == "1.2"

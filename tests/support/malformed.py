@@ -162,6 +162,7 @@ def json_cases() -> list[Malformed]:
         Malformed("infinity", raw.replace(b"15.5", b"Infinity")),
         Malformed("overflow", raw.replace(b"15.5", b"1e999")),
         Malformed("long_integer", raw.replace(b"15.5", b"9" * 6000)),
+        Malformed("integer_beyond_floats", raw.replace(b"15.5", b"9" * 400)),
         Malformed("no_header", json.dumps({k: v for k, v in frame_json().items() if k != "header"}).encode()),
         Malformed("header_list", _frame("header", [1.0])),
         Malformed("no_secs", _frame("header", {"seq": 1})),

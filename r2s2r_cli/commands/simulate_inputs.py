@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from r2s2r_cli.artifact import ArtifactData
     from r2s2r_cli.stages.identified import Identified
     from r2s2r_cli.stages.simulate import Request, Start
+    from r2s2r_cli.stages.simulate.replay import Replay
     from schemas.policy import PolicyFile
+    from schemas.robot import Robot
 
 REST = "rest"
 ARTIFACT = ".h5"
@@ -77,7 +79,6 @@ class Asked:
         """What the stage itself would refuse of policies, runs and numbers, for a dry run. Raises InputError,
         UsageError."""
         from r2s2r_cli.stages.simulate.policies import require_length, sequence
-        from r2s2r_cli.stages.simulate.replay import recorded_commands
 
         robot = self.project.robot()
         for text in self.policies:
@@ -86,7 +87,7 @@ class Asked:
         if self.random is not None:
             require_length(self.random)
         for run in self.replay:
-            recorded_commands(self._data(run, "--replay"), run, len(robot.actuated))
+            self._replay(run, robot)
         if self.start not in (None, REST):
             self._start(None)
         self.simulator()
@@ -106,16 +107,20 @@ class Asked:
         """The runs to simulate, in the order of the command line. Raises InputError, UsageError."""
         from r2s2r_cli.stages.simulate import Request
         from r2s2r_cli.stages.simulate.policies import random_policy
-        from r2s2r_cli.stages.simulate.replay import recorded_commands
 
         robot = self.project.robot()
         found = [Request(policy, self._start(None)) for text in self.policies for policy in read_policies(text)]
         if self.random is not None:
             found.append(Request(random_policy(robot, self.random, self.seed), self._start(None)))
         for run in self.replay:
-            commands = recorded_commands(self._data(run, "--replay"), run, len(robot.actuated))
-            found.append(Request(commands, self._start(run)))
+            found.append(Request(self._replay(run, robot), self._start(run)))
         return found
+
+    def _replay(self, run: str, robot: Robot) -> Replay:
+        from r2s2r_cli.stages.simulate.replay import recorded_commands
+
+        data = self._data(run, "--replay")
+        return recorded_commands(data, run, len(robot.actuated), source=str(self._recorded))
 
     def _start(self, run: str | None) -> Start | None:
         """The start of a replay of `run`, or of a policy; None: the rest state."""

@@ -90,6 +90,23 @@ def test_hints_name_options_that_exist() -> None:
     assert wrong == []
 
 
+def test_hints_that_begin_with_a_command_are_one() -> None:
+    """What is said beside the command stands behind a `#`: pasted, words of a sentence would be arguments."""
+    hints = [(name(path), *hint) for path in python_files("r2s2r_cli", "schemas") for hint in _whole_hints(path)]
+    assert len(hints) > 100
+    refused = [(where, line, text, _refused(shlex.split(text, comments=True)[1:])) for where, line, text in hints]
+    assert [row for row in refused if row[-1] and not UNFINISHED.match(row[-1])] == []
+
+
+def _whole_hints(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and text of every hint that is written out whole and begins with `r2s2r `."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if not isinstance(node, ast.keyword) or node.arg != "hint" or not isinstance(node.value, ast.Constant):
+            continue
+        if (text := _text(node.value)).startswith("r2s2r "):
+            yield node.value.lineno, text
+
+
 def _options(text: str) -> set[str] | None:
     """What the command that a text begins with takes; None where no command of ours is named."""
     words = re.findall(r"[\w-]+", text)

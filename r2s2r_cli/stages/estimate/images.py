@@ -121,6 +121,6 @@ class DecodedFrames:
                 where=f"{self.where}/{'depth' if deep else 'color'}",
                 expected=f"{size}, {self.lens.width} x {self.lens.height} px",
                 received=f"{image.dtype}, {image.ndim} axes, {image.shape[1]} x {image.shape[0]} px",
-                hint="r2s2r inspect 10-record.h5; colour and depth may be swapped, or depth not registered to colour",
+                hint="r2s2r inspect 10-record.h5   # swapped colour and depth, or depth not registered to colour?",
             )
         return np.asarray(image) if deep else cv2.cvtColor(image, cv2.COLOR_BGR2RGB)

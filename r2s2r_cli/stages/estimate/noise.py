@@ -29,7 +29,7 @@ def observation_noise(t: np.ndarray, p_WE: np.ndarray, caps: Group, *, where: st
             where=f"{where}/noise_sd",
             expected="a finite standard deviation per cap and axis",
             received=f"{int(np.sum(~np.isfinite(sd)))} of {sd.size} are not finite",
-            hint="r2s2r validate 10-record.h5 says what is wrong with the recording",
+            hint="r2s2r validate 10-record.h5   # says what is wrong with the recording",
         )
     typical = float(np.median(sd))
     held = sd < HELD * typical

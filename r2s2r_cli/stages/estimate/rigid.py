@@ -170,7 +170,7 @@ def _axis(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             where=f"caps/p_WE, kept frame {frame}",
             expected="two caps a rod length apart",
             received="0",
-            hint="r2s2r validate says which frames of the recording are impossible",
+            hint="r2s2r validate   # says which frames of the recording are impossible",
         )
     return bar / length[..., None], length
 

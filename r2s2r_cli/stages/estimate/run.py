@@ -119,7 +119,7 @@ def observations(run: str, streams: dict[str, Group]) -> tuple[np.ndarray, np.nd
             where=f"runs/{run}/caps",
             expected=f"at least {MIN_FRAMES} kept frames",
             received=f"{len(kept)} of {len(caps['t'])} rows were kept",
-            hint="r2s2r inspect 10-record.h5 shows drop_reason, why a row was left out",
+            hint="r2s2r inspect 10-record.h5   # shows drop_reason, why a row was left out",
         )
     if not (np.all(np.isfinite(p_WE)) and np.all(np.isfinite(t)) and np.all(np.diff(t) > 0)):
         raise InputError(
@@ -128,7 +128,7 @@ def observations(run: str, streams: dict[str, Group]) -> tuple[np.ndarray, np.nd
             expected="finite end caps and increasing stamps wherever drop_reason is 0",
             received=f"{int(np.sum(~np.isfinite(p_WE)))} coordinates not finite, "
             f"{int(np.sum(~(np.diff(t) > 0)))} stamps not after the one before",
-            hint="import the log again: r2s2r import crawl.csv --force",
+            hint="r2s2r import crawl.csv --force   # the log again",
         )
     return kept, t, p_WE
 
@@ -167,7 +167,7 @@ def _intervals(run: str, streams: dict[str, Group], t: np.ndarray) -> tuple[Inte
                 where=f"runs/{run}/intervals/last",
                 expected=f"at most {len(t) - 1}",
                 received=str(int(np.max(found.last))),
-                hint="import the log again: r2s2r import crawl.csv --force",
+                hint="r2s2r import crawl.csv --force   # the log again",
             )
         return found, Segments.from_group(streams["segments"]) if "segments" in streams else None
     return intervals_of(streams, t)

@@ -136,7 +136,7 @@ def chi2_quantile(probability: float) -> float:
 
 
 def _check(t: np.ndarray, seen: np.ndarray) -> None:
-    hint = "r2s2r inspect 10-record.h5 shows which frames were kept and why the others were dropped"
+    hint = "r2s2r inspect 10-record.h5   # shows which frames were kept and why the others were dropped"
     if not np.all(np.isfinite(t)) or np.any(np.diff(t) <= 0):
         raise NumericalError("the stamps of the kept frames do not increase", where="caps/t", hint=hint)
     if np.any(few := np.sum(seen, axis=0) < MIN_FRAMES):
@@ -194,7 +194,7 @@ def _check_explained(density: np.ndarray) -> None:
             where="caps/p_WE",
             expected=f"a spectral density below 1e{GRID[1]:g}",
             received="the likelihood still rises there, with every outlier and jump that was found left out",
-            hint="check the unit of the stamps and positions: r2s2r inspect 10-record.h5",
+            hint="r2s2r inspect 10-record.h5   # check the unit of the stamps and positions",
         )
 
 

@@ -198,7 +198,7 @@ class Sweep:
             f"in no frame of run {self._run} are all end caps seen and told apart", where=f"runs/{self._run}/camera",
             expected="one frame at least with both caps of every rod, as far apart as the cable sensors say",
             received=f"of {n} frames both caps of a colour: {seen}",
-            hint="r2s2r doctor camera shows what the colours of robot.toml find",
+            hint="r2s2r doctor camera   # shows what the colours of robot.toml find",
         )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
-from r2s2r_cli.errors import InputError
+from r2s2r_cli.errors import InputError, quoted
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,10 @@ class Replay:
         return Group({"t": self.t[rows], "target": self.target[rows], "control": self.control[rows]})
 
 
-def recorded_commands(data: ArtifactData, run: str, motors: int) -> Replay:
+def recorded_commands(data: ArtifactData, run: str, motors: int, *, source: str = "10-record.h5") -> Replay:
     """The motor commands of a run of a recording or an estimate; from its first to its last frame where it has frames.
 
-    Raises InputError where the run has none, or those of another robot.
+    source: the artifact's file. Raises InputError where the run has none, or those of another robot.
     """
     commands, frames = data.group(run, "commands"), data.group(run, "frames")
     logged = commands is not None and "control" in commands and bool(np.isfinite(commands["control"]).any())
@@ -52,7 +52,9 @@ def recorded_commands(data: ArtifactData, run: str, motors: int) -> Replay:
             where=f"runs/{run}/commands/control",
             expected="motor commands in -1 .. +1, as control columns of a log bring them",
             received="targets only" if commands is not None else "no commands",
-            hint="run its targets with the simulated controller instead: r2s2r simulate 10-record.h5:" + run,
+            hint=f"r2s2r inspect {quoted(source)}"
+            if commands is None
+            else f"r2s2r simulate {quoted(f'{source}:{run}')}   # its targets, with the simulated controller",
         )
     control = commands["control"]
     if control.shape[1] != motors:
@@ -64,6 +66,6 @@ def recorded_commands(data: ArtifactData, run: str, motors: int) -> Replay:
     if last <= first:
         raise InputError(f"run {run} has no duration to replay", where=f"runs/{run}/commands/t",
                          expected="commands over some time", received=f"{last - first:g} s",
-                         hint="r2s2r inspect 10-record.h5")  # fmt: skip
+                         hint=f"r2s2r inspect {quoted(source)}")  # fmt: skip
     missing = int((~np.isfinite(control)).any(axis=1).sum())
     return Replay(run, t, commands["target"], np.clip(np.nan_to_num(control), -1, 1), first, last, missing)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+
 import numpy as np
 import pytest
 
@@ -70,5 +72,13 @@ def test_a_run_without_commands_is_refused() -> None:
     """A camera recording has nothing to replay."""
     data = builders.estimate()
     bare = ArtifactData("estimate", {k: g for k, g in data.groups.items() if not k.endswith("commands")})
-    with pytest.raises(InputError, match="no motor commands"):
-        recorded_commands(bare, "walk", 6)
+    with pytest.raises(InputError, match="no motor commands") as caught:
+        recorded_commands(bare, "walk", 6, source="it/20-estimate.h5")
+    assert caught.value.hint == "r2s2r inspect it/20-estimate.h5"
+
+
+def test_a_log_without_motor_commands_is_simulated_by_its_targets_instead() -> None:
+    """The hint names the artifact where it lies: pasted, it finds it, whatever is in its name."""
+    with pytest.raises(InputError) as caught:
+        recorded_commands(with_commands(control=None), "walk", 6, source="a b/10-record.h5")
+    assert shlex.split(caught.value.hint, comments=True) == ["r2s2r", "simulate", "a b/10-record.h5:walk"]

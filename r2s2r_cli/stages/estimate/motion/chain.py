@@ -55,7 +55,7 @@ def eliminate(normal: Normal) -> Eliminated:
             raise NumericalError(
                 "the tracked motion is not determined", where=f"frame {k}", expected="positive definite equations",
                 received="a state that nothing observes",
-                hint="check the stamps and covariances of the sightings: r2s2r inspect 10-record.h5",
+                hint="r2s2r inspect 10-record.h5   # check the stamps and covariances of the sightings",
             )  # fmt: skip
         step[k] = dpotrs(factor[k], right)[0]
         if k + 1 < n:

@@ -52,14 +52,14 @@ def prepare(sighted: Sighted, body: Body) -> Prepared:
         raise InputError(
             "the frames allow no estimate", where="camera/t", expected=f"at least {MIN_FRAMES} frames, rising stamps",
             received=f"{len(t)} frames, {int(np.sum(~(np.diff(t) > 0)))} stamps not after the one before",
-            hint="r2s2r inspect 10-record.h5 shows the stamps",
+            hint="r2s2r inspect 10-record.h5   # shows the stamps",
         )  # fmt: skip
     seen = np.all(np.isfinite(p), axis=2) & np.all(np.isfinite(sighted.cov), axis=(2, 3))
     seen &= ~_twins(p, sighted.cov, seen, body)
     if np.any(never := ~np.any(seen, axis=0)):
         raise InputError(
             f"end cap {int(np.argmax(never))} is never sighted", where="sightings", expected="every cap at least once",
-            received="none in any frame", hint="r2s2r doctor camera shows which colours are found",
+            received="none in any frame", hint="r2s2r doctor camera   # shows which colours are found",
         )  # fmt: skip
     usual = float(np.median(np.diff(t)))
     times, gap_of = [t[:1]], []

@@ -39,7 +39,7 @@ def solve(x: np.ndarray, evidence: Evidence, body: Body, settings: MotionSetting
     if not np.isfinite(cost):
         raise NumericalError(
             "the smoother's states are not finite", where="sightings", expected="finite sightings and covariances",
-            received=f"cost {cost}", hint="r2s2r inspect 10-record.h5 shows what was recorded",
+            received=f"cost {cost}", hint="r2s2r inspect 10-record.h5   # shows what was recorded",
         )  # fmt: skip
     done = eliminate(normal)
     settled, taken = False, 0

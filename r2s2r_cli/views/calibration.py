@@ -12,7 +12,7 @@ import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.calibration_parts import draw_masses, draw_tendons
-from r2s2r_cli.views.figure import BLUE, GREEN, ORANGE, PALE, PURPLE, RED, new_figure, png_bytes, texts
+from r2s2r_cli.views.figure import BLUE, GREEN, ORANGE, PALE, PURPLE, RED, as_typed, new_figure, png_bytes, texts
 from schemas.calibration import LINE_STATES
 from schemas.robot import Robot
 
@@ -59,7 +59,7 @@ def _sensors(points: Group, lines: Group, number: int, name: str) -> bytes:
         if sensor + columns >= n:
             below.set_xlabel("length [mm]")
     figure.suptitle(
-        f"set {name}: line per sensor, rms {1e3 * lines['rms_set'][number]:.2f} mm over all points\n"
+        f"set {as_typed(name)}: line per sensor, rms {1e3 * lines['rms_set'][number]:.2f} mm over all points\n"
         "residual: length read from the line minus measured length (ring: line fitted without that point)"
     )
     return png_bytes(figure)
@@ -128,7 +128,8 @@ def _drift_panel(axes: Axes, history: Group, drift: Group, sensor: int, files: l
         if good.any():
             typical = np.median(slope[good] * middle + offset[good])
             length = 1e3 * ((typical - offset[good]) / slope[good] - middle)
-            axes.plot(dates[good], length, "-", color=color, marker=marker, ms=4, lw=1, label=name or "history")
+            label = as_typed(name) or "history"
+            axes.plot(dates[good], length, "-", color=color, marker=marker, ms=4, lw=1, label=label)
             ringed = np.isin(np.flatnonzero(good), swapped)
             axes.plot(dates[good][ringed], length[ringed], "o", mfc="none", color=RED, ms=10, mew=1.5)
         failed = (file == name) & (state != 0)

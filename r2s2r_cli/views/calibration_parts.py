@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from r2s2r_cli.artifact import Group
-from r2s2r_cli.views.figure import BLUE, GREY, ORANGE, PALE, RED, new_figure, png_bytes, texts
+from r2s2r_cli.views.figure import BLUE, GREY, ORANGE, PALE, RED, as_typed, new_figure, png_bytes, texts
 from schemas.robot import Robot
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ def draw_tendons(points: Group, tendons: Group) -> bytes:
     """PNG: force and stiffness of every tendon over its displacement, and their average."""
     figure = new_figure(9, 8)
     force, stiffness = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    names = texts(tendons, "name")
+    names = [as_typed(name) for name in texts(tendons, "name")]
     ks = np.stack([tendons[key] for key in ("k1", "k2", "k3")], axis=1)
     for i in range(len(names)):
         mine = points["curve"] == i
@@ -32,7 +32,9 @@ def draw_tendons(points: Group, tendons: Group) -> bytes:
         force.plot(1e3 * x, _cubic(ks[i], x), style, color=color, lw=0.8, label=label)
         stiffness.plot(1e3 * x, _slope(ks[i], x), style, color=color, lw=0.8)
         if not tendons["monotone"][i]:
-            force.annotate(f"{names[i]} falls", (1e3 * x[-1], _cubic(ks[i], x[-1:])[0]), color=RED, fontsize=8)
+            force.annotate(
+                f"{names[i]} falls", (1e3 * x[-1], _cubic(ks[i], x[-1:])[0]), color=RED, fontsize=8
+            )
     x, mean, sd = tendons["x"], tendons["mean"], tendons["sd"]
     k = np.array([float(tendons.attributes[f"k{i}_mean"]) for i in (1, 2, 3)])
     if np.isfinite(sd).all():
@@ -90,7 +92,7 @@ def _rod(
     mine = np.flatnonzero(parts["rod"] == rod)
     mine = mine[np.argsort(parts["offset"][mine], kind="stable")]
     top = max(cap, 1e3 * float(parts["radius"][mine].max()))
-    shapes, names = texts(parts, "shape"), texts(parts, "name")
+    shapes, names = texts(parts, "shape"), [as_typed(name) for name in texts(parts, "name")]
     for place, i in enumerate(mine):
         x, radius, length = (1e3 * float(parts[key][i]) for key in ("offset", "radius", "length"))
         color = shade(1e3 * float(parts["mass"][i]))
@@ -110,7 +112,7 @@ def _rod(
     axes.annotate(f"centre of mass {com:+.1f} mm", (com, 0), (com, -1.6 * top), fontsize=8, ha="center", va="top",
                   arrowprops={"arrowstyle": "-", "lw": 0.7})  # fmt: skip
     axial, across = (1e6 * masses[key][row] for key in ("inertia_axial", "inertia_transverse"))
-    title = f"rod {body.name}: {1e3 * masses['mass'][row]:.1f} g, moment of inertia {axial:.3g} kg mm² along"
+    title = f"rod {as_typed(body.name)}: {1e3 * masses['mass'][row]:.1f} g, moment of inertia {axial:.3g} kg mm² along"
     axes.set_title(f"{title}, {across:.4g} kg mm² across", fontsize=9)
     axes.set_xlim(-half - 2 * cap, half + 2 * cap)
     axes.set_ylim(-2.6 * top, 3.6 * top)

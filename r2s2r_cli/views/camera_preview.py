@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from r2s2r_cli.views.figure import ROD_COLORS, new_figure, png_bytes
+from r2s2r_cli.views.figure import ROD_COLORS, as_typed, new_figure, png_bytes
 
 _GRID_PX = 80
 _UNKNOWN = "#c8c8c8"
@@ -23,7 +23,7 @@ def draw_preview(
     """
     rows, columns = z.shape
     figure = new_figure(14.4, 6.4 * rows / columns + 1.1)
-    figure.suptitle(title, fontsize=10)
+    figure.suptitle(as_typed(title), fontsize=10)
     left, right = figure.subplots(1, 2)
     left.imshow(color, extent=(0, columns, rows, 0), interpolation="nearest")
     u, v = np.arange(columns) + 0.5, np.arange(rows) + 0.5
@@ -31,7 +31,7 @@ def draw_preview(
         shade = ROD_COLORS[rod % len(ROD_COLORS)]
         for line, width in (("white", 2.2), (shade, 1.0)) if mask.any() else ():
             left.contour(u, v, mask.astype(float), [0.5], colors=line, linewidths=width)
-        left.plot([], [], color=shade, label=f"rod {name}: {int(mask.sum())} px")
+        left.plot([], [], color=shade, label=f"rod {as_typed(name)}: {int(mask.sum())} px")
     _pixels(left, columns, rows, "colour; outlined: what is taken for a cap")
     if masks:
         left.legend(loc="upper left", fontsize=7, framealpha=0.85)

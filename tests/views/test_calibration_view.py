@@ -13,6 +13,7 @@ from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.stages.calibrate import Source, calibrate
 from r2s2r_cli.stages.init.robots import robot_toml
 from r2s2r_cli.views.calibration import draw_calibration
+from r2s2r_cli.views.camera_preview import draw_preview
 from schemas.robot import Robot
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -75,3 +76,27 @@ def test_other_measurements_give_another_picture(data: ArtifactData, robot: Robo
         for group in (tendons, stronger)
     )
     assert one != other
+
+
+@pytest.mark.parametrize("name", [b"cost $\\frac$ b", b"$_{$"])
+def test_names_are_drawn_as_they_were_typed(data: ArtifactData, robot: Robot, name: bytes) -> None:
+    """Sets, files, tendons, parts and rods: between two `$` matplotlib would read a formula, and refuse these."""
+    groups = dict(data.groups)
+    for path, key in (("lines", "name"), ("history", "file"), ("tendons", "name"), ("mass_parts", "name")):
+        group = groups[path]
+        renamed = {**group.datasets, key: np.full(len(group[key]), name)}
+        if path == "tendons":  # one that is named in the picture, since it falls
+            renamed["monotone"] = np.zeros(len(group[key]), dtype=bool)
+        groups[path] = Group(renamed, group.attributes)
+    rods = tuple(rod.model_copy(update={"name": name.decode()}) for rod in robot.rods)
+    pictures = dict(draw_calibration(ArtifactData(data.kind, groups), robot.model_copy(update={"rods": rods})))
+    assert len(pictures) == 5 and all(png.startswith(PNG) for png in pictures.values())
+
+
+@pytest.mark.parametrize("name", ["cost $\\frac$ b", "$_{$"])
+def test_a_camera_and_its_rods_are_named_as_they_were_typed(name: str) -> None:
+    """The same of what `doctor camera --preview` draws."""
+    mask = np.zeros((60, 80), dtype=bool)
+    mask[10:20, 10:20] = True
+    picture = np.zeros((60, 80, 3), dtype=np.uint8)
+    assert draw_preview(picture, np.ones((60, 80)), None, masks={name: mask}, title=name).startswith(PNG)

@@ -32,9 +32,7 @@ def draw_tendons(points: Group, tendons: Group) -> bytes:
         force.plot(1e3 * x, _cubic(ks[i], x), style, color=color, lw=0.8, label=label)
         stiffness.plot(1e3 * x, _slope(ks[i], x), style, color=color, lw=0.8)
         if not tendons["monotone"][i]:
-            force.annotate(
-                f"{names[i]} falls", (1e3 * x[-1], _cubic(ks[i], x[-1:])[0]), color=RED, fontsize=8
-            )
+            force.annotate(f"{names[i]} falls", (1e3 * x[-1], _cubic(ks[i], x[-1:])[0]), color=RED, fontsize=8)
     x, mean, sd = tendons["x"], tendons["mean"], tendons["sd"]
     k = np.array([float(tendons.attributes[f"k{i}_mean"]) for i in (1, 2, 3)])
     if np.isfinite(sd).all():

@@ -21,13 +21,13 @@ _UNKNOWN, _BROKEN = "#c8c8c8", "#d4380d"
 
 def has_frames(camera: Group) -> bool:
     """Whether any pictures are there to draw."""
-    return any(isinstance(camera.datasets.get(name), Blobs) for name in ("color", "depth"))
+    return any(_pictures(camera, name) is not None for name in ("color", "depth"))
 
 
 def camera_height(camera: Group, width: float) -> float:
     """Height [inches] of the strip in a picture of `width`: a row for colour, one for depth."""
     aspect = float(camera.attributes["height"]) / float(camera.attributes["width"])
-    rows = sum(isinstance(camera.datasets.get(name), Blobs) for name in ("color", "depth"))
+    rows = sum(_pictures(camera, name) is not None for name in ("color", "depth"))
     return rows * (min(1.0, aspect) * width / 3.6 + 0.35) + 0.3
 
 
@@ -35,18 +35,18 @@ def draw_camera(figure: SubFigure, camera: Group) -> None:
     """Draws the frames into `figure`; a frame that cannot be decoded says so in its place."""
     from matplotlib import colormaps
 
-    color, depth = (camera.datasets.get(name) for name in ("color", "depth"))
-    rows = [name for name, images in (("color", color), ("depth", depth)) if isinstance(images, Blobs)]
+    color, depth = (_pictures(camera, name) for name in ("color", "depth"))
+    rows = [name for name, images in (("color", color), ("depth", depth)) if images is not None]
     chosen = _chosen(len(camera["t"]) if "color" in rows else len(camera["t_depth"]))
     grid = figure.subplots(len(rows), len(chosen), squeeze=False)
     frames = chosen
-    if isinstance(color, Blobs):
+    if color is not None:
         images = _decoded(color, chosen, is_depth=False)
         for axes, frame in zip(grid[0], chosen, strict=True):
             number = int(camera["source_frame"][frame]) if "source_frame" in camera else frame
             _show(axes, images.get(frame), f"colour frame {number}, {camera['t'][frame]:.2f} s")
         frames = [int(camera["pair"][i]) for i in chosen] if "pair" in camera else []
-    if not isinstance(depth, Blobs):
+    if depth is None:
         return
     scale = float(camera.attributes.get("depth_scale", 1.0))
     unit = "m" if "depth_scale" in camera.attributes else "counts"
@@ -63,6 +63,12 @@ def draw_camera(figure: SubFigure, camera: Group) -> None:
         axes.set_axis_off()
     if drawn is not None:
         figure.colorbar(drawn, ax=list(grid[-1]), label=f"depth [{unit}]", shrink=0.8)
+
+
+def _pictures(camera: Group, name: str) -> Blobs | None:
+    """The pictures of a kind; None where there are none, as of a camera that failed before its first frame."""
+    pictures = camera.datasets.get(name)
+    return pictures if isinstance(pictures, Blobs) and pictures.count else None
 
 
 def _chosen(count: int) -> list[int]:

@@ -130,6 +130,20 @@ def test_a_recording_whose_pictures_were_taken_out_is_drawn(tmp_path: Path) -> N
     assert dict(draw_recording(ArtifactData("recording", groups), 0.0175))["walk"].startswith(b"\x89PNG")
 
 
+@pytest.mark.parametrize("empty", [("color",), ("depth",), ("color", "depth")])
+def test_a_camera_that_failed_before_its_first_frame_is_left_out(tmp_path: Path, empty: tuple[str, ...]) -> None:
+    """Streams without a picture stop neither the drawing of the other one nor that of the robot's."""
+    data = _recording(_source("authors_folder", tmp_path))
+    camera = data.groups["runs/walk/camera"]
+    gone: dict[str, Value] = {name: Blobs([], 0) for name in empty}
+    if "color" in empty:
+        gone |= {"t": np.zeros(0), "pair": np.zeros(0, dtype=np.int64), "source_frame": np.zeros(0, dtype=np.int64)}
+    if "depth" in empty:
+        gone["t_depth"] = np.zeros(0)
+    groups = {**data.groups, "runs/walk/camera": Group({**camera.datasets, **gone}, camera.attributes)}
+    assert dict(draw_recording(ArtifactData("recording", groups), 0.0175))["walk"].startswith(b"\x89PNG")
+
+
 def test_numbers_that_would_overlap_are_left_out() -> None:
     """Of points in a row every one far enough from those taken before is taken, the first always."""
     points = np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0], [1.0, 0.2], [3.0, 0.0]])

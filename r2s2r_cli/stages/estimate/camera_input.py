@@ -45,7 +45,8 @@ def kept_frames(run: str, streams: dict[str, Group], pictures: Pictures) -> tupl
     if lost:
         raise InputError(
             f"the camera of run {run} is not described", where=where, expected=", ".join((*_LENS, "depth_scale")),
-            received=f"no {', '.join(lost)}", hint="r2s2r import recording --force   # a folder with config.json in it",
+            received=f"no {', '.join(lost)}",
+            hint="r2s2r import recording --force   # the authors' layout, with config.json; TUM's has none",
         )  # fmt: skip
     t = camera["t"]
     rows = np.flatnonzero(keep_frames(t) == KEPT)

@@ -147,8 +147,16 @@ def test_a_run_without_a_target_is_no_policy(estimated: Path) -> None:
     assert not Path("out").exists()
 
 
-@pytest.mark.parametrize(("first", "ending"), [(b"\xff\xd8\xff\xfe", "jpg"), (b"\xff\xd8\xff\xe2", "jpg"),
-                                               (b"\xff\xd8\xff\xe0", "jpg"), (b"\x89PNG", "png"), (b"GIF8", "bin")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("first", "ending"),
+    [
+        (b"\xff\xd8\xff\xfe", "jpg"),
+        (b"\xff\xd8\xff\xe2", "jpg"),
+        (b"\xff\xd8\xff\xe0", "jpg"),
+        (b"\x89PNG", "png"),
+        (b"GIF8", "bin"),
+    ],
+)
 def test_images_are_named_by_what_they_are(first: bytes, ending: str) -> None:
     """Every JPEG that `import` takes, whoever wrote it: with a comment or a colour profile first as well."""
     camera = Group({"color": Blobs([first + b"rest"], 1)})

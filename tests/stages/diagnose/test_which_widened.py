@@ -11,7 +11,7 @@ from r2s2r_cli.stages.diagnose.which import which as module
 from r2s2r_cli.stages.diagnose.which.fit import Fits
 from r2s2r_cli.stages.diagnose.which.hypothesis import Fit, Hypothesis
 from r2s2r_cli.stages.diagnose.which.screen import Response, screen
-from tests.support.linear_arena import EACH, STRETCHES, LinearArena, kinds_of, candidate
+from tests.support.linear_arena import EACH, STRETCHES, LinearArena, candidate, kinds_of
 
 KNOWN = [candidate("right", 0), candidate("wrong", 1)]
 

@@ -34,6 +34,10 @@ Slope = Annotated[float, Field(strict=True, ge=-0.7, le=0.7)]
 """[rad]; beyond 40 degrees it was meant in degrees."""
 Factor = Annotated[float, Field(strict=True, ge=0.01, le=100)]
 """How many times as much."""
+Place = Annotated[float, Field(strict=True, ge=-10, le=10)]
+"""Along the floor [m]; beyond ten it was meant in millimetres."""
+Spread = Annotated[float, Field(strict=True, ge=0, le=0.3)]
+"""Relative standard deviation of what is above 0 and drawn as far as three of them: a tenth of it is left."""
 Shift3 = tuple[Shift, Shift, Shift]
 Vector3 = tuple[Real, Real, Real]
 Vector2 = tuple[Real, Real]

@@ -9,9 +9,11 @@ import pytest
 
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.rig.firmware import BoardSample
+from r2s2r_cli.rig.firmware.board import Board
+from r2s2r_cli.rig.firmware.generators import generator
 from r2s2r_cli.rig.firmware.inertial import InertialUnit
-from r2s2r_cli.rig.firmware.layout import posts
-from r2s2r_cli.rig.world import Inertial
+from r2s2r_cli.rig.firmware.layout import Post, posts
+from r2s2r_cli.rig.world import Boards, Inertial, World
 from tests.support.rig_boards import ALL, GAIT, ROBOT, TICK, lengths_of, make, run
 from tests.support.rig_robots import known
 
@@ -70,6 +72,17 @@ def test_each_board_sends_its_own_at_its_own_pace() -> None:
         gaps = np.diff([s.t for s in mine])
         assert 0.012 < gaps.min() < gaps.max() < 0.028
     assert (np.diff([s.t for s in samples]) > 0).all()
+
+
+def test_a_board_of_the_widest_spread_still_goes_on() -> None:
+    """Whatever is drawn, a board samples forwards: one with a rate below 0 went back in time for ever."""
+    rates = Boards(rate_spread=0.3)
+    for seed in range(100):
+        world = World(seed=seed, boards=rates)
+        board = Board(0, Post(0, (), ()), world, generator(world, "board 0"))
+        before = board.due
+        board.sampled()
+        assert board.due > before
 
 
 def test_recorded_lengths_are_the_true_ones_within_the_stated_error() -> None:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Self
 
 import mujoco
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from r2s2r_cli.rig.camera.settings import CameraSettings, Occluder, Rgb
 from r2s2r_cli.rig.effects.base import EffectSection, Law, Scene
 from r2s2r_cli.rig.effects.contact import cap_geoms
 from r2s2r_cli.rig.model.mjcf_text import ground_rotation
 from r2s2r_cli.rig.model.options import Options, Ridge
-from r2s2r_cli.rig.section import Index, NonNegative, Slope, Vector2, Vector3
+from r2s2r_cli.rig.section import Index, NonNegative, Place, Slope, Vector3
+
+_SHORTEST_M = 1e-6
+"""MuJoCo takes no shorter bar."""
 
 
 class GroundSlope(EffectSection):
@@ -44,14 +47,20 @@ class GroundSlope(EffectSection):
 class Obstacle(EffectSection):
     """A ridge: a round bar that lies half sunk in the floor."""
 
-    from_m: Vector2 = (0.2, -0.5)
+    from_m: tuple[Place, Place] = (0.2, -0.5)
     """Where it begins [m], along the floor ..."""
-    to_m: Vector2 = (0.2, 0.5)
+    to_m: tuple[Place, Place] = (0.2, 0.5)
     """... and where it ends [m]."""
     height_m: Annotated[float, Field(strict=True, gt=0, le=0.1)] = 0.01
     """How far it stands out of the floor: its radius [m]."""
     rgb: Rgb = (90, 85, 80)
     """Its colour in the picture."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if math.dist(self.from_m, self.to_m) < _SHORTEST_M:
+            raise ValueError("from_m and to_m are one point")
+        return self
 
     def options(self, options: Options) -> Options:
         """A capsule of MuJoCo's in the plane of the floor, whatever its slope."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from r2s2r_cli.rig.section import Count, NonNegative, Positive, Real, Section, Share, Size
+from r2s2r_cli.rig.section import Count, NonNegative, Positive, Real, Section, Share, Size, Spread
 
 
 class Sensors(Section):
@@ -60,7 +60,7 @@ class Boards(Section):
     rod, everything dealt out in turn). `central`: one board with everything, as on the older robot."""
     rate_hz: Positive = 50.0
     """Samples of a board a second [Hz]; it drives its motors at once when a command comes."""
-    rate_spread: Share = 0.01
+    rate_spread: Spread = 0.01
     """Boards differ in rate by this part (standard deviation, drawn from the seed)."""
     jitter_s: NonNegative = 0.001
     """Of every sample's instant [s], standard deviation."""

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.rig.camera.settings import CameraSettings
 from r2s2r_cli.rig.effects.parameters import Effects
-from r2s2r_cli.rig.section import Index, NonNegative, Positive, Real, Section, Vector2
+from r2s2r_cli.rig.section import Index, NonNegative, Positive, Real, Section, Share, Vector2
 from r2s2r_cli.rig.world.device import Boards, Inertial, Sensors
 from r2s2r_cli.rig.world.faults import Fault, Wire
 
@@ -20,7 +20,7 @@ class Floor(Section):
 
     friction: NonNegative | None = None
     """Coulomb coefficient under every cap; left out: that of `robot.toml`."""
-    restitution: NonNegative | None = None
+    restitution: Share | None = None
     """Left out: that of `robot.toml`."""
 
 

@@ -44,21 +44,21 @@ class PtyTransport:
                 received=error.strerror or str(error), hint="r2s2r rig --link tcp",
             ) from error  # fmt: skip
         tty.setraw(slave)
-        device = os.ttyname(slave)
+        self._device = os.ttyname(slave)
         os.set_blocking(self._master, False)
         # Once it was open and is no longer, the master reports a hang-up until somebody opens it.
         os.close(slave)
         self._poll.register(self._master, select.POLLIN | select.POLLHUP)
         self._gone = False
-        self.address = device if self._name is None else str(self._name)
+        self.address = self._device if self._name is None else str(self._name)
         if self._name is not None:
-            self._link(self._name, device)
+            self._link(self._name)
 
-    def _link(self, name: Path, device: str) -> None:
+    def _link(self, name: Path) -> None:
         try:
             if name.is_symlink():
                 name.unlink()
-            name.symlink_to(device)
+            name.symlink_to(self._device)
         except OSError as error:
             self.close()
             raise HardwareError(
@@ -111,7 +111,8 @@ class PtyTransport:
             self._outbox.clear()
             self._poll.unregister(self._master)
             os.close(self._master)
-            if self._name is not None and self._name.is_symlink():
+            # Another rig may have taken the name over since.
+            if self._name is not None and self._name.is_symlink() and str(self._name.readlink()) == self._device:
                 self._name.unlink()
 
     def _wait(self, timeout: float) -> int:

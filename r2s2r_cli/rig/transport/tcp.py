@@ -9,6 +9,7 @@ import time
 
 from r2s2r_cli.errors import HardwareError
 from r2s2r_cli.rig.transport.base import Event
+from r2s2r_cli.rig.transport.host import ipv4_of
 from r2s2r_cli.rig.transport.outbox import Outbox
 
 _CHUNK = 4096
@@ -113,10 +114,11 @@ class TcpTransport:
 
 
 def _listening(host: str, port: int) -> socket.socket:
+    address = ipv4_of(host, "tcp")
     listen = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
         listen.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listen.bind((host, port))
+        listen.bind((address, port))
         listen.listen()
     except OSError as error:
         listen.close()

@@ -9,10 +9,10 @@ import time
 
 from r2s2r_cli.errors import HardwareError
 from r2s2r_cli.rig.transport.base import Event
+from r2s2r_cli.rig.transport.host import ipv4_of
 
 PORT = 2390
 """Where the authors' boards send to."""
-_LOOPBACK = ("localhost",)
 _CHUNK = 2048
 _BURST = 64
 """Datagrams that are read of one board before another has its turn."""
@@ -25,7 +25,7 @@ class UdpTransport:
     connected = True
 
     def __init__(self, host: str = "127.0.0.1", port: int = PORT, *, boards: int = 1, shared: bool = False) -> None:
-        self._to = (host, port or PORT)
+        self._to = (ipv4_of(host, "udp"), port or PORT)
         self.address = f"udp://{host}:{self._to[1]}"
         self._shared, self._boards = shared, 1 if shared else boards
         self._sockets = self._open()
@@ -72,7 +72,7 @@ class UdpTransport:
     def _open(self) -> list[socket.socket]:
         sockets: list[socket.socket] = []
         # On the loopback alone where the host is: nobody else shall drive the rig.
-        own = "127.0.0.1" if self._to[0] in _LOOPBACK or self._to[0].startswith("127.") else "0.0.0.0"
+        own = "127.0.0.1" if self._to[0].startswith("127.") else "0.0.0.0"
         try:
             for _ in range(self._boards):
                 sockets.append(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))

@@ -113,6 +113,18 @@ def test_a_name_that_is_taken_is_refused(tmp_path: Path) -> None:
     assert (tmp_path / "robot").read_text() == "mine"
 
 
+def test_a_name_that_another_has_taken_over_stays(tmp_path: Path) -> None:
+    """A second rig replaces the link of the first, and keeps it when the first one ends."""
+    name = tmp_path / "robot"
+    first, second = PtyTransport(name), PtyTransport(name)
+    first.close()
+    fd = opened(str(name))
+    wait(second, "opened")
+    os.close(fd)
+    second.close()
+    assert not name.is_symlink()
+
+
 def test_a_host_that_does_not_read_blocks_nobody(pty: PtyTransport, tcp: TcpTransport) -> None:
     """A megabyte to a host that never reads is sent as far as there is room, and then lost, without waiting."""
     fd = opened(pty.address)
@@ -216,6 +228,15 @@ def test_udp_boards_speak_first_from_addresses_of_their_own(shared: bool) -> Non
     assert host.recv(100) == b"back"
     udp.close()
     host.close()
+
+
+@pytest.mark.parametrize("transport", [TcpTransport, UdpTransport])
+@pytest.mark.parametrize("host", ["nobody.invalid", "::1", "\u00fc" + "x" * 80])
+def test_a_host_that_is_none_is_one_clear_error(transport: type[TcpTransport] | type[UdpTransport], host: str) -> None:
+    """A name that nobody has is no port in use, and no rig that sends to nobody for ever."""
+    with pytest.raises(HardwareError, match="no such host") as caught:
+        transport(host)
+    assert host in caught.value.where
 
 
 def test_links_have_names() -> None:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from r2s2r_cli.commands.typed import typed_instead
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import InputError, UsageError, install_extra
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
@@ -135,8 +136,10 @@ def _measure(console: Console, robot: Robot, world: World, target: Path) -> None
         raise InputError("the robot has no sensors to measure", where="robot.toml", expected="[[sensors]]",
                          received="none", hint="r2s2r rig")  # fmt: skip
     if target.exists():
+        beside = target.with_name(f"{target.stem}-2.csv")
+        # As typed: another world or robot has other sensors.
         raise UsageError("a file is in the way of the table", where=str(target), expected="a new file",
-                         received="a file", hint=f"r2s2r rig --points {quote(target.stem)}-2.csv")  # fmt: skip
+                         received="a file", hint=typed_instead("rig", str(target), str(beside)))  # fmt: skip
     write_text(target, points_csv(robot, world))
     console.document(RigResult(robot=robot.name, points=str(target)))
     console.data(str(target))

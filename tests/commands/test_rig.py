@@ -104,10 +104,14 @@ def test_what_cannot_be_is_refused(project: Path, tmp_path: Path) -> None:
     assert invoke("rig", "--robot", "six/robot.toml", "--protocol", "legacy").exit_code == ExitCode.INPUT
 
 
-def test_the_bench_table_calibrates_the_robot(project: Path) -> None:
+def test_the_bench_table_calibrates_the_robot(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """`--points` writes what `calibrate` takes: lines within millimetres; a file in the way stays."""
     assert document("rig", "--points", "points.csv")["points"] == "points.csv"
-    assert invoke("rig", "--points", "points.csv").exit_code == ExitCode.USAGE
+    typed = ["rig", "--points", "points.csv", "--seed", "3"]
+    monkeypatch.setattr(sys, "argv", ["r2s2r", *typed])
+    refused = invoke(*typed)
+    assert refused.exit_code == ExitCode.USAGE
+    assert refused.stderr.endswith("hint: r2s2r rig --points points-2.csv --seed 3\n")  # of the same world
     assert invoke("calibrate", "--points", "points.csv").exit_code == 0
     robot = tomllib.loads((project / "robot.toml").read_text())
     assert [2e-11 < sensor["slope_f_per_m"] < 4e-11 for sensor in robot["sensors"]] == [True] * 9

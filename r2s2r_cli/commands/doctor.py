@@ -20,13 +20,15 @@ from r2s2r_cli.errors import GateError, R2S2RError, install_extra, quoted
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from schemas.results import DoctorResult, Probe
 
+OPEN3D_NEEDS = "libusb-1.0-0 libgl1 libegl1 libx11-6 libudev1 libidn2-0 libgomp1"
+"""Debian's packages of what open3d loads, as in README.md and .ci/system-libs."""
 LIBRARIES: dict[str, tuple[str, str]] = {
     "h5py": ("error", "pip install --force-reinstall h5py"),
     "torch": ("error", "pip install torch==2.13.0"),
     "cv2": ("error", "pip install --force-reinstall opencv-python-headless"),
     "serial": ("error", "pip install --force-reinstall pyserial"),
     "mujoco": ("warning", install_extra("rig")),
-    "open3d": ("warning", "apt-get install libusb-1.0-0 libgl1 libegl1 libx11-6 libudev1 libidn2-0"),
+    "open3d": ("warning", "sudo apt-get install " + OPEN3D_NEEDS),
 }
 """What is imported, in a process of its own; what its failure means; the remedy."""
 IMPORT_LIMIT_S = 60
@@ -75,9 +77,9 @@ def doctor(
 def _installation() -> Iterator[Probe]:
     from r2s2r_cli.store.provenance import package_versions, source_commit
 
-    ours = sys.version_info >= (3, 11)
+    ours = (3, 11) <= sys.version_info < (3, 13)  # as pyproject.toml says
     yield Probe(name="python", state="ok" if ours else "error", found=platform.python_version(),
-                hint="" if ours else "install Python 3.11 or newer")  # fmt: skip
+                hint="" if ours else "install Python 3.11 or 3.12")  # fmt: skip
     commit, dirty = source_commit()
     origin = f"checkout {commit[:12]}{' (dirty)' if dirty else ''}" if commit else "installed package"
     yield Probe(name="r2s2r", state="ok", found=f"{__version__}, {origin}")
@@ -134,14 +136,9 @@ def _outlets() -> Iterator[Probe]:
 
 def _library(name: str, failed_state: str, hint: str) -> Probe:
     code = f"import time; t = time.time(); import {name}; print(f'{{time.time() - t:.1f}} s')"
-    try:
-        child = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, timeout=IMPORT_LIMIT_S, check=False
-        )
-        failure = "" if child.returncode == 0 else (child.stderr.strip().splitlines() or ["it crashed"])[-1]
-        found = failure or f"imports in {child.stdout.split()[-2]} s"
-    except subprocess.TimeoutExpired:
-        failure = found = f"its import took over {IMPORT_LIMIT_S} s"
+    works, said = _tried(code)
+    failure = "" if works else said
+    found = failure or f"imports in {said}"
     return Probe.model_validate(
         {"name": f"import {name}", "state": failed_state if failure else "ok", "found": found[:200],
          "hint": hint if failure else ""}
@@ -156,13 +153,21 @@ def _hdf5() -> Probe:
         "f = h5py.File(p, 'r', locking=False); assert f['x'][1] == 2; f.close();"
         "os.unlink(p); os.rmdir(d); print(h5py.version.hdf5_version)"
     )
-    child = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=IMPORT_LIMIT_S, check=False
-    )
-    works = child.returncode == 0
-    lines = (child.stdout if works else child.stderr).strip().splitlines() or ["it crashed"]
-    return Probe(name="HDF5 write and read", state="ok" if works else "error", found=lines[-1][:200],
+    works, said = _tried(code)
+    return Probe(name="HDF5 write and read", state="ok" if works else "error", found=said[:200],
                  hint="" if works else "pip install --force-reinstall h5py")  # fmt: skip
+
+
+def _tried(code: str) -> tuple[bool, str]:
+    """Whether Python code ran to its end in a process of its own, and the last line of what it said."""
+    try:
+        child = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, timeout=IMPORT_LIMIT_S, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return False, f"it took over {IMPORT_LIMIT_S} s"
+    works = child.returncode == 0
+    return works, ((child.stdout if works else child.stderr).strip().splitlines() or ["it crashed"])[-1]
 
 
 doctor_app.command("ports")(ports)

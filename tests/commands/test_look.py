@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shlex
 import sys
 from pathlib import Path
@@ -232,6 +233,35 @@ def test_doctor_names_the_package_to_install(project: Path, monkeypatch: pytest.
     result = invoke("doctor")
     assert result.exit_code == 3
     assert result.stderr.splitlines()[-1] == "hint: apt-get install it"
+
+
+def test_doctor_on_a_machine_that_is_too_slow(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What does not end in time has failed, the trial of HDF5 as well: a gate, no traceback."""
+    module = sys.modules["r2s2r_cli.commands.doctor"]
+    monkeypatch.setattr(module, "LIBRARIES", {})
+    monkeypatch.setattr(module, "IMPORT_LIMIT_S", 0.001)
+    result = invoke("doctor")
+    assert result.exit_code == 3
+    assert "received: it took over 0.001 s" in result.stderr
+
+
+@pytest.mark.parametrize("version", [(3, 10), (3, 13)])
+def test_doctor_knows_which_python_is_ours(version: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
+    """That of pyproject.toml: 3.11 or 3.12."""
+    module = sys.modules["r2s2r_cli.commands.doctor"]
+    monkeypatch.setattr(module.sys, "version_info", version)
+    probe = next(module._installation())
+    monkeypatch.undo()
+    assert (probe.state, probe.hint) == ("error", "install Python 3.11 or 3.12")
+
+
+def test_doctor_and_the_readme_name_the_same_packages_for_open3d() -> None:
+    """What open3d loads: one list, also where the machine is set up."""
+    module, root = sys.modules["r2s2r_cli.commands.doctor"], Path(__file__).parents[2]
+    assert f"sudo apt-get install {module.OPEN3D_NEEDS} " in (root / "README.md").read_text()
+    listed = re.search(r'wanted="(.*?)"', (root / ".ci" / "system-libs").read_text(), re.DOTALL)
+    assert listed is not None
+    assert [row.split()[1] for row in listed[1].splitlines()] == module.OPEN3D_NEEDS.split()
 
 
 def test_bench_prints_ratios(project: Path) -> None:

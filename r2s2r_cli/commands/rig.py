@@ -171,7 +171,7 @@ def _need_mujoco() -> None:
 
 @contextmanager
 def _until_told(seconds: float | None) -> Iterator[Callable[[], bool]]:
-    """A function that says whether it is time to end: Ctrl-C, SIGTERM, or the time asked for.
+    """A function that says whether it is time to end: Ctrl-C, SIGTERM, a closed terminal, or the time asked for.
 
     A second signal insists: it interrupts whatever the loop may hang in.
     """
@@ -182,7 +182,9 @@ def _until_told(seconds: float | None) -> Iterator[Callable[[], bool]]:
             raise KeyboardInterrupt
         told.set()
 
-    before = {number: signal.signal(number, tell) for number in (signal.SIGINT, signal.SIGTERM)}
+    # With nohup a rig outlives its terminal. SIGINT is ignored for every `rig &` of a script, and must end that too.
+    closed = () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)
+    before = {number: signal.signal(number, tell) for number in (signal.SIGINT, signal.SIGTERM, *closed)}
     end = None if seconds is None else time.monotonic() + seconds
     try:
         yield lambda: told.is_set() or (end is not None and time.monotonic() >= end)

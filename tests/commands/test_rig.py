@@ -39,9 +39,12 @@ def running(folder: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
         child.communicate()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, *(pytest.param(one, marks=pytest.mark.slow) for one in (signal.SIGTERM, signal.SIGHUP))]
+)
 def test_it_prints_the_device_and_ends_when_told(project: Path, number: signal.Signals) -> None:
-    """One line on stdout, which can be opened; Ctrl-C and SIGTERM both end it well, and the name of the device goes."""
+    """One line on stdout, which can be opened; Ctrl-C, SIGTERM and a closed terminal end it well, and the name of the
+    device goes: later it could lead to another terminal."""
     with running(project, "--device", "robot") as child:
         assert child.stdout is not None
         assert child.stdout.readline() == "robot\n"

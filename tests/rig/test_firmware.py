@@ -206,6 +206,18 @@ def test_a_reset_board_forgets_everything() -> None:
     assert plant.truth().angle[0] / plant.winches._full[0] == pytest.approx(0.5 * 0.2, rel=0.03)
 
 
+@pytest.mark.parametrize("apart", [0.0, 1e-3, -1e-3])
+def test_boards_that_reset_together_all_forget(apart: float) -> None:
+    """At one time, and within one gap between samples in either order."""
+    first, second = ({"kind": "board_reset", "board": board, "at_s": at, "for_s": 0.3}
+                     for board, at in ((0, 0.2), (2, 0.2 + apart)))  # fmt: skip
+    motors = {board: set(make()[0]._boards[board].post.motors) for board in (0, 2)}
+    firmware, _ = make(faults=[first, second])
+    firmware.command(np.full(6, 0.5), 0.0)
+    run(firmware, 0.4)
+    assert set(np.flatnonzero(firmware.duty == 0.0).tolist()) == motors[0] | motors[2] and all(motors.values())
+
+
 def test_a_fault_of_a_board_that_is_not_there_is_refused() -> None:
     """The message names the key, the numbers that there are, and why."""
     with pytest.raises(UsageError) as error:

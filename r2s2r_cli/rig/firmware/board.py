@@ -50,9 +50,9 @@ class Board:
         """It sends nothing."""
         return self.down(t) or any(fault.on(t) for fault in self._silent)
 
-    def restarts(self, begin: float, end: float) -> float | None:
-        """When a reset begins within (begin, end] [s]; None: none does."""
-        return next((reset.at_s for reset in self._resets if begin < reset.at_s <= end), None)
+    def restarts(self, begin: float, end: float) -> list[float]:
+        """When resets begin within (begin, end] [s]."""
+        return [reset.at_s for reset in self._resets if begin < reset.at_s <= end]
 
     def greeting(self, t: float) -> str | None:
         """The text with which it comes back, once after each reset."""

@@ -92,11 +92,11 @@ class Firmware:
             board = min(self._boards, key=lambda b: b.due)
             due = min([board.due, *(when for when, _ in self._later)])
             end = min(due, t)
-            for other in self._boards:
-                at = other.restarts(self._plant.t, end)
-                if at is not None:
-                    self._go(at)
-                    self._duty[list(other.post.motors)] = 0.0
+            # All of them before the first is gone to: by then two of one time would lie behind.
+            restarts = [(at, b.post.motors) for b in self._boards for at in b.restarts(self._plant.t, end)]
+            for at, motors in sorted(restarts):
+                self._go(at)
+                self._duty[list(motors)] = 0.0
             self._go(end)
             if due > t:
                 return samples

@@ -144,11 +144,14 @@ class Executor:
     ) -> Executed:
         """Targets (B, S, actuated) from where the robots stand, with the robot's controller; no time is held.
 
-        counts: how many of its targets each is to reach, (B,); None: all. record: keep every tick.
+        counts: how many of its targets each is to reach, (B,); None: all. record: keep every tick. B may be 0.
         """
         import torch
 
         counts = np.full(len(at), targets.shape[1]) if counts is None else np.asarray(counts)
+        if not len(at):
+            nothing = np.zeros((0, targets.shape[1]), dtype=bool)
+            return Executed((at,) * targets.shape[1], nothing.astype(np.int64), nothing, np.zeros(0, dtype=bool), counts)
         parts = []
         for first in range(0, len(at), CHUNK):
             rows = np.arange(first, min(first + CHUNK, len(at)))

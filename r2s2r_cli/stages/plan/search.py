@@ -82,7 +82,7 @@ class Search:
         """All gaits that come back to rest, each with its outcome: simulated, or told by a pose of its class."""
         levels: list[_Level] = []
         gaits: list[Gait] = []
-        parts: list[Outcomes] = []
+        parts = [_none()]
         motors = self.executor.structure.n_actuated
         origin = np.ones((1, 0, motors))
         closed: _Closed | None = None
@@ -93,6 +93,8 @@ class Search:
                 going = self._promising(levels[-1], closed)
                 level = self._expanded(levels[-1].at, levels[-1].targets, going, levels[-1].ticks)
             levels.append(level)
+            if not len(level.ticks):
+                break  # every target was given up, or there are no other shapes: nothing goes on from here
             closed = self._closed(level)
             made, came = self._unfolded(levels, closed)
             gaits += made
@@ -193,8 +195,10 @@ class Search:
 
 def best_of(found: Found, reward: Reward, count: int, *, apart_m: float = 0.002, apart_rad: float = 0.01) -> list[int]:
     """Rows of the `count` gaits with the highest reward, of those with one outcome only the one that switches fewest
-    cables. apart: outcomes nearer than this on the same triangle are one."""
+    cables. apart: outcomes nearer than this on the same triangle are one. Of no gaits no reward is asked."""
     came = found.outcomes
+    if not len(came):
+        return []
     value = reward(came)
     place = np.round(np.column_stack([came.com[:, :2] / apart_m, came.turn / apart_rad])).astype(int)
     seen_keys: dict[tuple[int, ...], int] = {}

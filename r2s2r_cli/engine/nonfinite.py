@@ -83,7 +83,8 @@ def _terms(structure: Structure, s: Tensor, p: Tensor, h: Tensor) -> Iterator[tu
     turn = gyroscopic(theta, rods.inverse_inertia, rods.w, h)
     yield "rod", "gyroscopic change of angular velocity", turn
     v, w = rods.v + h[..., None] * theta.gravity[:, None] + dv, rods.w + turn + dw
-    ground = contact_rows(structure, theta, rods, v, w, h)
+    memory = {effect.name: state.of(effect.name) for effect in structure.effects}
+    ground = contact_rows(structure, theta, rods, v, w, h, memory)
     yield "rod", "contact mobility", ground.mobility
     yield "rod", "contact velocity", ground.free
     yield "rod", "contact impulse", solve(structure, ground)

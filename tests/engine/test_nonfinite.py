@@ -8,7 +8,10 @@ import pytest
 import torch
 from torch import Tensor
 
+from r2s2r_cli.effects import Effect, EffectParameter, with_off_values
+from r2s2r_cli.effects.soft_ground import SoftGround
 from r2s2r_cli.engine import (
+    Channel,
     EngineInputError,
     NonFiniteError,
     Parameters,
@@ -20,6 +23,7 @@ from r2s2r_cli.engine import (
     pack_parameters,
     pack_state,
 )
+from r2s2r_cli.engine.hooks import Values, WorldTerms
 from r2s2r_cli.engine.nonfinite import require_finite
 from tests.support.engine import G, free_rods, lying, parameters, simulator, state, vector
 from tests.support.robots import rested, subject
@@ -176,3 +180,31 @@ def test_the_closed_loop_stops_too() -> None:
     with pytest.raises(NonFiniteError):
         closed_loop(robot.simulator, heavy, rested().state, robot.pid(), torch.zeros(1, 6, dtype=torch.float64),
                     torch.zeros(1), torch.tensor([0.2]))  # fmt: skip
+
+
+class _Torn(Effect):
+    name = "torn"
+    channel = Channel.WORLD
+    title = "a force beyond all numbers"
+    own = (EffectParameter("force_n", "N", 0.0, 1.0, off=0.0, scale=1.0, what="times 1e400, upwards"),)
+
+    @classmethod
+    def signature(cls) -> str:
+        """Gone."""
+        return "gone"
+
+    def world(self, x: Values, terms: WorldTerms, force: Tensor, torque: Tensor) -> tuple[Tensor, Tensor]:
+        """Infinite but for 0."""
+        return force + terms.R_GR[..., 2] * (x["force_n"] * 1e200)[..., None] * 1e200, torque
+
+
+def test_the_culprit_is_named_on_soft_ground_as_well() -> None:
+    """A ground that gives way has a memory, which the search for the first bad term needs as the step does."""
+    plain, theta, start = pair()
+    structure = plain.with_effects(SoftGround(), _Torn())
+    theta = with_off_values(structure, theta)
+    theta = theta.with_values({"torn.force_n": torch.ones(1, 1, dtype=torch.float64)})
+    sunk = torch.zeros(1, 6, dtype=torch.float64)
+    error = caught(structure, theta, replace(start, extra={"soft_ground.sunk": sunk}), steps=1, every=1)
+    assert (error.step, error.term) == (0, "v_WB")
+    assert error.body.startswith("rod")

@@ -192,8 +192,8 @@ class Simulator:
         """The size of the batch, after all inputs were looked at. Raises EngineInputError."""
         if substeps is not None and substeps < 1:
             raise EngineInputError("substeps", "no step", expected="at least 1", received=str(substeps))
-        looked_at = (theta, sum(x._version for x in tensors_of(theta).values()))
-        if self._checked is None or self._checked[0] is not theta or self._checked[1] != looked_at[1]:
+        looked_at = (theta, _written(theta))
+        if self._checked is None or self._checked[0] is not theta or not 0 <= self._checked[1] == looked_at[1]:
             check_parameters(self.structure, theta)
             self._checked, self._always = looked_at, always_stable_step(self.structure, theta)
         check_state(self.structure, state0)
@@ -215,6 +215,13 @@ class Simulator:
         if self.structure.detach == Detach.IMPULSE and duration > IMPULSE_WINDOW:
             _warn_of_impulse(duration)
         return common_batch({"commands": commands, **tensors_of(state0), **tensors_of(theta)})
+
+
+def _written(theta: Parameters) -> int:
+    """How often its tensors were written into since they were made; -1 where torch does not count, which is so for
+    those of `torch.inference_mode`."""
+    tensors = tensors_of(theta).values()
+    return -1 if any(x.is_inference() for x in tensors) else sum(x._version for x in tensors)
 
 
 def _warn_of_impulse(duration: float) -> None:

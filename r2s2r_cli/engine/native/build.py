@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from threading import RLock
@@ -80,7 +81,10 @@ class Builder:
     def program(self, dtype: torch.dtype) -> Forward:
         """The traced step. Raises TracingError."""
         if dtype not in self._programs:
-            self._programs[dtype] = forward_program(self._fn, *self._sizes, dtype)
+            # In inference mode torch decomposes nothing, and what it does not decompose cannot be traced.
+            inference = torch.is_inference_mode_enabled()
+            with torch.inference_mode(False) if inference else nullcontext():
+                self._programs[dtype] = forward_program(self._fn, *self._sizes, dtype)
         return self._programs[dtype]
 
     def _make(self, kernel: Kernel) -> Callable[..., None]:

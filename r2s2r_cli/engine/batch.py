@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
+from typing import TYPE_CHECKING
 
 from torch import Tensor
 
 from r2s2r_cli.engine.errors import EngineInputError
-from r2s2r_cli.engine.parameters import Parameters
-from r2s2r_cli.engine.state import State
+
+if TYPE_CHECKING:
+    from r2s2r_cli.engine.parameters import Parameters
+    from r2s2r_cli.engine.state import State
 
 
 def tensors_of(x: State | Parameters) -> dict[str, Tensor]:

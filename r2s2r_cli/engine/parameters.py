@@ -13,6 +13,7 @@ from functools import cached_property
 import torch
 from torch import Tensor
 
+from r2s2r_cli.engine.batch import common_batch
 from r2s2r_cli.engine.errors import EngineInputError
 from r2s2r_cli.engine.structure import Structure
 
@@ -136,7 +137,8 @@ def check_parameters(structure: Structure, theta: Parameters) -> None:
                 received=str(tuple(tensor.shape)),
             )
         if not torch.isfinite(tensor).all():
-            raise EngineInputError(name, "not a finite number", expected="finite numbers", received=_where(tensor))
+            bad = ~torch.isfinite(tensor)
+            raise EngineInputError(name, "not a finite number", expected="finite numbers", received=_where(tensor, bad))
     for name in ("mass", "cap_radius", "stiffness", "impact_speed"):
         _require(theta, name, "above 0", getattr(theta, name) > 0)
     for name in ("rod_radius", "friction", "restitution", "rod_friction", "damping", "tendon_stiffness", "speed_in",
@@ -145,18 +147,23 @@ def check_parameters(structure: Structure, theta: Parameters) -> None:
     if structure.axial:
         _require_axial(theta)
     _require(theta, "restitution", "0 to 1", theta.restitution <= 1)
+    common_batch({"rest_min": theta.rest_min, "rest_max": theta.rest_max})
     _require(theta, "rest_min", "at most rest_max", theta.rest_min <= theta.rest_max)
     length = torch.linalg.vector_norm(theta.p_BE[..., 1, :] - theta.p_BE[..., 0, :], dim=-1)
     if not bool((length > 0).all()):
-        raise EngineInputError("p_BE", "a rod of zero length", expected="two different caps", received=_where(length))
+        raise EngineInputError(
+            "p_BE", "a rod of zero length", expected="two different caps", received=_where(length, length <= 0)
+        )
     diagonal = torch.linalg.eigvalsh(theta.inertia)
     if not bool((diagonal > 0).all()):
-        raise EngineInputError("inertia", "not an inertia", expected="positive definite", received=_where(diagonal))
+        raise EngineInputError(
+            "inertia", "not an inertia", expected="positive definite", received=_where(diagonal, diagonal <= 0)
+        )
 
 
 def _require(theta: Parameters, name: str, rule: str, good: Tensor) -> None:
     if not bool(good.all()):
-        tensor = getattr(theta, name)
+        tensor = getattr(theta, name).expand_as(good)  # compared with a field of a larger batch it is shared
         index = tuple(int(i) for i in torch.nonzero(~good)[0])
         raise EngineInputError(
             f"{name}.{'.'.join(map(str, index[1:]))}",
@@ -181,7 +188,7 @@ def _require_axial(theta: Parameters) -> None:
                                received=f"{float(theta.p_BE[..., :2].abs().amax()):g} m off it")  # fmt: skip
 
 
-def _where(tensor: Tensor) -> str:
-    bad = ~torch.isfinite(tensor) | (tensor <= 0)
+def _where(tensor: Tensor, bad: Tensor) -> str:
+    """The first number that is bad, and its place without the batch axis."""
     index = tuple(int(i) for i in torch.nonzero(bad)[0])
     return f"{float(tensor[index]):g} at {index[1:]}"

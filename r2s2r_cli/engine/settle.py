@@ -76,7 +76,7 @@ def settled(
     _check("p_WE", p_WE, (2 * structure.n_rods, 3))
     wanted = cap_lengths(cable_caps, p_WE) if lengths is None else lengths
     _check("lengths", wanted, (structure.n_cables,))
-    batch = max(len(p_WE), len(theta.mass), len(wanted))
+    batch = _batch(p_WE=p_WE, R_WR=R_WR, lengths=wanted, mass=theta.mass)
     p_WE, wanted = p_WE.expand(batch, -1, -1), wanted.expand(batch, -1)
     seen = effective(structure, theta)  # as effects make the robot; the step is handed what it was before
     state = pose_state(structure, seen, p_WE, along(p_WE, R_WR), rest=p_WE.new_zeros(len(p_WE), structure.n_actuated))
@@ -126,6 +126,19 @@ def _check(name: str, observed: Tensor, shape: tuple[int, ...]) -> None:
         )  # fmt: skip
 
 
+def _batch(**tensors: Tensor) -> int:
+    """The one batch of observations, parameters and states, those of batch 1 being shared. Raises EngineInputError,
+    naming the first that is of another one, or of none."""
+    batch = max(map(len, tensors.values()))
+    for name, tensor in tensors.items():
+        if len(tensor) not in (1, batch) or batch == 0:
+            raise EngineInputError(
+                name, "another batch", expected=f"{batch} or 1" if batch > 1 else "at least 1",
+                received=str(len(tensor)),
+            )  # fmt: skip
+    return batch
+
+
 def window_state(
     simulator: Simulator,
     theta: Parameters,
@@ -140,13 +153,14 @@ def window_state(
 
     carried: gives roll (turned by the smallest rotation on to the observed axes), the rest lengths of slack winched
     cables, effect states, and velocities where v_WE (B, cap, 3) [m/s] is None. Tensions balance the observed pose, but
-    cables longer than seen by more than `loose` [m] hang.
+    cables longer than seen by more than `loose` [m] hang. Raises EngineInputError.
     """
     structure = simulator.structure
     _check("p_WE", p_WE, (2 * structure.n_rods, 3))
     if v_WE is not None:
         _check("v_WE", v_WE, (2 * structure.n_rods, 3))
-    batch = max(len(p_WE), len(theta.mass), len(carried.p_WB))
+    given = {} if v_WE is None else {"v_WE": v_WE}
+    batch = _batch(p_WE=p_WE, **given, mass=theta.mass, carried=carried.p_WB)
     p_WE = p_WE.expand(batch, -1, -1)
     R_WR = along(p_WE, roma.unitquat_to_rotmat(carried.q_WR).expand(len(p_WE), -1, -1, -1))
     rest = carried.rest.expand(len(p_WE), -1)

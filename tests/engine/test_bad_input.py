@@ -80,6 +80,30 @@ def test_impossible_parameters(case: str) -> None:
     assert error.value.field == field
 
 
+@pytest.mark.parametrize(("name", "index"), [("gravity", (0, 2)), ("p_BE", (0, 1, 0, 2)), ("inertia", (0, 2, 1, 1))])
+def test_the_number_that_is_none_is_shown(name: str, index: tuple[int, ...]) -> None:
+    """Of a field with zeros and negative numbers, which are good there, the NaN is shown, and its place."""
+    structure, theta, _ = threebar_engine()
+    with pytest.raises(EngineInputError) as error:
+        check_parameters(structure, with_parameter(name, index, math.nan)(theta))
+    assert (error.value.field, error.value.received) == (name, f"nan at {index[1:]}")
+
+
+def test_winch_ends_of_different_batches() -> None:
+    """One end shared by three robots: the winch of the third whose ends are crossed is named. Batches that do not fit:
+    the odd one is named."""
+    structure, theta, start = threebar_engine()
+    longest = changed(theta.rest_max.expand(3, -1), (2, 1), 1e-3)
+    with pytest.raises(EngineInputError) as error:
+        simulator(structure).rollout(replace(theta, rest_max=longest), start, STILL)
+    assert error.value.field == "rest_min.1"
+    with pytest.raises(EngineInputError) as error:
+        simulator(structure).rollout(
+            replace(theta, rest_max=longest, rest_min=theta.rest_min.expand(2, -1)), start, STILL
+        )
+    assert error.value.field == "rest_max"
+
+
 @pytest.mark.parametrize("case", list(STATES))
 def test_impossible_states(case: str) -> None:
     """Each impossible state raises an error that names its field, alone and through the simulator."""

@@ -151,7 +151,9 @@ class Executor:
         counts = np.full(len(at), targets.shape[1]) if counts is None else np.asarray(counts)
         if not len(at):
             nothing = np.zeros((0, targets.shape[1]), dtype=bool)
-            return Executed((at,) * targets.shape[1], nothing.astype(np.int64), nothing, np.zeros(0, dtype=bool), counts)
+            return Executed(
+                (at,) * targets.shape[1], nothing.astype(np.int64), nothing, np.zeros(0, dtype=bool), counts
+            )
         parts = []
         for first in range(0, len(at), CHUNK):
             rows = np.arange(first, min(first + CHUNK, len(at)))

@@ -93,12 +93,14 @@ class Asked:
     def request(self, settings: PlanSettings) -> Request:
         """The request. Raises UsageError for behaviours and goals that cannot be read, InputError for an
         identification of another robot."""
+        from r2s2r_cli.stages.plan.choose import short_names
         from r2s2r_cli.stages.plan.rewards import BEHAVIOURS, reward_named
         from r2s2r_cli.stages.plan.stage import Request
 
         names = dict.fromkeys(self.behaviours or BEHAVIOURS)
         with _importable(self.project.root):
             rewards = {name: reward_named(name) for name in names}
+        short_names(names)  # a name that no gait can have is said now, not after the search
         goals = {_goal_name(k, len(self.to)): self._goal(text, settings) for k, text in enumerate(self.to)}
         return Request(self.belief(), rewards, goals, self.seed, self.reach())
 

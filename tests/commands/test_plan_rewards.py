@@ -113,6 +113,14 @@ def test_a_file_of_a_reward_that_cannot_be_imported(project: Path, text: str, li
     assert f"wish_d{line}.py, line {line}" in result.stderr and "Traceback" not in result.stderr
 
 
+def test_a_name_that_no_gait_can_have(project: Path) -> None:
+    """Said before the search, with exit code 2."""
+    (project / "wish_e.py").write_text(MINE.replace("forward", "_forward"))
+    result = invoke("plan", "--behaviour", "wish_e:_forward", "--dry-run")
+    assert result.exit_code == 2, result.stderr
+    assert "--behaviour wish_e:_forward" in result.stderr and "letter or digit" in result.stderr
+
+
 @pytest.mark.slow
 def test_a_behaviour_of_ones_own_is_planned_beside_those_of_the_paper(project: Path) -> None:
     """Under a name of its own, though its function is called as one of them; the artifact validates. Another function

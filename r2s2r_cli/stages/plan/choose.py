@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from r2s2r_cli.errors import UsageError
+from r2s2r_cli.stages.import_.run import RUN_NAME
 from r2s2r_cli.stages.plan.executor import Executor
 from r2s2r_cli.stages.plan.gaits import Gait
 from r2s2r_cli.stages.plan.placement import Reference
@@ -73,13 +75,19 @@ def shortlist(found: Found, rewards: Mapping[str, Reward], count: int) -> dict[s
 
 def short_names(behaviours: Iterable[str]) -> dict[str, str]:
     """What gaits of each behaviour are called: the last word of `package.module:function`, and as many words before it
-    as tell it from the others; one word is called as it is."""
+    as tell it from the others; one word is called as it is. Raises UsageError where no policy may be called so."""
     parts = {name: re.split(r"[.:]", name) for name in behaviours}
     found: dict[str, str] = {}
     for name, words in parts.items():
         taken = [other for key, other in parts.items() if key != name]
         count = next((n for n in range(1, len(words)) if all(other[-n:] != words[-n:] for other in taken)), len(words))
         found[name] = "-".join(words[-count:])
+        if not re.fullmatch(RUN_NAME, found[name]):
+            raise UsageError(
+                "gaits cannot be named after this behaviour", where=f"--behaviour {name}", received=found[name],
+                expected="a name that begins with a letter or digit; letters, digits, _ . + -",
+                hint="--behaviour forward",
+            )  # fmt: skip
     return found
 
 

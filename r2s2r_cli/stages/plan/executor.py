@@ -18,6 +18,7 @@ from r2s2r_cli.stages.model import structure_of
 from r2s2r_cli.stages.plan.belief import Belief
 from r2s2r_cli.stages.plan.standing import Executed, Standing, stacked
 from r2s2r_cli.stages.plan.together import run_together
+from r2s2r_cli.stages.ticks import whole_steps
 from schemas.robot import Robot
 
 if TYPE_CHECKING:
@@ -36,7 +37,8 @@ class Executor:
 
     draws: values (K, n) of the belief's parameters. timeout_s: a target that takes longer is given up. hurried: one
     that stalls is given up at once, and what comes after it is not simulated; else the timeout of the robot passes.
-    bias: what the controller reads too much of every cable [m], (K, cable); None: nothing.
+    bias: what the controller reads too much of every cable [m], (K, cable); None: nothing. Raises InputError where
+    `step` [s] does not divide the control period.
     """
 
     def __init__(
@@ -47,7 +49,7 @@ class Executor:
         import torch
 
         from r2s2r_cli.engine.flat import pack_parameters
-        from r2s2r_cli.engine.pid import steps_a_tick, ticks
+        from r2s2r_cli.engine.pid import ticks
         from r2s2r_cli.engine.rollout import Simulator
         from r2s2r_cli.stages.identify.free import Mapping
 
@@ -66,7 +68,7 @@ class Executor:
         none = np.zeros((len(draws), len(robot.cables)))
         self.bias = torch.as_tensor(none if bias is None else bias, dtype=torch.float64)
         self.period = 1.0 / robot.pid.rate_hz
-        self.whole = steps_a_tick(self.period, step)
+        self.whole = whole_steps(robot, step, "plan.step_s")
         self.cable_caps = tuple((a, b) for a, b in (cable.caps for cable in robot.cables))
         late = torch.tensor([self.mapping.observation(row).command_delay for row in draws], dtype=torch.float64)
         measured, numbers = belief.model.command_delay, own.observation(belief.model.values).command_delay

@@ -16,6 +16,7 @@ from r2s2r_cli.stages.init.attachment import rod_frames
 from r2s2r_cli.stages.simulate.frames import centre_of_mass, frame_datasets, joined, stored_rows, without_first
 from r2s2r_cli.stages.simulate.policies import Sequence
 from r2s2r_cli.stages.simulate.replay import Replay
+from r2s2r_cli.stages.ticks import whole_steps
 from schemas.config import SimulateSettings
 from schemas.robot import Robot
 
@@ -182,19 +183,8 @@ class Driver:
 
     def _ticks_a_frame(self) -> int:
         """Control ticks from one stored frame to the next. Raises InputError where the step does not fit."""
-        from r2s2r_cli.engine import EngineInputError
-        from r2s2r_cli.engine.pid import steps_a_tick
-
-        rate, wanted = self.robot.pid.rate_hz, self.settings.frame_rate_hz
-        try:
-            steps_a_tick(self.period, self.settings.step_s)
-        except EngineInputError as error:
-            raise InputError(
-                "the engine step does not divide the control period", where="simulate.step_s",
-                expected=f"{self.period:g} s (pid.rate_hz {rate:g}) over a whole number",
-                received=f"{self.settings.step_s:g} s", hint=f"--set simulate.step_s={self.period / 20!r}",
-            ) from error  # fmt: skip
-        return max(1, round(rate / wanted))
+        whole_steps(self.robot, self.settings.step_s, "simulate.step_s")
+        return max(1, round(self.robot.pid.rate_hz / self.settings.frame_rate_hz))
 
     def _read(self, states: State, rows: np.ndarray, substeps: int) -> dict[str, np.ndarray]:
         h = self.settings.step_s / substeps

@@ -58,8 +58,10 @@ def unseen(structure: Structure, theta: Parameters, p_WE: Tensor) -> Tensor:
         return p_WE
     basis = torch.cat([torch.zeros_like(p_WE[:1, :1]), torch.eye(3, dtype=p_WE.dtype, device=p_WE.device)[None]], dim=1)
     now = torch.zeros(1, dtype=p_WE.dtype, device=p_WE.device)
-    # A single frame at a time of its own: nothing to interpolate. An even number of points, as caps come in pairs.
-    shown = observe(structure, theta, now, basis[:, None])[:, 0]
+    # A single frame at a time of its own: nothing to interpolate. Every point as both caps of a rod: taken for each
+    # other they are what they were.
+    points = basis[0, :, None, None].expand(-1, 1, 2, -1)
+    shown = torch.cat([observe(structure, theta, now, point[None])[:, 0, :1] for point in points], dim=1)
     shift, turn = shown[:, :1], (shown[:, 1:] - shown[:, :1]).mT
     known = torch.isfinite(turn).all()
     return torch.linalg.solve(turn[:, None], (p_WE - shift)[..., None])[..., 0] if bool(known) else p_WE

@@ -94,6 +94,16 @@ def test_what_was_seen_is_taken_back(plain: Variant) -> None:
     assert unseen(plain.structure, plain.theta, p_WE) is p_WE
 
 
+@pytest.mark.parametrize("swapped", [0.1, 0.2, 0.3])
+def test_the_camera_is_undone_whatever_the_tracker_mistakes(plain: Variant, swapped: float) -> None:
+    """Caps that are taken for each other in the very frame that is asked about are no part of where the camera is."""
+    p_WE = torch.randn(3, 4, 3, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
+    now, turned = torch.zeros(1, dtype=torch.float64), {"turn_x_rad": 0.05, "shift_y_m": 0.02}
+    shown = seen(with_(plain, CameraPose(), **turned), now, p_WE[:, None])[:, 0]
+    model = with_(plain, CameraPose(), Dropout(), swapped=swapped, **turned)
+    assert torch.allclose(unseen(model.structure, model.theta, shown), p_WE, rtol=0, atol=1e-13)
+
+
 def test_camera_scale_stretches_rods(plain: Variant) -> None:
     """Rods are seen 2 % too long."""
     p_WE = torch.randn(1, 2, 4, 3, generator=torch.Generator().manual_seed(0), dtype=torch.float64)

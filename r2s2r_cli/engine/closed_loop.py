@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -73,6 +74,14 @@ def closed_loop(
     check_parameters(structure, theta)
     check_state(structure, state0)
     _check_policy(structure, targets, holds, timeouts)
+    if (tuple(pid.actuated), len(pid.cable_caps)) != (tuple(structure.actuated), structure.n_cables):
+        raise EngineInputError(
+            "pid.actuated", "the controller of another robot",
+            expected=f"motors of cables {structure.actuated} of {structure.n_cables}",
+            received=f"{pid.actuated} of {len(pid.cable_caps)}",
+        )  # fmt: skip
+    if not (math.isfinite(tail) and tail >= 0):
+        raise EngineInputError("tail", "no time to wait", expected="0 s or more, finite", received=f"{tail:g} s")
     late = delay_of(structure, theta)
     if late is not None:
         given = Link() if link is None else link

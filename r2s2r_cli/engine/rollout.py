@@ -120,25 +120,35 @@ class Simulator:
 
         d_parameters: (NP, D), the Jacobian of `pack_parameters` with respect to what is differentiated; d_state:
         (NS, D) likewise of `pack_state`; d_commands: (row, actuated, D); each may have a batch axis before. None: zero.
-        Returns the trajectory and the tangents of its flat states (B, frame, NS, D).
+        Returns the trajectory and the tangents of its flat states (B, frame, NS, D). Raises as `rollout`.
         """
         batch = self._checked_batch(theta, state0, commands, step, hold, every, substeps)
         n = substeps or self.substeps(theta, state0, step)
         s0 = pack_state(self.structure, state0).expand(batch, -1).contiguous()
         rows = commands.shape[1]
-        given = commands.expand(batch, -1, -1).contiguous()
-        u, hold, by_delay = self._arriving(theta, given, step, hold, tangents=d_parameters is not None)
+        repeated = commands.expand(batch, -1, -1).contiguous()
+        u, hold, by_delay = self._arriving(theta, repeated, step, hold, tangents=d_parameters is not None)
         p = pack_parameters(self.structure, theta)
 
-        def spread(x: Tensor | None, axes: int) -> Tensor | None:
-            return None if x is None else x.expand(batch, *x.shape[-axes:])
+        def spread(name: str, x: Tensor | None, *shape: int) -> Tensor | None:
+            if x is None:
+                return None
+            given = tuple(x.shape[:-1])
+            if given not in (shape, (1, *shape), (batch, *shape)) or not x.shape[-1]:
+                wanted = ", ".join(map(str, shape))
+                raise EngineInputError(
+                    name, "wrong shape", expected=f"({wanted}, D) or ({batch}, {wanted}, D), D at least 1",
+                    received=str(tuple(x.shape)),
+                )  # fmt: skip
+            return x.to(s0.dtype).expand(batch, *shape, -1)
 
+        d_s0, d_p = spread("d_state", d_state, s0.shape[1]), spread("d_parameters", d_parameters, p.shape[1])
+        d_u = spread("d_commands", d_commands, *commands.shape[1:])
         # What no direction changes needs no tangent: less to compile, and less to compute.
         active = None
         if d_parameters is not None:
             size = d_parameters.abs().amax(-1).reshape(-1, d_parameters.shape[-2]).amax(0)
             active = tuple(torch.nonzero(size).flatten().tolist())
-        d_s0, d_u, d_p = spread(d_state, 2), spread(d_commands, 3), spread(d_parameters, 2)
         if by_delay is not None:
             d_u = self._late_tangents(theta, d_u, d_p, by_delay, u.shape[1] // rows, step)
         run = partial(self.kernels.jvp, threads=self.threads) if self.native else self.kernels.torch_jvp

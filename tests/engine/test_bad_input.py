@@ -18,9 +18,11 @@ from r2s2r_cli.engine import (
     Structure,
     check_parameters,
     check_state,
+    closed_loop,
 )  # fmt: skip
 from r2s2r_cli.engine.rollout import Simulator
 from tests.support.engine import simulator, threebar_engine
+from tests.support.robots import rested, subject
 
 STILL = torch.zeros(1, 10, 6, dtype=torch.float64)
 
@@ -180,3 +182,33 @@ def test_a_simulation_that_leaves_the_finite_numbers(native: bool | None) -> Non
     assert found.body.split()[0] in ("rod", "cable")
     assert found.term
     assert f"step {found.step}" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("field", "shape"),
+    [
+        ("d_parameters", (3, 2)),
+        ("d_parameters", (135, 0)),
+        ("d_state", (3, 51, 2)),
+        ("d_commands", (10, 6)),
+    ],
+)
+def test_impossible_directions(field: str, shape: tuple[int, ...]) -> None:
+    """Directions of another length, of another batch, or none at all: named as the caller calls them."""
+    structure, theta, start = threebar_engine()
+    with pytest.raises(EngineInputError) as error:
+        simulator(structure).jvp(theta, start, STILL, **{field: torch.zeros(shape, dtype=torch.float64)})
+    assert error.value.field == field
+
+
+@pytest.mark.parametrize(
+    ("field", "motors", "tail"), [("pid.actuated", (0, 1), 0.0), ("tail", None, math.nan), ("tail", None, -1.0)]
+)
+def test_impossible_loops(field: str, motors: tuple[int, ...] | None, tail: float) -> None:
+    """The controller of a robot with other motors, and times that cannot be waited."""
+    model, start = subject(), rested().state
+    pid = model.pid() if motors is None else replace(model.pid(), actuated=motors)
+    one, none = torch.ones(1, 6, dtype=torch.float64), torch.zeros(1, dtype=torch.float64)
+    with pytest.raises(EngineInputError) as error:
+        closed_loop(model.simulator, model.theta, start, pid, one, none, none + 0.1, tail=tail)
+    assert error.value.field == field

@@ -31,14 +31,14 @@ def test_every_target_given_up(depth: int) -> None:
     """Time for no target: everything is lost at the first level, and the shortlist of every behaviour is empty."""
     found = searched(SearchSettings(depth=depth, most_changed=1), ticks=3)
     assert found.gaits == [] and found.lost == found.simulated == 6
-    assert shortlist(found, {**BEHAVIOURS, "own": never_asked}, 8) == dict.fromkeys([*BEHAVIOURS, "own"], [])
+    assert shortlist(found, {**BEHAVIOURS, "own": never_asked}, 8) == {name: [] for name in [*BEHAVIOURS, "own"]}
 
 
 def test_no_gait_near_enough_to_the_rest_pose() -> None:
     """Gaits that all end too far from rest are none: empty shortlists."""
     found = searched(SearchSettings(depth=2, most_changed=1, rest_error_m=1e-9))
     assert found.gaits == [] and found.lost == 0
-    assert shortlist(found, BEHAVIOURS, 8) == dict.fromkeys(BEHAVIOURS, [])
+    assert shortlist(found, BEHAVIOURS, 8) == {name: [] for name in BEHAVIOURS}
 
 
 def test_no_robots_are_run_as_any_others() -> None:

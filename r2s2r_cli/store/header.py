@@ -44,13 +44,10 @@ def block_size(header: Header) -> int:
     while size < _LINE + len(_encode(header)) + 1:
         size *= 2
     if size > MAX_BLOCK:
-        raise InputError(
-            "the artifact has too many runs for one file",
-            where=header.kind,
-            expected="a header of at most 4 MB",
-            received=f"one of {size / 1e6:.0f} MB for {len(header.datasets)} datasets",
-            hint="use several iterations, each with a part of the runs",
-        )
+        raise InputError("the artifact has too many runs for one file", where=header.kind,
+                         expected="a header of at most 4 MB",
+                         received=f"one of {size / 1e6:.0f} MB for {len(header.datasets)} datasets",
+                         hint="use several iterations, each with a part of the runs")  # fmt: skip
     return size
 
 

@@ -150,16 +150,18 @@ def test_a_stranger_is_as_probable_as_what_a_wider_floor_explains() -> None:
 
 
 def test_the_rule_of_the_package_names_a_stranger() -> None:
-    """What is shipped: a certain effect, and a certain pair, that leave five sd are `unknown` by its own threshold."""
+    """What is shipped: a certain effect, and a certain pair, that leave more than its own threshold are `unknown`. That
+    is no tighter than healthy runs leave, and no wider than the strangers did that taught it."""
     by = calibration()
+    assert 4.3 < by.unfit < 6.1
     certain = {"payload": 0.97, "none": 0.01, "backlash": 0.02}
-    for left, verdict in ((5.0, ("unknown", ())), (4.0, ("effect", ("payload",)))):
+    for left, verdict in ((by.unfit + 0.5, ("unknown", ())), (by.unfit - 0.5, ("effect", ("payload",)))):
         found = by.with_unknown(certain, 0.0, left)
         ranks = [Ranked(name, 100.0, p, marginal=100.0) for name, p in sorted(found.items(), key=lambda item: -item[1])]
         assert verdict_of(ranks, by, None, GAP, left_sd=left)[:2] == verdict
-    found = by.with_unknown(certain, 0.0, 5.0)
+    found = by.with_unknown(certain, 0.0, by.unfit + 0.5)
     ranks = [Ranked(name, 100.0, p, marginal=100.0) for name, p in sorted(found.items(), key=lambda item: -item[1])]
-    assert verdict_of(ranks, by, ("payload", "backlash"), GAP, left_sd=5.0)[0] == "unknown"
+    assert verdict_of(ranks, by, ("payload", "backlash"), GAP, left_sd=by.unfit + 0.5)[0] == "unknown"
 
 
 def test_what_is_left_is_told_in_its_sd() -> None:

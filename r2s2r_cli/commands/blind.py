@@ -107,13 +107,13 @@ def make(
     if key.resolve().is_relative_to(out.resolve()):
         raise UsageError("the key lies in the bank that it locks", where="--key", expected=f"a file outside {out}",
                          received=str(key), hint=f"r2s2r blind make --key {out.name}.key {out}")  # fmt: skip
+    pictures = f"r2s2r blind make --camera --key {key} {out}"
     if camera and tier is Tier.A:
         raise UsageError("tier A has no camera", where="--camera", expected="--tier B, the rig, which has one",
-                         received="--tier A", hint=f"r2s2r blind make --camera --key {key} {out}")  # fmt: skip
+                         received="--tier A", hint=pictures)  # fmt: skip
     if camera and noise is not None:
         raise UsageError("pictures have the noise of the tracker", where="--noise", expected="--noise without --camera",
-                         received=f"--noise {noise:g} --camera",
-                         hint=f"r2s2r blind make --camera --key {key} {out}")  # fmt: skip
+                         received=f"--noise {noise:g} --camera", hint=pictures)  # fmt: skip
     if first is not None:
         _check_first(first, count, bank, console)
     asked = ["--out", str(out), "--key", str(key), "--bank", bank.value, "--tier", tier.value, "--count", str(count),

@@ -40,7 +40,7 @@ def nominal(arena: Arena, z: np.ndarray, *, calibrate: bool, first: bool, ends: 
     """From nuisances z (p + q,): fitted, and where this ends (`ends`) shaken once, and fitted with derivatives and
     starts taken anew while that gains. calibrate: floor and noise are found with it, of healthy runs: under a noise
     that is too small every piece looks like a fall, and a fit of falls learns nothing. first: nothing is known of them.
-    The arena is left with the last derivatives."""
+    The arena is left with the last derivatives, and its stretches beginning where those of the fit do."""
     for again in range(MOST_JACOBIANS if ends else 1):
         if again:
             arena.move_starts(arena.away)

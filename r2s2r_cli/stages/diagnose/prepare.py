@@ -129,7 +129,7 @@ def _fitted(
         arena = Arena(replayer, many, floor_m=simulator, noise=noise, lasts=lasts, prior=prior, whole=intervals)
         z = _first(arena, z, late)
         base = nominal(arena, z, calibrate=calibrate, first=number == 0, ends=number == rounds - 1)
-        z, arena.away = base.z, base.away
+        z = base.z
         simulator, noise, lasts = arena.floor_m, arena.noise, arena.lasts
     if calibrate:
         calibrated(arena, base.z)

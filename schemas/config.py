@@ -9,6 +9,10 @@ from pydantic import ConfigDict, Field
 from schemas.base import Frozen
 from schemas.estimate import EstimateSettings
 
+LONGEST_STEP_S = 0.01
+"""[s] no stage takes a longer step of the engine."""
+EngineStep = Annotated[float, Field(strict=True, gt=0, le=LONGEST_STEP_S)]
+
 
 class ImportSettings(Frozen):
     """Settings of `import`."""
@@ -53,7 +57,7 @@ class SimulateSettings(Frozen):
 
     model_config = ConfigDict(use_attribute_docstrings=True)
 
-    step_s: Annotated[float, Field(strict=True, gt=0, le=0.01)] = 0.001
+    step_s: EngineStep = 0.001
     """Step of the engine [s]; must divide the controller's period. Where cables are stiff it is divided further."""
     frame_rate_hz: Annotated[float, Field(strict=True, gt=0, le=1000)] = 50.0
     """Stored frames a second; at most one a control tick is kept."""
@@ -68,7 +72,7 @@ class IdentifySettings(Frozen):
 
     model_config = ConfigDict(use_attribute_docstrings=True)
 
-    step_s: Annotated[float, Field(strict=True, gt=0, le=0.01)] = 0.001
+    step_s: EngineStep = 0.001
     """Step of the engine [s]; must divide the controller's period. Where cables are stiff it is divided further."""
     rod_contact: Annotated[bool, Field(strict=True)] = True
     """Whether rods collide with each other."""
@@ -95,7 +99,7 @@ class PlanSettings(Frozen):
 
     model_config = ConfigDict(use_attribute_docstrings=True)
 
-    step_s: Annotated[float, Field(strict=True, gt=0, le=0.01)] = 0.001
+    step_s: EngineStep = 0.001
     """Step of the engine [s]; must divide the controller's period. Where cables are stiff it is divided further."""
     rod_contact: Annotated[bool, Field(strict=True)] = True
     """Whether rods collide with each other."""
@@ -142,7 +146,7 @@ class DiagnoseSettings(Frozen):
 
     model_config = ConfigDict(use_attribute_docstrings=True)
 
-    step_s: Annotated[float, Field(strict=True, gt=0, le=0.01)] = 0.002
+    step_s: EngineStep = 0.002
     """Step of the engine [s]. Where cables are stiff it is divided further."""
     members: Annotated[int, Field(strict=True, ge=16, le=1024)] = 16
     """Members of the ensemble that finds where every target interval starts."""

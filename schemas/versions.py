@@ -73,8 +73,8 @@ def chain(
 
 
 STAGE_VERSIONS: dict[str, int] = {
-    "import": 1, "calibrate": 1, "record": 1, "estimate": 2, "identify": 4, "simulate": 1, "floor": 3,
-    "plan": 3, "execute": 1,
+    "import": 1, "calibrate": 1, "record": 1, "estimate": 3, "identify": 4, "simulate": 1, "floor": 4,
+    "plan": 4, "execute": 1,
     "compare": 6, "diagnose": 23,
 }  # fmt: skip
 """Raised by hand when a stage computes something else from the same input; `status` then calls its results stale."""

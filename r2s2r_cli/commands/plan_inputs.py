@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -100,9 +100,21 @@ class Asked:
         names = dict.fromkeys(self.behaviours or BEHAVIOURS)
         with _importable(self.project.root):
             rewards = {name: reward_named(name) for name in names}
-        short_names(names)  # a name that no gait can have is said now, not after the search
+        called = short_names(names)  # a name that no gait can have is said now, not after the search
+        self._apart(called)
         goals = {_goal_name(k, len(self.to)): self._goal(text, settings) for k, text in enumerate(self.to)}
         return Request(self.belief(), rewards, goals, self.seed, self.reach())
+
+    def _apart(self, called: Mapping[str, str]) -> None:
+        """Raises UsageError where gaits of a behaviour, numbered, would be called as the ways to several goals are."""
+        ways = {_goal_name(k, len(self.to)) for k in range(len(self.to))}
+        for behaviour, name in called.items():
+            if f"{name}-1" in ways:
+                raise UsageError(
+                    "its gaits would be called as the ways to the goals", where=f"--behaviour {behaviour}",
+                    expected="another name of the function, or a single --to", received=", ".join(sorted(ways)),
+                    hint=f"--behaviour forward --to {self.to[0]}",
+                )  # fmt: skip
 
     def belief(self) -> Belief:
         """The simulator's numbers. Raises InputError where they are those of another robot, or of robot.toml as it was

@@ -40,7 +40,7 @@ class Dropout(Effect):
     def observation(self, x: Values, t: Tensor, p_WE: Tensor) -> Tensor:
         """With gaps and exchanged caps."""
         caps = p_WE.shape[2]
-        number = torch.arange(caps, dtype=t.dtype, device=t.device)
+        number = torch.arange(1, caps + 1, dtype=t.dtype, device=t.device)  # from 1: sin(0) is a certain loss
         rod = _chance(t, 100.0 + number[::2])[None].repeat_interleave(2, dim=-1)
         around = p_WE.unflatten(2, (-1, 2)).flip(3).flatten(2, 3)
         seen = torch.where((rod < x["swapped"][..., None])[..., None], around, p_WE)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 from r2s2r_cli.errors import InputError
+from schemas.config import LONGEST_STEP_S
 from schemas.robot import Robot
 
 STEPS = 20
 """Engine steps a control tick that are proposed where those asked for do not fit."""
-LONGEST_S = 0.01
-"""[s] no stage takes a longer step."""
 
 
 def whole_steps(robot: Robot, step: float, setting: str) -> int:
@@ -23,7 +22,7 @@ def whole_steps(robot: Robot, step: float, setting: str) -> int:
     try:
         return steps_a_tick(period, step)
     except EngineInputError as error:
-        fits = period / max(STEPS, math.ceil(period / LONGEST_S))
+        fits = period / max(STEPS, math.ceil(period / LONGEST_STEP_S))
         raise InputError(
             "the engine step does not divide the control period", where=setting,
             expected=f"{period:g} s (pid.rate_hz {robot.pid.rate_hz:g}) over a whole number",

@@ -35,6 +35,18 @@ def test_the_file_of_a_reward_is_an_input(project: Path) -> None:
     assert asked(project, "tests.stages.plan.test_search:sideways").refs() == []
 
 
+def test_a_behaviour_whose_gaits_would_be_called_as_ways_to_goals_is_refused(project: Path) -> None:
+    """Two goals are gone to by `to-1` and `to-2`, as the gaits of a function `to` are called; one goal by `to`."""
+    (project / "wish_to.py").write_text(MINE.replace("forward", "to"))
+    here = Project.find(project)
+    place = here.iteration(1, create=True)
+    settings = here.config(place, {}).plan
+    one = Asked(here, place, ("wish_to:to",), ("0.1,0,0",), 0)
+    assert list(one.request(settings).goals) == ["to"]
+    with pytest.raises(UsageError, match="ways to the goals"):
+        Asked(here, place, ("wish_to:to",), ("0.1,0,0", "0.2,0,0"), 0).request(settings)
+
+
 def test_a_reward_of_an_entry_point(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Named as its package registered it."""
 

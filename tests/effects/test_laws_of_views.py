@@ -138,6 +138,8 @@ def test_dropout_loses_and_swaps_its_share(plain: Variant) -> None:
     assert bool((many | ~few).all())
     alone = float((few[:, 0] & few[:, 1]).double().mean())
     assert alone == pytest.approx(0.01, abs=0.005)  # caps are lost independently of each other
+    first = seen(with_(plain, Dropout(), lost=1e-6), torch.zeros(1, dtype=torch.float64), p_WE[:, :1])
+    assert torch.equal(first, p_WE[:, :1])  # no cap is lost for certain in the frame at 0 s
     swapped = seen(with_(plain, Dropout(), swapped=0.1), t, p_WE)[0]
     other = p_WE[0].unflatten(1, (-1, 2)).flip(2).flatten(1, 2)
     moved = (swapped != p_WE[0]).all(-1)

@@ -10,11 +10,11 @@ from r2s2r_cli.artifact import Group
 from r2s2r_cli.devices.camera import Intrinsics
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.estimate.images import DecodedFrames, Encoded
-from r2s2r_cli.stages.estimate.lengths import readings_of
 from r2s2r_cli.stages.estimate.motion.data import Readings
 from r2s2r_cli.stages.estimate.smooth import MIN_FRAMES
 from r2s2r_cli.stages.estimate.unseen import Unseen
 from r2s2r_cli.stages.frames import KEPT, keep_frames
+from r2s2r_cli.stages.sensed import sensed_lengths
 from schemas.robot import Robot
 
 Pictures = Callable[[str, str], Encoded | None]
@@ -71,10 +71,10 @@ def sensor_readings(streams: dict[str, Group], robot: Robot) -> Readings | None:
     if "sensors" not in streams:
         return None
     sensors = streams["sensors"]
-    length = readings_of(sensors, robot)
-    cable = sensors["cable"] if "cable" in sensors else np.array([s.cable for s in robot.sensors], dtype=np.int64)
-    if length is None or len(cable) != length.shape[1] or not np.any(np.isfinite(length)):
+    found = sensed_lengths(sensors, robot)
+    if found is None or not np.any(np.isfinite(found[0])):
         return None
+    length, cable = found
     good = np.isfinite(sensors["t"]) & np.any(np.isfinite(length), axis=1)
     # A line of robot.toml turns the 0.20 pF of a chip that is not initialised into a negative length.
     return Readings(t=sensors["t"][good], length=np.where(length[good] > 0, length[good], np.nan), cable=cable)

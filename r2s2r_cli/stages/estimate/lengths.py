@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.artifact import Group
+from r2s2r_cli.stages.sensed import sensed_lengths
 from schemas.robot import Robot
 
 
@@ -40,26 +41,12 @@ def sensor_lengths(t: np.ndarray, sensors: Group, robot: Robot, gap_s: float) ->
     t: stamps of the frames [s]. The recording's own lengths are taken where it has them, else capacitances through
     the lines of robot.toml. Between two readings at most `gap_s` apart the length is interpolated linearly.
     """
-    readings = readings_of(sensors, robot)
-    if readings is None:
+    found = sensed_lengths(sensors, robot)
+    if found is None:
         return None
-    cable = sensors["cable"] if "cable" in sensors else np.array([s.cable for s in robot.sensors], dtype=np.int64)
-    if len(cable) != readings.shape[1]:
-        return None
+    readings, cable = found
     lengths = np.column_stack([_at(t, sensors["t"], column, gap_s) for column in readings.T])
     return SensorLengths(lengths, cable) if np.any(np.isfinite(lengths)) else None
-
-
-def readings_of(sensors: Group, robot: Robot) -> np.ndarray | None:
-    """Lengths of the samples [m], (sample, sensor): the recording's own, else capacitances through the lines of
-    robot.toml; None where neither is there. NaN: not received."""
-    if "length" in sensors:
-        return sensors["length"]
-    if "capacitance" not in sensors or len(robot.sensors) != sensors["capacitance"].shape[1]:
-        return None
-    lines = [(s.slope_f_per_m or np.nan, np.nan if s.offset_f is None else s.offset_f) for s in robot.sensors]
-    slope, offset = np.array(lines, dtype=float).T
-    return np.asarray((sensors["capacitance"] - offset) / slope)
 
 
 def _at(t: np.ndarray, stamps: np.ndarray, values: np.ndarray, gap_s: float) -> np.ndarray:
@@ -69,4 +56,5 @@ def _at(t: np.ndarray, stamps: np.ndarray, values: np.ndarray, gap_s: float) -> 
     stamps, values = stamps[good], values[good]
     after = np.clip(np.searchsorted(stamps, t), 1, len(stamps) - 1)
     near = (stamps[after] - stamps[after - 1] <= gap_s) & (t >= stamps[0]) & (t <= stamps[-1])
+    near |= np.isin(t, stamps)  # a reading at the very stamp needs no other, whatever gap lies beside it
     return np.where(near, np.interp(t, stamps, values), np.nan)

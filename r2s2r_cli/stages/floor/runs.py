@@ -9,6 +9,7 @@ import numpy as np
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.segments import Intervals
+from r2s2r_cli.stages.sensed import of_robot, sensed_lengths
 from schemas.robot import Robot
 
 
@@ -60,19 +61,16 @@ def seen_run(name: str, estimate: ArtifactData, recording: ArtifactData | None, 
 
 
 def sensed_run(name: str, recording: ArtifactData, run: str, robot: Robot) -> SensedRun | None:
-    """Of a recording; None where the run has no target intervals, or no lengths of the robot's sensors."""
+    """Of a recording, with a column for each sensor of robot.toml; None where the run has no target intervals, or no
+    lengths of the robot's sensors."""
     sensors, intervals = recording.group(run, "sensors"), recording.group(run, "intervals")
     if sensors is None or intervals is None or not len(intervals["t_first"]):
         return None
-    if "length" in sensors:
-        length = sensors["length"]
-    elif "capacitance" in sensors:
-        lines = [(s.slope_f_per_m or np.nan, np.nan if s.offset_f is None else s.offset_f) for s in robot.sensors]
-        slope, offset = np.array(lines, dtype=float).reshape(-1, 2).T
-        length = (sensors["capacitance"] - offset) / slope
-    else:
+    found = sensed_lengths(sensors, robot)
+    if found is None:
         return None
-    if length.shape[1] != len(robot.sensors) or not np.isfinite(length).any():
+    length = of_robot(*found, robot)
+    if not np.isfinite(length).any():
         return None
     cable = np.array([sensor.cable for sensor in robot.sensors], dtype=np.int64)
     return SensedRun(name, sensors["t"], length, cable, *_reached(Intervals.from_group(intervals), recording, run))

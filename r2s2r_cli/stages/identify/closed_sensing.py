@@ -87,10 +87,11 @@ def seen_by_camera(
     where none says it. Nothing rests on the moments at which cables arrived, of which there are few."""
     named = {one.run for one in train}
     mine = [run for run in runs if run.name in named]
-    of_cable = {sensor.cable: i for i, sensor in enumerate(robot.sensors)}
     errors = np.full((len(mine), len(robot.actuated)), np.nan)
     for row, run in enumerate(mine):
         if run.sensor_bias is not None:
+            cables = [s.cable for s in robot.sensors] if run.sensor_cable is None else run.sensor_cable.tolist()
+            of_cable = {cable: i for i, cable in enumerate(cables)}
             for k, cable in enumerate(robot.actuated):
                 if cable in of_cable:
                     errors[row, k] = run.sensor_bias[of_cable[cable]]

@@ -21,7 +21,8 @@ class RunData:
     design. sampled: the rows are what the frames found in force, not the commands as they were sent. nature: what the
     recording is, in words, empty where it does not say. sensor_bias: reading minus length of every cable sensor, mean
     over the run as the camera shows it [m], (sensor,), NaN: dead; sensor_delay: how late they read [s], by the clock of
-    the frames, None: not known. Both None where no camera looked.
+    the frames, None: not known. Both None where no camera looked. sensor_cable: the cable of each, (sensor,), None:
+    those of robot.toml in their order.
     """
 
     name: str
@@ -42,6 +43,7 @@ class RunData:
     nature: str = ""
     sensor_bias: np.ndarray | None = None
     sensor_delay: float | None = None
+    sensor_cable: np.ndarray | None = None
     observed_sd: np.ndarray | None = None
 
     def sd_at(self, frames: np.ndarray | int, least: float = 0.0) -> np.ndarray:

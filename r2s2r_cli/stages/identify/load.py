@@ -48,6 +48,7 @@ def run_data(
         )  # fmt: skip
     caps = None if recording is None else recording.group(run, "caps")
     bias, delay = _sensors(estimate.group(run, "sensor_fit"))
+    heard = None if recording is None else recording.group(run, "sensors")
     found = RunData(
         name=name or run,
         t=frames["t"],
@@ -70,6 +71,7 @@ def run_data(
         nature=str(estimate.groups[f"runs/{run}"].attributes.get("nature", "")),
         sensor_bias=bias,
         sensor_delay=delay,
+        sensor_cable=None if heard is None or "cable" not in heard else heard["cable"],
     )
     _require_finite(found, run)
     _require_rows(found, run)

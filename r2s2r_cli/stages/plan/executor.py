@@ -49,6 +49,7 @@ class Executor:
         import torch
 
         from r2s2r_cli.engine.flat import pack_parameters
+        from r2s2r_cli.engine.hooks import effective
         from r2s2r_cli.engine.pid import ticks
         from r2s2r_cli.engine.rollout import Simulator
         from r2s2r_cli.stages.identify.free import Mapping
@@ -64,6 +65,7 @@ class Executor:
         one = self.mapping.theta(self.values)
         self.theta = one.map(lambda x: x.expand(len(draws), *x.shape[1:]).contiguous())
         self.packed = pack_parameters(self.structure, self.theta)
+        self.seen = effective(self.structure, self.theta)
         self.simulator = Simulator(self.structure, cache_dir=cache_dir, threads=threads)
         none = np.zeros((len(draws), len(robot.cables)))
         self.bias = torch.as_tensor(none if bias is None else bias, dtype=torch.float64)
@@ -114,7 +116,7 @@ class Executor:
             )  # fmt: skip
         s = pack_state(self.structure, found.state)
         depth = int(torch.floor(self.delay.max() / self.period + 1e-9)) + 2
-        every = Standing(s, s.new_zeros(len(s), depth, self.structure.n_actuated), index)
+        every = Standing(s, s.new_zeros(len(s), depth, self.structure.n_actuated), index, s.new_zeros(len(s)))
         return every.take(np.flatnonzero(~restless.numpy()))
 
     def caps(self, at: Standing) -> np.ndarray:
@@ -123,14 +125,14 @@ class Executor:
         from r2s2r_cli.engine.flat import unpack_state
 
         state = unpack_state(self.structure, at.s)
-        return np.asarray(end_caps(self.theta.map(lambda x: x[at.draw]), state).numpy())
+        return np.asarray(end_caps(self.seen.map(lambda x: x[at.draw]), state).numpy())
 
     def speeds(self, at: Standing) -> np.ndarray:
         """Speeds of the end caps [m/s], (B, cap)."""
         from r2s2r_cli.engine import cap_velocities
         from r2s2r_cli.engine.flat import unpack_state
 
-        v_WE = cap_velocities(self.theta.map(lambda x: x[at.draw]), unpack_state(self.structure, at.s))
+        v_WE = cap_velocities(self.seen.map(lambda x: x[at.draw]), unpack_state(self.structure, at.s))
         return np.asarray(v_WE.norm(dim=-1).numpy())
 
     def com(self, at: Standing) -> np.ndarray:
@@ -171,12 +173,12 @@ class Executor:
         return Executed(ends, **named, tracks=tuple(track for p in parts for track in p.tracks))
 
     def numbers(self, draw: Tensor) -> tuple[Parameters, Tensor, LatchedPid]:
-        """Parameters, packed ones and the controller of environments with these draws."""
+        """Parameters as their effects make them, packed ones and the controller of environments with these draws."""
 
         def of(x: Tensor) -> Tensor:
             return x[draw]
 
-        return self.theta.map(of), self.packed[draw], self.pid(draw)
+        return self.seen.map(of), self.packed[draw], self.pid(draw)
 
     def substeps(self, at: Standing) -> int:
         """Engine steps per `step`, as many as the stiffest of all draws needs."""

@@ -15,11 +15,13 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Standing:
     """Robots in the engine, one a row. s: flat states (B, NS); line: commands that are under way, newest last,
-    (B, depth, actuated); draw: which drawn numbers each has, (B,)."""
+    (B, depth, actuated); draw: which drawn numbers each has, (B,); t: time since the start of the run, by which sensors
+    drift, (B,) [s]."""
 
     s: Tensor
     line: Tensor
     draw: Tensor
+    t: Tensor
 
     def __len__(self) -> int:
         return len(self.s)
@@ -29,14 +31,14 @@ class Standing:
         import torch
 
         index = torch.as_tensor(np.asarray(rows, dtype=np.int64))
-        return Standing(self.s[index], self.line[index], self.draw[index])
+        return Standing(self.s[index], self.line[index], self.draw[index], self.t[index])
 
 
 def stacked(parts: Sequence[Standing]) -> Standing:
     """Robots of several, one after the other."""
     import torch
 
-    return Standing(*(torch.cat([getattr(part, name) for part in parts]) for name in ("s", "line", "draw")))
+    return Standing(*(torch.cat([getattr(part, name) for part in parts]) for name in ("s", "line", "draw", "t")))
 
 
 @dataclass(frozen=True)
@@ -73,8 +75,8 @@ class Executed:
         import torch
 
         row, at = torch.arange(len(self.counts)), torch.as_tensor(self.counts - 1 - back)
-        s, line = (torch.stack([getattr(end, name) for end in self.ends])[at, row] for name in ("s", "line"))
-        return Standing(s, line, self.ends[0].draw)
+        s, line, t = (torch.stack([getattr(end, name) for end in self.ends])[at, row] for name in ("s", "line", "t"))
+        return Standing(s, line, self.ends[0].draw, t)
 
     @property
     def total(self) -> np.ndarray:

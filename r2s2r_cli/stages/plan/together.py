@@ -28,6 +28,7 @@ def run_together(executor: Executor, at: Standing, targets: Tensor, counts: np.n
     import torch
 
     from r2s2r_cli.engine.flat import unpack_state
+    from r2s2r_cli.engine.late import sense
     from r2s2r_cli.engine.pid import advance, start_progress
     from r2s2r_cli.engine.reading import cap_lengths
     from r2s2r_cli.engine.state import end_caps
@@ -35,6 +36,7 @@ def run_together(executor: Executor, at: Standing, targets: Tensor, counts: np.n
     batch, steps, _ = targets.shape
     ends_s = at.s[:, None].repeat(1, steps, 1)
     ends_line = at.line[:, None].repeat(1, steps, 1, 1)
+    ends_t = at.t[:, None].repeat(1, steps)
     ticks, given_up = np.zeros((batch, steps), dtype=np.int64), np.zeros((batch, steps), dtype=bool)
     failed = np.zeros(batch, dtype=bool)
     hold, timeout = torch.zeros(steps, dtype=torch.long), torch.full((steps,), executor.timeout)
@@ -44,7 +46,7 @@ def run_together(executor: Executor, at: Standing, targets: Tensor, counts: np.n
     kept: list[tuple[Tensor, ...]] = []
 
     live = torch.arange(batch)
-    s, s_line, draw, goal, asked = at.s, at.line, at.draw, targets, torch.as_tensor(counts)
+    s, s_line, draw, t, goal, asked = at.s, at.line, at.draw, at.t, targets, torch.as_tensor(counts)
     theta, p, pid = executor.numbers(draw)
     memory, where = pid.start(s.new_zeros(batch, executor.structure.n_cables)), start_progress(batch)
     line = _line(executor, draw, s_line) if delayed else None
@@ -53,8 +55,7 @@ def run_together(executor: Executor, at: Standing, targets: Tensor, counts: np.n
         for tick in range(1, steps * (executor.timeout + 1) + 1):
             state = unpack_state(executor.structure, s)
             length = cap_lengths(executor.cable_caps, end_caps(theta, state)) + executor.bias[draw]
-            for effect in executor.structure.effects:
-                length = effect.sensing(theta.of(effect.name), length)
+            length = sense(executor.structure, theta, length, t[:, None] + (tick - 1) * executor.period)
             running = where.index < asked
             wanted = goal[torch.arange(len(s)), where.index.clamp(max=steps - 1)]
             u, memory = pid.tick(memory, length, wanted)
@@ -73,7 +74,7 @@ def run_together(executor: Executor, at: Standing, targets: Tensor, counts: np.n
             if bool(changed.any()):
                 left, step_of = live[changed], before[changed]
                 ends_s[left, step_of], ticks[left.numpy(), step_of.numpy()] = s[changed], tick
-                ends_line[left, step_of] = s_line[changed]
+                ends_line[left, step_of], ends_t[left, step_of] = s_line[changed], t[changed] + tick * executor.period
                 given_up[left.numpy(), step_of.numpy()] = moved.timed_out[changed].numpy()
             if record:
                 kept.append((live[running], s[running], u[running], before[running], done[running]))
@@ -91,14 +92,14 @@ def run_together(executor: Executor, at: Standing, targets: Tensor, counts: np.n
                 break
             if int(over.sum()) * 8 >= len(over):
                 keep = ~over
-                live, s, s_line, draw = live[keep], s[keep], s_line[keep], draw[keep]
+                live, s, s_line, draw, t = live[keep], s[keep], s_line[keep], draw[keep], t[keep]
                 goal, asked, length_then = goal[keep], asked[keep], length_then[keep]
                 theta, p, pid = executor.numbers(draw)
                 memory = replace(memory, total=memory.total[keep], previous=memory.previous[keep],
                                  done=memory.done[keep])  # fmt: skip
                 where = replace(where, index=where.index[keep], elapsed=where.elapsed[keep], held=where.held[keep])
                 line = None if line is None else _line(executor, draw, s_line)
-    ends = tuple(Standing(ends_s[:, k], ends_line[:, k], at.draw) for k in range(steps))
+    ends = tuple(Standing(ends_s[:, k], ends_line[:, k], at.draw, ends_t[:, k]) for k in range(steps))
     return Executed(ends, ticks, given_up, failed, counts, tuple(tracks(at.s, kept)) if record else ())
 
 

@@ -34,7 +34,7 @@ ASTRAY = 2.0
 """[m] or [rad] that a sequence may be worth less for ending where it should from all drawn numbers and starts: the loss
 where none of them ends where most do."""
 LOST = -10.0
-"""Worth of a sequence in which the robot gives a target up or leaves its area: less than any other."""
+"""Worth of a sequence in which the robot gives a target up or leaves its area, where no other is worth less."""
 MARGIN = 0.9
 """Share of its area that a sequence may use on paper: on its way between the ends of its gaits it comes farther."""
 
@@ -84,17 +84,21 @@ def ways(
         rested = world.reference.place(world.executor.caps(walk.rested)).error < settings.rest_error_m
         return share_astray(walk, rested)
 
+    judged: dict[str, list[tuple[Paths, Walk, np.ndarray, np.ndarray]]] = {}
+    for (name, path), walk in zip(tried, walked_along(tried, world.pairs, smooth=False, part="sequences"), strict=True):
+        if turns_as_named(name, walk):
+            came = walked(walk.way)
+            away = (farthest(came) > request.reach) & (name not in request.goals)
+            judged.setdefault(name, []).append((path, walk, values[name](came), walk.lost | away))
     score: dict[str, tuple[float, Paths]] = {}
     whole: dict[str, Walk] = {}
-    for (name, path), walk in zip(tried, walked_along(tried, world.pairs, smooth=False, part="sequences"), strict=True):
-        if not turns_as_named(name, walk):
-            continue
-        came = walked(walk.way)
-        away = (farthest(came) > request.reach) & (name not in request.goals)
-        worth = np.where(walk.lost | away, LOST, values[name](came))
-        one = float(worth.mean() - settings.spread * worth.std()) - ASTRAY * astray(walk)
-        if name not in score or one > score[name][0]:
-            score[name], whole[name] = (one, path), walk
+    for name, sequences in judged.items():
+        lost = worth_of_lost([(worth, gone) for _, _, worth, gone in sequences])
+        for path, walk, worth, gone in sequences:
+            worths = np.where(gone, lost, worth)
+            one = float(worths.mean() - settings.spread * worths.std()) - ASTRAY * astray(walk)
+            if name not in score or one > score[name][0]:
+                score[name], whole[name] = (one, path), walk
     chosen_paths = [(name, path) for name, (_, path) in score.items()]
     made = walked_along(chosen_paths, world.few, smooth=settings.smooth, part="long policies")
     # Every shortcut led where the whole gait led, and yet what follows it may not: then the returns to rest stay.
@@ -103,6 +107,12 @@ def ways(
         for (name, _), walk in zip(chosen_paths, made, strict=True)
     ]
     return [Way(name, path, walk) for (name, path), walk in zip(chosen_paths, kept, strict=True)]
+
+
+def worth_of_lost(sequences: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
+    """Worth of a robot that gives a target up or leaves its area, given the worths and who did so (B,) of every
+    sequence for one purpose: no more than that of any that did not, however far it ends from a narrow goal."""
+    return min([LOST, *(float(worth[~gone].min()) for worth, gone in sequences if not gone.all())])
 
 
 def turns_as_named(name: str, walk: Walk) -> bool:

@@ -51,6 +51,30 @@ def test_sensor_lengths_are_interpolated_and_gaps_left_open() -> None:
     assert found.cable.tolist() == [sensor.cable for sensor in robot.sensors]
 
 
+def test_a_reading_at_the_stamp_of_a_frame_counts_whatever_gap_lies_beside_it() -> None:
+    """Frames at the very stamps of readings, before, after and between gaps of 0.8 s, have the readings."""
+    robot = threebar()
+    stamps = np.array([0.0, 0.8, 1.6, 1.7])
+    lengths = np.outer(0.1 + 0.05 * stamps, np.ones(len(robot.sensors)))
+    found = sensor_lengths(np.array([0.0, 0.4, 0.8, 1.6, 1.7]), Group({"t": stamps, "length": lengths}), robot, 0.25)
+    assert found is not None
+    assert found.length[[0, 2, 3, 4]] == pytest.approx(lengths)
+    assert np.isnan(found.length[1]).all()
+
+
+def test_capacitances_of_some_cables_go_through_their_own_lines() -> None:
+    """A recording that says of which cables its two columns are: each by the line of that cable, not of its place."""
+    robot = threebar()
+    lines = {k: (30e-12 + 1e-12 * k, 12e-12) for k in range(9)}
+    sensors = [s.model_copy(update={"slope_f_per_m": lines[s.cable][0], "offset_f": 12e-12}) for s in robot.sensors]
+    robot = robot.model_copy(update={"sensors": tuple(sensors)})
+    t = np.linspace(0, 1, 20)
+    raw = np.column_stack([np.full(20, 12e-12 + lines[k][0] * length) for k, length in ((7, 0.11), (2, 0.15))])
+    found = sensor_lengths(t, Group({"t": t, "capacitance": raw, "cable": np.array([7, 2])}), robot, 0.25)
+    assert found is not None and found.cable.tolist() == [7, 2]
+    assert found.length == pytest.approx(np.tile([0.11, 0.15], (20, 1)))
+
+
 def test_capacitances_go_through_the_calibrated_lines() -> None:
     """Capacitance = slope length + offset is inverted for calibrated sensors; others give no length."""
     robot = threebar()

@@ -177,3 +177,27 @@ def test_the_step_after_a_target_that_was_given_up_is_no_repeat_of_caps() -> Non
     assert report.caps is not None and report.caps.floor_m < 1e-9
     _, fooled = floor([whole], [], policies={})
     assert fooled.caps is not None and fooled.caps.floor_m > 1e-3
+
+
+def test_lengths_of_a_log_stand_under_the_sensor_of_their_cable() -> None:
+    """A log of three cables in an order of its own: each column comes to the sensor of robot.toml that measures it,
+    the others are empty, and the floor of one cable is that cable's."""
+    robot, n = calibrated(), 50
+    cables = [robot.sensors[k].cable for k in (5, 0, 3)]
+    t = np.arange(10 * n) / RATE
+    level = np.repeat(np.tile([0.0, 1.0], 5), n)
+    target = np.repeat(level[:, None], len(robot.actuated), axis=1)
+    off = np.repeat(np.arange(10) // 2 % 2, n)[:, None] * np.array([[4e-3, 0.0, 0.0]])
+    length = 0.1 + 0.1 * level[:, None] + np.array([[0.0, 0.01, 0.02]]) + off
+    slope = {s.cable: (s.slope_f_per_m or np.nan, s.offset_f or 0.0) for s in robot.sensors}
+    raw = np.column_stack([slope[c][1] + slope[c][0] * length[:, k] for k, c in enumerate(cables)])
+    table = target_intervals(t, target, control=np.zeros_like(target)).to_group()
+    for name, values in (("length", length), ("capacitance", raw)):
+        sensors = Group({"t": t, name: values, "cable": np.array(cables, dtype=np.int64)})
+        recording = ArtifactData("recording", {"runs/a/sensors": sensors, "runs/a/intervals": table})
+        found = sensed_run("1:a", recording, "a", robot)
+        assert found is not None and found.cable.tolist() == [s.cable for s in robot.sensors]
+        assert np.allclose(found.length[:, [5, 0, 3]], length, atol=1e-12)
+        assert np.isnan(np.delete(found.length, [5, 0, 3], axis=1)).all()
+        repeats = length_repeats([found])
+        assert repeats is not None and repeats.sd[5] > 1e-3 and repeats.sd[[0, 3]].max() < 1e-9

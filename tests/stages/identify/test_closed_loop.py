@@ -154,6 +154,10 @@ def test_what_the_camera_says_of_the_sensors_comes_first() -> None:
     bias, behind = seen_by_camera(threebar(), runs, train)
     assert bias == pytest.approx(np.array([2.0, 3, 4, 5, np.nan, 7]) * 1e-3, nan_ok=True)
     assert behind == pytest.approx(0.03)
+    # A recording that heard the cables in another order, and not all of them.
+    two = [replace(one, sensor_bias=shown[[5, 0]], sensor_cable=np.array([5, 0])) for one in runs]
+    bias, _ = seen_by_camera(threebar(), two, train)
+    assert bias == pytest.approx(np.array([1.0, np.nan, np.nan, np.nan, np.nan, 6.0]) * 1e-3, nan_ok=True)
     assert np.isnan(seen_by_camera(threebar(), [run], TRAIN[:1])[0]).all()
     predictor = predictor_of("command_delay=0.12,0..0.5")
     sensing, late = loop_of(runs, train, predictor, values_at(predictor, command_delay=0.12))

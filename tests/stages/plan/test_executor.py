@@ -101,6 +101,28 @@ def test_a_sensor_that_reads_too_much_leaves_its_cable_shorter() -> None:
     assert abs(length[0] - length[1] - 0.02) < 0.003
 
 
+def test_a_sensor_that_drifts_reads_too_much_by_the_time_of_the_run() -> None:
+    """A robot that has run for 40 s with a drift of 0.5 mm/s of one sensor does what one does whose sensor reads 20 mm
+    too much and more by as much a second; the time goes on from target to target."""
+    robot = subject().robot
+    cable = robot.sensors[1].cable
+    known = entries(robot)
+    frees = tuple(known[f"sensor_bias.drift_m_per_s.{k}"].free for k in range(len(robot.cables)))
+    one = np.array([5e-4 if k == cable else 0.0 for k in range(len(frees))])
+    belief = Belief(Identified("a test", robot, Mapping(robot, frees), one, np.zeros((len(one), len(one)))), True)
+    bias = np.zeros((2, len(robot.cables)))
+    bias[1, cable] = 0.02
+    made = Executor(robot, belief, np.tile(one, (2, 1)), step=1e-3, bias=bias)
+    at = made.standing(np.repeat(subject().p_WE.numpy(), 2, axis=0), np.arange(2))
+    at = replace(at, s=at.s[:1].repeat(2, 1), t=torch.tensor([40.0, 0.0], dtype=torch.float64))
+    target = np.repeat(np.array([[[1.0, 0.4, 1, 1, 1, 1], [1.0, 0.8, 1, 1, 1, 1]]]), 2, axis=0)
+    run = made.run(at, target)
+    assert torch.equal(run.last.s[0], run.last.s[1])
+    assert run.last.t.numpy() == pytest.approx(np.array([40.0, 0.0]) + run.total * made.period)
+    still = made.run(replace(at, t=torch.zeros(2, dtype=torch.float64)), target)
+    assert float((still.last.s[0] - run.last.s[0]).abs().max()) > 1e-3
+
+
 def test_a_robot_starts_where_its_sensors_say_that_it_is_at_rest() -> None:
     """A sensor that reads 8 mm too much: its winch stops 8 mm early, before the gait as in it; the first robot stands
     as robot.toml says whatever its sensors read."""

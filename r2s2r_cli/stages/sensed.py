@@ -1,0 +1,41 @@
+"""What the cable sensors of a recording say, and of which cables."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from r2s2r_cli.artifact import Group
+from schemas.robot import Robot
+
+
+def sensed_lengths(sensors: Group, robot: Robot) -> tuple[np.ndarray, np.ndarray] | None:
+    """Lengths of the samples [m], (sample, sensor), and the cable of each sensor, (sensor,). NaN: not received.
+
+    The recording's own lengths, else its capacitances, each through the line that robot.toml has of its cable. Which
+    cables they are of the recording says; one that does not has the sensors of robot.toml, in their order. None where
+    there is neither, or where nobody says of which cables they are.
+    """
+    name = next((name for name in ("length", "capacitance") if name in sensors), None)
+    if name is None:
+        return None
+    cable = sensors["cable"] if "cable" in sensors else np.array([s.cable for s in robot.sensors], dtype=np.int64)
+    values = sensors[name]
+    if len(cable) != values.shape[1]:
+        return None
+    if name == "length":
+        return values, cable
+    lines = {s.cable: (s.slope_f_per_m or np.nan, np.nan if s.offset_f is None else s.offset_f) for s in robot.sensors}
+    own = [lines.get(int(one), (np.nan, np.nan)) for one in cable]
+    slope, offset = np.array(own, dtype=float).reshape(-1, 2).T
+    return np.asarray((values - offset) / slope), cable
+
+
+def of_robot(length: np.ndarray, cable: np.ndarray, robot: Robot) -> np.ndarray:
+    """The same lengths with a column for each sensor of robot.toml, in that order, (sample, sensor) [m]; NaN where the
+    recording has none of its cable."""
+    found = np.full((len(length), len(robot.sensors)), np.nan)
+    for i, sensor in enumerate(robot.sensors):
+        column = np.flatnonzero(cable == sensor.cable)
+        if len(column):
+            found[:, i] = length[:, column[0]]
+    return found

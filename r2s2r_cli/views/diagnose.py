@@ -86,7 +86,10 @@ def _gap(data: ArtifactData, report: DiagnoseReport) -> bytes:
     axes[0].annotate("target interval", (0.0, 1.0), xycoords="axes fraction", xytext=(-4, 0),
                      textcoords="offset points", ha="right", va="bottom", fontsize=7, color=PLAIN)  # fmt: skip
     axes[0].set_ylim(bottom=0.0)  # of all panels, once every one of them is drawn
-    handles, labels = axes[0].get_legend_handles_labels()
+    # Of all panels: there may be no point of the effect in the first one.
+    entries = {label: handle for own in axes[::-1]
+               for handle, label in zip(*own.get_legend_handles_labels(), strict=True)}  # fmt: skip
+    handles, labels = list(entries.values()), list(entries)
     if not rows["gap"].all():
         handles.append(Patch(color=PLAIN, alpha=BAND))
         labels.append("grey: a target interval that does not stand out")
@@ -94,7 +97,8 @@ def _gap(data: ArtifactData, report: DiagnoseReport) -> bytes:
         handles.append(Patch(color=MARKED, alpha=BAND))
         # Points are of an interval's end alone, so the highest one need not be on orange.
         labels.append("orange: stands out over the whole interval, not at its end alone")
-    if not np.isfinite(np.concatenate([rows["refit"], rows["effect"]])).all() and np.isfinite(rows["effect"]).any():
+    curves = [rows["refit"], *([rows["effect"]] if np.isfinite(rows["effect"]).any() else [])]
+    if not np.isfinite(curves).all():
         handles.append(Patch(color="none"))
         labels.append("no point: a cap ended more than 25 cm off")
     _legend(figure, handles, labels)

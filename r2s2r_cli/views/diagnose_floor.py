@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 ARROW = 5.0
 """Times that errors are drawn larger than they are."""
+NO_ARROW = "\nno arrows: an interval at whose end a cap was more than 25 cm off"
 
 
 def floor_picture(data: ArtifactData, report: DiagnoseReport) -> bytes:
@@ -34,11 +35,15 @@ def floor_picture(data: ArtifactData, report: DiagnoseReport) -> bytes:
                 shown, ax=axes, label="change of friction that contacts ask for [1]\nred: less, blue: more", shrink=0.8
             )
     xy, error = rows["xy"], rows["error"]
-    for row in range(len(xy)):
-        for cap in range(xy.shape[1]):
-            if np.isfinite(error[row, cap]).all():
-                axes.annotate("", xy=xy[row, cap] - ARROW * error[row, cap, :2], xytext=xy[row, cap],
-                              arrowprops={"arrowstyle": "->", "color": rod_color(cap), "lw": 0.9})  # fmt: skip
+    tips = xy - ARROW * error[..., :2]
+    known = np.isfinite(tips).all(axis=-1)
+    lost = np.isfinite(xy).all(axis=-1) & ~known
+    for row, cap in np.argwhere(known).tolist():
+        axes.annotate("", xy=tips[row, cap], xytext=xy[row, cap],
+                      arrowprops={"arrowstyle": "->", "color": rod_color(cap), "lw": 0.9})  # fmt: skip
+    if known.any():
+        # Arrows stretch no axes by themselves, and one that ends outside of them is not drawn: the largest errors.
+        axes.update_datalim(tips[known])
     for cap in range(xy.shape[1]):
         axes.plot(xy[:, cap, 0], xy[:, cap, 1], ".", ms=4, color=rod_color(cap))
     for rod in range(xy.shape[1] // 2):
@@ -49,9 +54,11 @@ def floor_picture(data: ArtifactData, report: DiagnoseReport) -> bytes:
         axes.annotate("named place", element.xy_m, xytext=(10, 10), textcoords="offset points", color=MARKED,
                       bbox={"boxstyle": "round", "fc": "white", "ec": "none", "alpha": 0.8}, zorder=6)  # fmt: skip
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set(xlabel="x [m]", ylabel="y [m]",
-             title="dots: caps at the ends of intervals; arrows: how much farther\n"
-             f"the robot went than the refit model, {ARROW:g} times enlarged")  # fmt: skip
+    title = (
+        "dots: caps at the ends of intervals; arrows: how much farther\n"
+        f"the robot went than the refit model, {ARROW:g} times enlarged"
+    )
+    axes.set(xlabel="x [m]", ylabel="y [m]", title=title + (NO_ARROW if lost.any() else ""))
     axes.margins(0.1)
     legend_below(figure, [axes])
     return png_bytes(figure)

@@ -12,6 +12,7 @@ from r2s2r_cli.views.diagnose_ranking import element_words, ranking_table
 from r2s2r_cli.views.diagnose_words import (
     HELD_OUT,
     LEFT_OUT,
+    NATS,
     TWO_ERRORS,
     WHY_NONE,
     loud_words,
@@ -196,6 +197,7 @@ def _how(report: DiagnoseReport, *, brief: bool) -> Iterator[list[str]]:
         f"the best of the catalogue gains {report.chance_nats:.1f} nats left out by chance in one case of 20",
     ]
     yield ["probabilities", report.calibrated]
+    yield ["nats", NATS]
     yield ["none and unknown", WHY_NONE]
     yield ["two errors", TWO_ERRORS]
     if brief and report.refit:

@@ -95,11 +95,11 @@ def _ranked(one: RankedName, report: DiagnoseReport) -> list[str]:
     remarks += [f"{_own(name, one)} on a bound" for name in one.on_bound]
     where = element_words(one.element) or (f"channel {one.channel}" if one.channel else "")
     sd = "" if one.elpd_gain_sd is None else f" +- {one.elpd_gain_sd:.1f}"
-    gain = f"{one.elpd_gain:.1f}{sd}" if one.fitted else "-"
-    whole = f"{one.marginal_nats:.1f}" if one.fitted and one.size and one.marginal_nats is not None else ""
+    gain = f"{one.elpd_gain:z.1f}{sd}" if one.fitted else "-"
+    whole = f"{one.marginal_nats:z.1f}" if one.fitted and one.size and one.marginal_nats is not None else ""
     parity = f"{one.parity_nats:.1f}"
     if one.effect in RIVALS:
-        whole, gain, parity = (f"{one.elpd_gain:.1f}" if one.elpd_gain > NOWHERE else "-"), "", ""
+        whole, gain, parity = (f"{one.elpd_gain:z.1f}" if one.elpd_gain > NOWHERE else "-"), "", ""
     return [one.effect, where, whole, gain, parity, f"{one.probability:.2f}", size_words(one), _error(one, report),
             "; ".join(remarks)]  # fmt: skip
 

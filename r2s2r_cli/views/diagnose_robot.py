@@ -84,7 +84,9 @@ def _drawn(axes: Axes, group: Group, p: np.ndarray, element: ElementFound | None
     near = TOGETHER * float(np.ptp(p, axis=0).max())
     ends = group["cable"]
     bad_cables = {k for k in range(len(ends)) if _is_named(element, ("cable", "sensor"), k)}
-    bad_cables |= {k for k in range(len(ends)) if _is_named(element, ("motor",), k) and bool(group["actuated"][k])}
+    # Motors are numbered through the winched cables alone.
+    bad_cables |= {k for motor, k in enumerate(np.flatnonzero(group["actuated"]).tolist())
+                   if _is_named(element, ("motor",), motor)}  # fmt: skip
     for k, (a, b) in enumerate(ends.tolist()):
         bad = k in bad_cables
         axes.plot(p[[a, b], 0], p[[a, b], 1], color=MARKED if bad else PLAIN, lw=3.5 if bad else 1.0,

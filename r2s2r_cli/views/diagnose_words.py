@@ -36,6 +36,7 @@ TWO_ERRORS = (
     "were used for nothing before. They are of other intervals, each beside its own floor, so one may be at the floor "
     "and the other not"
 )
+NATS = "the unit of evidence: what gains 1 nat makes the runs e = 2.7 times as likely, what gains 3 nats 20 times"
 WHY_NONE = (
     "a gain is what these runs say, before what is known beforehand. none gains nothing by definition: sets of known "
     "truth taught how much an effect must gain to be likelier. unknown has the share of causes that the catalogue "

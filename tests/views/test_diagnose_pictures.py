@@ -59,3 +59,25 @@ def test_the_legend_of_judged_intervals_is_whole(figures: list[Figure], names: t
     marks = dict(zip([text.get_text() for text in legend.texts], legend.legend_handles, strict=True))
     assert marks["refit"].get_facecolor() == to_rgba(BLUE)  # type: ignore[union-attr]
     assert "median of all together" in marks
+
+
+@pytest.mark.parametrize("run", [b"a", b"b"])
+def test_a_curve_of_one_run_alone_is_in_the_legend(figures: list[Figure], run: bytes) -> None:
+    """Whichever it is."""
+    rows = gap().groups["segments"]
+    effect = np.where(rows["run"] == run, rows["effect"], np.nan)
+    next(draw_diagnosis(ArtifactData("diagnosis", {"segments": Group({**rows.datasets, "effect": effect})}), report()))
+    words = [text.get_text() for text in figures[0].legends[0].texts]
+    assert sorted(words[:3]) == ["floor", "refit", "refit + payload"] and len(set(words)) == len(words)
+
+
+@pytest.mark.parametrize(("lost", "said"), [(True, True), (False, False)])
+def test_points_that_are_missing_are_explained_without_an_effect(figures: list[Figure], lost: bool, said: bool) -> None:
+    """Where no effect was fitted a cap may be lost as well; an effect that was not fitted loses none."""
+    rows = gap().groups["segments"]
+    refit = rows["refit"].copy()
+    refit[1] = np.nan if lost else refit[1]
+    none = Group({**rows.datasets, "refit": refit, "effect": np.full(4, np.nan)})
+    next(draw_diagnosis(ArtifactData("diagnosis", {"segments": none}), report()))
+    words = [text.get_text() for text in figures[0].legends[0].texts]
+    assert ("no point: a cap ended more than 25 cm off" in words) == said

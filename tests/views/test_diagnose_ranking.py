@@ -140,3 +140,19 @@ def test_a_name_loses_the_unit_that_stands_behind_its_number() -> None:
     """And nothing else."""
     assert plain_name("compliance_m_per_n", "m/N") == "compliance" and plain_name("factor", "1") == "factor"
     assert plain_name("per_newton", "1/N") == "per_newton" and rounded(0.0371, 2) == "0.037"
+
+
+def test_what_rounds_to_nothing_has_no_sign() -> None:
+    """Of a gain of -0.04 nats nobody knows which way it goes."""
+    first = report().ranking[0].model_copy(update={"elpd_gain": -0.04, "marginal_nats": -0.03})
+    none = report().ranking[1].model_copy(update={"elpd_gain": -0.01})
+    table = ranking_table(report().model_copy(update={"ranking": (first, none)}))
+    rows = [dict(zip(table.columns, row, strict=True)) for row in table.rows]
+    assert [row["all data: gain [nats]"] for row in rows] == ["0.0", "0.0"]
+    assert rows[0]["left out: gain +- sd [nats]"] == "0.0"
+
+
+def test_the_unit_of_evidence_is_explained() -> None:
+    """Every table of gains is in nats, which a newcomer does not know."""
+    rows = {row[0]: row[1] for table in diagnose_tables(report()) for row in table.rows if len(row) == 2}
+    assert "1 nat makes the runs e = 2.7 times as likely" in rows["nats"]

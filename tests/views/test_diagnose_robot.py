@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.diagnose import draw_diagnosis
-from r2s2r_cli.views.diagnose_floor import floor_picture
+from r2s2r_cli.views.diagnose_floor import ARROW, NO_ARROW, floor_picture
 from r2s2r_cli.views.diagnose_robot import CAP, MARKED, PLAIN, ROD, named, robot_picture, together
 from r2s2r_cli.views.diagnose_words import GUIDE, drawn_effects, verdict_words
 from schemas.diagnosis import VERDICTS
@@ -120,3 +120,36 @@ def test_the_verdict_says_where_to_read_on(verdict: str) -> None:
     guide = (ROOT / GUIDE).read_text()
     chapter = words.split("chapter ")[1].rstrip(")")
     assert words.startswith(f"{verdict}: ") and f"\n## {chapter}\n" in guide and f"\n| `{verdict}` |" in guide
+
+
+def test_a_motor_is_on_its_own_cable(figures: list[Figure]) -> None:
+    """Motors are numbered through winched cables alone: the second motor need not be on cable 1."""
+    group = robot().groups["robot"]
+    ends = np.array([[0, 2], [0, 1], [2, 1]])
+    passive_first = Group({**group.datasets, "cable": ends, "actuated": np.array([False, True, True])})
+    robot_picture(ArtifactData("diagnosis", {"robot": passive_first}), said("effect", MOTOR))
+    (marked,) = (line for line in figures[0].axes[0].lines if to_hex(str(line.get_color())) == MARKED)
+    wanted = group["p_WE"][ends[2], :2] - group["p_WE"][:, :2].mean(axis=0)
+    assert np.allclose(marked.get_xydata(), wanted)
+
+
+def test_no_arrow_leaves_the_picture_of_the_floor(figures: list[Figure]) -> None:
+    """One that ends outside of the axes is not drawn, and those are the largest errors."""
+    error = np.zeros((2, 4, 3))
+    error[0, 1] = (0.1, -0.2, 0.0)
+    rows = Group({"xy": np.full((2, 4, 2), 0.1), "error": error})
+    floor_picture(ArtifactData("diagnosis", {"segments": rows}), said("ambiguous", None))
+    axes = figures[0].axes[0]
+    figures[0].canvas.draw()
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    assert left < 0.1 - ARROW * 0.1 < right and low < 0.1 + ARROW * 0.2 < high
+    assert NO_ARROW not in axes.get_title()
+
+
+def test_intervals_without_arrows_are_explained(figures: list[Figure]) -> None:
+    """No error is known where a cap was lost; a dot without an arrow would say that there is none."""
+    error = np.full((2, 4, 3), 0.01)
+    error[1] = np.nan
+    rows = Group({"xy": np.zeros((2, 4, 2)), "error": error})
+    floor_picture(ArtifactData("diagnosis", {"segments": rows}), said("ambiguous", None))
+    assert figures[0].axes[0].get_title().endswith(NO_ARROW)

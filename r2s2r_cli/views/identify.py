@@ -43,9 +43,11 @@ def draw_identification(data: ArtifactData) -> Iterator[tuple[str, str, bytes]]:
         if f"runs/{run}/free_run" in data.groups:
             yield f"free-{run}", f"Run {run}: free run over the test segments", draw_free_run(data, run)
     if "trace" in data.groups or "profiles" in data.groups:
-        yield "search", "Loss on the way of the fit, and profile likelihood of the weakest", draw_search(data)
+        parts = {"trace": "loss on the way of the fit", "profiles": "profile likelihood of the weakest"}
+        title = ", and ".join(words for name, words in parts.items() if name in data.groups)
+        yield "search", f"{title[:1].upper()}{title[1:]}", draw_search(data)
     if "history" in data.groups:
-        yield "history", "Estimates as runs arrived", draw_history(data)
+        yield "history", "Estimates as runs arrived, with 95 % intervals", draw_history(data)
 
 
 def _parameters(data: ArtifactData) -> bytes:

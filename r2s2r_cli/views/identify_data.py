@@ -7,13 +7,15 @@ import math
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.views.figure import GREEN, ORANGE, PURPLE, RED
 
 TRAIN, TEST = 1, 2
 """Codes of `role`."""
 ROLE_WORDS = {0: "not used", TRAIN: "train", TEST: "test"}
 ROLE_COLORS = {0: "#9aa5b1", TRAIN: "#0b5fa5", TEST: "#c1272d"}
 _ROUNDING = 1e-12
-TRUST_COLORS = {0: "#2a7f3e", 1: "#b8860b", 2: "#c1272d", 3: "#6b3fa0", 4: "#9aa5b1"}
+TRUST_COLORS = {0: GREEN, 1: ORANGE, 2: RED, 3: PURPLE, 4: "#9aa5b1"}
+"""Nothing but its colour says what a row of the parameters is worth: of a palette that colour-blind people can tell."""
 TRUST_WORDS = {0: "identified", 1: "weak", 2: "not identifiable", 3: "on a bound", 4: "fixed"}
 
 

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WHITENESS = "correlation of neighbouring residuals; ! not white: something is not modelled, or the tracker drifts"
+_TOO_FEW = "; grey: too few frames"
+_REPEATING = "identified + what repeats"
+_LETTERS = 110
+"""So many fit below the axis side by side, with gaps between as many names."""
 _DARK = 0.6
 """Correlations whose colour hides black signs."""
 _SPREAD = 0.7
@@ -61,26 +65,32 @@ def _bars(axes: Axes, segments: Group, measures: Group, repeats: Group | None = 
     axes.bar(x, 1e3 * segments["keyframe_cap_rmse"], color=[ROLE_COLORS[role] for role in roles], width=0.6)
     for role in sorted(set(roles)):
         axes.bar([0], [0], color=ROLE_COLORS[role], label=f"identified, {ROLE_WORDS[role]}")
-    marked = [
-        (k, name) for k, name in enumerate(words(measures, "baseline")) if name != "identified"
-    ]  # that is the bars
     repeating = errors_with_repeats(segments, repeats)
+    # The bars, and where it is drawn by itself what repeats: once each.
+    drawn = ("identified",) if repeating is None else ("identified", _REPEATING)
+    marked = [(k, name) for k, name in enumerate(words(measures, "baseline")) if name not in drawn]
     aside = _SPREAD * (np.arange(len(marked) + 1) - 0.5 * len(marked)) / max(len(marked), 1)
     for (k, name), beside in zip(marked, aside, strict=False):
         error, mark = 1e3 * segments["baseline_cap_rmse"][:, k], _MARKS[k % len(_MARKS)]
         color = _PALE if k % 2 else _FULL
         axes.plot(x + beside, error, mark, ms=9, mew=1.8, color=color, label=name, path_effects=edge)
     if repeating is not None:
-        axes.plot(
-            x + aside[-1], 1e3 * repeating, "P", ms=10, mec="black", color="#f5c518", label="identified + what repeats"
-        )
+        axes.plot(x + aside[-1], 1e3 * repeating, "P", ms=10, mec="black", color="#f5c518", label=_REPEATING)
     floor = floor_of(measures)
     if math.isfinite(floor):
         axes.axhline(1e3 * floor, color="black", lw=1, ls="--", label=f"floor {1e3 * floor:.1f} mm")
-    axes.set_xticks(x, segment_names(segments), fontsize=8)
-    axes.set(ylabel="end caps at the key frame, rms [mm]", xlabel="target interval")
+    _name_segments(axes, segments)
+    axes.set_ylabel("end caps at the key frame, rms [mm]")
     axes.set_ylim(0, None)
     legend_beside(axes)
+
+
+def _name_segments(axes: Axes, segments: Group) -> None:
+    """The same axis in both panels, a segment below its bar; names upright where they do not fit side by side."""
+    names = segment_names(segments)
+    upright = sum(map(len, names)) > _LETTERS
+    axes.set_xticks(range(len(names)), names, fontsize=8, rotation=90 if upright else 0)
+    axes.set(xlabel="target interval", xlim=(-0.5, len(names) - 0.5))
 
 
 def _whiteness(figure: Figure, axes: Axes, segments: Group) -> None:
@@ -93,7 +103,6 @@ def _whiteness(figure: Figure, axes: Axes, segments: Group) -> None:
         color = "white" if abs(lag1[cap, segment]) > _DARK else "black"
         axes.annotate("!", (segment, cap), ha="center", va="center", fontsize=13, weight="bold", color=color)
     axes.set_yticks(range(len(lag1)), [f"cap {cap}" for cap in range(len(lag1))], fontsize=8)
-    axes.set_xticks(range(lag1.shape[1]), segment_names(segments), fontsize=8)
-    axes.set_title(_WHITENESS, fontsize=9)
-    axes.set_xlabel("target interval")
+    _name_segments(axes, segments)
+    axes.set_title(_WHITENESS + ("" if np.isfinite(lag1).all() else _TOO_FEW), fontsize=9)
     figure.colorbar(image, ax=axes, fraction=0.03, pad=0.01)

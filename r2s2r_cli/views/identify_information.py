@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
-from r2s2r_cli.views.figure import new_figure, png_bytes
+from r2s2r_cli.views.figure import GREEN, RED, new_figure, png_bytes
 from r2s2r_cli.views.identify_data import shown_in_log, words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_WEAK, _STRONG = "#c1272d", "#2a7f3e"
+_WEAK, _STRONG = RED, GREEN
 _WRAP = 58
 """Characters of a line of words."""
 _LINE_IN = 0.135

@@ -151,11 +151,12 @@ def _own(segment: SegmentFigures) -> float:
 
 
 def _repeating(found: RepeatsFigures) -> PageTable:
+    left_out = counted(found.left_out, "interval")
     counts = ", ".join(f"{weight:.2f} ({n})" for weight, n in zip(found.weights, found.repeats, strict=True))
     rows = [
         ["part of the prediction", "yes" if found.used else "no: training intervals are not predicted better with it"],
         ["training intervals, the simulator alone [mm]", millimetres(found.left_out_alone_m)],
-        [f"the same with the repeats of the others [mm], {found.left_out} intervals", millimetres(found.left_out_m)],
+        [f"the same with the repeats of the others [mm], {left_out}", millimetres(found.left_out_m)],
         ["simulator beyond the floor, training [mm]", millimetres(found.gap_m)],
         [f"floor [mm], from {counted(found.contrasts, 'difference')}", millimetres(found.floor_m)],
         ["weight (repeats) of each test interval", counts or "-"],

@@ -44,7 +44,8 @@ def draw_search(data: ArtifactData) -> bytes:
 
 def draw_history(data: ArtifactData) -> bytes:
     """A panel a parameter: the estimate after each run, with its interval."""
-    history, names = data.groups["history"], words(data.groups["parameters"], "name")
+    history, table = data.groups["history"], data.groups["parameters"]
+    names, units = words(table, "name"), words(table, "unit")
     columns = min(len(names), _COLUMNS)
     figure = new_figure(15, 0.6 + 2.8 * math.ceil(len(names) / columns))
     panels = figure.subplots(math.ceil(len(names) / columns), columns, squeeze=False)
@@ -53,9 +54,10 @@ def draw_history(data: ArtifactData) -> bytes:
         if k >= len(names):
             axes.set_axis_off()
             continue
-        axes.errorbar(steps, history["value"][:, k], 1.96 * np.nan_to_num(history["sd"][:, k]), fmt="o-", capsize=3)
+        wide = _TWO_SIDED * np.nan_to_num(history["sd"][:, k])
+        axes.errorbar(steps, history["value"][:, k], wide, fmt="o-", capsize=3)
         axes.set_xticks(steps, runs, rotation=45, fontsize=7)
-        axes.set_title(names[k], fontsize=9)
+        axes.set_title(f"{names[k]}{'' if units[k] == '1' else f' [{units[k]}]'}", fontsize=9)
     return png_bytes(figure)
 
 

@@ -17,6 +17,7 @@ from r2s2r_cli.views.identify_errors import draw_errors, errors_with_repeats, fl
 from r2s2r_cli.views.identify_fits import cap_rmse
 from r2s2r_cli.views.identify_information import draw_information, information_figure
 from r2s2r_cli.views.identify_page import identify_page, report_tables, verdict
+from r2s2r_cli.views.identify_search import draw_history
 from r2s2r_cli.views.identify_self_test import self_test_tables
 from schemas.results_identify import Intervals, Recovered, RecoveredCase, SelfTestReport
 from tests.stages.identify.reports import report
@@ -263,3 +264,73 @@ def test_the_self_test_as_a_table() -> None:
     assert table.rows == [["friction", "1", "-0.002", "0.01", "0.011", "95%", "100%"],
                           ["damping", "N s/m", "+0.5", "1", "-", "-", "0%"]]  # fmt: skip
     assert table.title == "self-test, simulated: 20 planted robots, noise 1.0 mm, 95% converged"
+
+
+def errors_figure(data: ArtifactData, monkeypatch: pytest.MonkeyPatch) -> Figure:
+    """The picture of errors, as a figure."""
+    figures: list[Figure] = []
+
+    def kept(figure: Figure) -> bytes:
+        figures.append(figure)
+        return b""
+
+    monkeypatch.setattr("r2s2r_cli.views.identify_errors.png_bytes", kept)
+    draw_errors(data)
+    return figures[0]
+
+
+def test_what_repeats_is_drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is a baseline, too, where it is not the prediction: one mark and one name for one number."""
+    name = "identified + what repeats"
+    data = changed("measures", "baseline", np.array([name, "nominal", "nothing moves", "repeat"], dtype="S"))
+    legend = errors_figure(data, monkeypatch).axes[0].get_legend()
+    assert legend is not None
+    words = [text.get_text() for text in legend.texts]
+    assert words.count(name) == 1 and {"nominal", "nothing moves", "repeat"} <= set(words)
+    alone = replace(data, groups={path: group for path, group in data.groups.items() if path != "repeating"})
+    legend = errors_figure(alone, monkeypatch).axes[0].get_legend()
+    assert legend is not None and name not in [text.get_text() for text in legend.texts][4:]
+
+
+def test_many_segments_have_names_that_can_be_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of several runs with long names: no name lies on its neighbour, and a segment is below its own bar."""
+    data = builders.identification()
+    group = data.groups["segments"]
+    many = {key: np.concatenate([value] * 12) for key, value in group.datasets.items()}
+    many["run"] = np.array([f"turn-counterclockwise-{k}".encode() for k in range(len(many["run"]))])
+    many["lag1"] = np.full_like(many["lag1"], np.nan)
+    figure = errors_figure(replace(data, groups={**data.groups, "segments": Group(many)}), monkeypatch)
+    figure.canvas.draw()
+    top, bottom = figure.axes[:2]
+    for axes in (top, bottom):
+        boxes = sorted((label.get_window_extent() for label in axes.get_xticklabels()), key=lambda box: box.x0)
+        assert len(boxes) == len(many["run"]) and all(left.x1 <= right.x0 for left, right in pairwise(boxes))
+    assert top.get_xlim() == bottom.get_xlim()
+    assert bottom.get_title().endswith("grey: too few frames")
+
+
+def test_estimates_as_runs_arrived_have_units(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside the names, but for numbers without one."""
+    figures: list[Figure] = []
+
+    def kept(figure: Figure) -> bytes:
+        figures.append(figure)
+        return b""
+
+    monkeypatch.setattr("r2s2r_cli.views.identify_search.png_bytes", kept)
+    data = builders.identification()
+    draw_history(data)
+    table = data.groups["parameters"]
+    pairs = [(name.decode(), unit.decode()) for name, unit in zip(table["name"], table["unit"], strict=True)]
+    assert [axes.get_title() for axes in figures[0].axes] == [
+        name if unit == "1" else f"{name} [{unit}]" for name, unit in pairs
+    ]
+    assert any("[" in axes.get_title() for axes in figures[0].axes)
+
+
+def test_a_search_is_called_what_it_shows() -> None:
+    """Without profiles there is no word of them."""
+    titles = {name: title for name, title, _ in draw_identification(without("profiles"))}
+    assert titles["search"] == "Loss on the way of the fit"
+    titles = {name: title for name, title, _ in draw_identification(without("trace"))}
+    assert titles["search"] == "Profile likelihood of the weakest"

@@ -11,6 +11,12 @@ from r2s2r_cli.views.page import Page, PageTable, Picture, render
 from schemas.results_blind import BlindRow, BlindScoreResult
 
 _INK, _PALE = "#0b5fa5", "#8792a2"
+_TITLES = {
+    "confusion": "what was guessed first for every truth",
+    "calibration": "how often the first guess was right, by the probability that it was given",
+}
+_WHOLE = (-0.05, 1.09)
+"""Shares with room for marks at their ends, and for the numbers above them."""
 
 
 def blind_tables(result: BlindScoreResult) -> Iterator[PageTable]:
@@ -92,7 +98,7 @@ def blind_page(result: BlindScoreResult, pictures: Mapping[str, bytes]) -> bytes
             f"interval still holds the target. Commitment of the labels: {result.index_sha256}.",
             labels=result.warnings,
             tables=list(blind_tables(result)),
-            pictures=[Picture(name, png) for name, png in pictures.items()],
+            pictures=[Picture(_TITLES.get(name, name), png) for name, png in pictures.items()],
         )
     )
 
@@ -121,8 +127,8 @@ def _calibration(result: BlindScoreResult) -> bytes:
     right = [one.right for one in result.calibration]
     axes.plot(said, right, color=_INK, marker="o", label="found")
     for one in result.calibration:
-        axes.annotate(str(one.n), (one.said, one.right), textcoords="offset points", xytext=(5, -10), fontsize=8)
-    axes.set(xlabel="probability of the first guess", ylabel="how often it was right", xlim=(0, 1), ylim=(0, 1),
+        axes.annotate(str(one.n), (one.said, one.right), textcoords="offset points", xytext=(5, 4), fontsize=8)
+    axes.set(xlabel="probability of the first guess", ylabel="how often it was right", xlim=_WHOLE, ylim=_WHOLE,
              title="calibration, with the number of sets")  # fmt: skip
     axes.legend(fontsize=8)
     return png_bytes(figure)

@@ -6,13 +6,25 @@ import math
 import re
 from collections.abc import Iterator
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.views.calibration_parts import draw_masses, draw_tendons
-from r2s2r_cli.views.figure import BLUE, GREEN, ORANGE, PALE, PURPLE, RED, as_typed, new_figure, png_bytes, texts
+from r2s2r_cli.views.figure import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    PALE,
+    PURPLE,
+    RED,
+    as_typed,
+    legend_columns,
+    new_figure,
+    png_bytes,
+    texts,
+)
 from schemas.calibration import LINE_STATES
 from schemas.robot import Robot
 
@@ -58,8 +70,10 @@ def _sensors(points: Group, lines: Group, number: int, name: str) -> bytes:
             below.set_ylabel("residual\n[mm]")
         if sensor + columns >= n:
             below.set_xlabel("length [mm]")
+    rms = 1e3 * float(lines["rms_set"][number])
+    worth = f"rms {rms:.2f} mm over all points" if math.isfinite(rms) else "all sensors are dead"
     figure.suptitle(
-        f"set {as_typed(name)}: line per sensor, rms {1e3 * lines['rms_set'][number]:.2f} mm over all points\n"
+        f"set {as_typed(name)}: line per sensor, {worth}\n"
         "residual: length read from the line minus measured length (ring: line fitted without that point)"
     )
     return png_bytes(figure)
@@ -97,6 +111,7 @@ def _drift(history: Group, drift: Group) -> bytes:
     ticks = sorted({round(t / DAY_S) for t in np.linspace(history["time"].min(), history["time"].max(), 4)})
     labels = [f"{datetime.fromtimestamp(DAY_S * day, UTC):%d %b\n%Y}" for day in ticks]
     first: Axes | None = None
+    entries = dict[str, Any]()
     for sensor in range(n):
         row, column = divmod(sensor, columns)
         axes = figure.add_subplot(grid[row, column], sharex=first, sharey=first)
@@ -105,9 +120,12 @@ def _drift(history: Group, drift: Group) -> bytes:
         axes.set_xticks(ticks, labels)
         if column == 0:
             axes.set_ylabel("deviation [mm]")
-    if first is not None:
-        handles, names = first.get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside lower center", ncol=len(names), fontsize=9, frameon=False)
+        # Of every sensor: the first one may have no usable line in a file.
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    columns = legend_columns(figure.get_figwidth(), list(entries))
+    figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncol=columns, fontsize=8,
+                  frameon=False)  # fmt: skip
     _drift_sizes(figure.add_subplot(grid[rows, :]), history, drift)
     figure.suptitle(
         "drift: length that one and the same capacitance means, calibration after calibration\n"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from r2s2r_cli.views.page import Page, PageTable, Picture, render
+from r2s2r_cli.views.page import Page, PageTable, Picture, counted, render
 from schemas.results_calibrate import CalibrationReport, DriftSpread
 
 
@@ -38,12 +38,25 @@ def report_tables(report: CalibrationReport) -> Iterator[PageTable]:
         )  # fmt: skip
 
 
+_TITLES = {
+    "drift": "drift: what one and the same capacitance means, calibration after calibration",
+    "tendons": "force and stiffness of every tendon over its stretch",
+    "masses": "weighed parts and centre of mass of every rod",
+}
+"""Of pictures: their headings, and what stands for them where they cannot be seen."""
+
+
+def _title(name: str) -> str:
+    return _TITLES.get(name, f"sensor lines and their residuals, set {name.removeprefix('sensors-')}")
+
+
 def calibration_page(report: CalibrationReport, pictures: Mapping[str, bytes]) -> bytes:
     """The HTML page: tables of this run, pictures of everything in the artifact."""
-    parts = [f"{len(report.sets)} sets of sensor lines" if report.sets else "",
+    sets = f"{counted(len(report.sets), 'set')} of sensor lines"
+    parts = [sets if report.sets else "",
              "dated calibrations" if report.history else "",
-             f"{len(report.tendons.curves)} tendon curves" if report.tendons else "",
-             f"{len(report.masses)} weighed rods" if report.masses else ""]  # fmt: skip
+             counted(len(report.tendons.curves), "tendon curve") if report.tendons else "",
+             counted(len(report.masses), "weighed rod") if report.masses else ""]  # fmt: skip
     used = f" Set {report.used} is in robot.toml." if report.used else ""
     return render(
         Page(
@@ -51,7 +64,7 @@ def calibration_page(report: CalibrationReport, pictures: Mapping[str, bytes]) -
             sentence=f"Fitted: {', '.join(part for part in parts if part)}.{used}",
             labels=report.warnings,
             tables=list(report_tables(report)),
-            pictures=[Picture(name, png) for name, png in pictures.items()],
+            pictures=[Picture(_title(name), png) for name, png in pictures.items()],
         )
     )
 

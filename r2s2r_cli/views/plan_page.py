@@ -46,13 +46,17 @@ def plan_page(report: PlanReport, data: ArtifactData, robot: Robot, pictures: Se
     )
     page = Page(
         title=f"Plan for {robot.title}",
-        sentence=f"{counted(len(report.gaits), 'gait')} and {len(report.policies)} long policies, simulated with "
+        sentence=f"{counted(len(report.gaits), 'gait')} and {_long(len(report.policies))}, simulated with "
         f"{report.numbers}: {said}.",
         labels=list(report.warnings),
         tables=list(report_tables(report)),
         pictures=[Picture(title, png) for title, png in pictures],
     )
     return playback_page(page, data, robot)
+
+
+def _long(count: int) -> str:
+    return f"{count} long {'policy' if count == 1 else 'policies'}"
 
 
 def _gait(one: GaitFigures, pairs: int) -> list[str]:
@@ -70,7 +74,7 @@ def _gait(one: GaitFigures, pairs: int) -> list[str]:
 def _goal(one: PolicyFigures) -> str:
     """Where it was to go. Its name stays the one that `execute` knows."""
     x, y, turn = one.goal or (math.nan,) * 3
-    return f"({x:g}, {y:g}, {math.degrees(turn):.0f} deg)"
+    return f"({x:g} m, {y:g} m, {math.degrees(turn):.0f} deg)"
 
 
 def _policy(one: PolicyFigures) -> list[str]:

@@ -3,6 +3,8 @@
 from typing import Any
 
 import numpy as np
+import pytest
+from matplotlib.figure import Figure
 
 from r2s2r_cli.blind.score import score_of
 from r2s2r_cli.views.blind import _interval, blind_page, blind_tables, draw_blind
@@ -88,3 +90,32 @@ def test_markdown_holds_the_same_tables() -> None:
     said = [line.split(" | ")[1] for line in tables[-1].splitlines() if line.startswith("| ")][2:]
     counts = [sum(int(one.split()[1]) for one in line.rstrip(" |").split(", ")) for line in said]
     assert counts == [sum(row) for row in result.confusion if any(row)]
+
+
+def test_no_number_of_the_calibration_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of guesses that are never right, and of those that always are: within the axes, and so not on their ticks."""
+    figures: list[Figure] = []
+
+    def kept(figure: Figure) -> bytes:
+        figures.append(figure)
+        return b""
+
+    monkeypatch.setattr("r2s2r_cli.views.blind.png_bytes", kept)
+    labels = blind_bank.bank(60)
+    result = score_of(blind_bank.answered(labels, blind_bank.by_chance), tier="B", bank="test", sets=60, index="f00")
+    ends = [result.calibration[0].model_copy(update={"said": end, "right": end, "n": 888}) for end in (0.0, 1.0)]
+    assert "calibration" in dict(draw_blind(result.model_copy(update={"classes": [], "calibration": ends})))
+    axes = figures[0].axes[0]
+    figures[0].canvas.draw()
+    box = axes.get_window_extent()
+    numbers = [text.get_window_extent() for text in axes.texts]
+    assert len(numbers) == 2
+    assert all(box.x0 <= one.x0 and one.x1 <= box.x1 and box.y0 <= one.y0 and one.y1 <= box.y1 for one in numbers)
+
+
+def test_pictures_say_what_they_show() -> None:
+    """Above them, and where they cannot be seen."""
+    labels = blind_bank.bank(60)
+    result = score_of(blind_bank.answered(labels, blind_bank.by_chance), tier="B", bank="test", sets=60, index="f00")
+    page = blind_page(result, {"confusion": b"", "calibration": b""}).decode()
+    assert 'alt="what was guessed first for every truth"' in page and 'alt="how often the first guess was right' in page

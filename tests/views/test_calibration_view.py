@@ -8,12 +8,15 @@ import tomllib
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.stages.calibrate import Source, calibrate
 from r2s2r_cli.stages.init.robots import robot_toml
 from r2s2r_cli.views.calibration import draw_calibration
+from r2s2r_cli.views.calibration_page import calibration_page
 from r2s2r_cli.views.camera_preview import draw_preview
+from schemas.results_calibrate import CalibrationReport, RodMass
 from schemas.robot import Robot
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -100,3 +103,58 @@ def test_a_camera_and_its_rods_are_named_as_they_were_typed(name: str) -> None:
     mask[10:20, 10:20] = True
     picture = np.zeros((60, 80, 3), dtype=np.uint8)
     assert draw_preview(picture, np.ones((60, 80)), None, masks={name: mask}, title=name).startswith(PNG)
+
+
+@pytest.fixture
+def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """What the pictures draw, instead of files."""
+    found: list[Figure] = []
+
+    def kept(figure: Figure) -> bytes:
+        found.append(figure)
+        return b""
+
+    monkeypatch.setattr("r2s2r_cli.views.calibration.png_bytes", kept)
+    return found
+
+
+@pytest.mark.parametrize(("rms", "said"), [(np.nan, "all sensors are dead"), (0.0012, "rms 1.20 mm over all points")])
+def test_a_set_without_a_live_sensor_has_no_rms(
+    data: ArtifactData, robot: Robot, figures: list[Figure], rms: float, said: str
+) -> None:
+    """It says so instead of `nan mm`."""
+    lines = data.groups["lines"]
+    changed = Group({**lines.datasets, "rms_set": np.full_like(lines["rms_set"], rms)}, lines.attributes)
+    next(draw_calibration(ArtifactData(data.kind, {**data.groups, "lines": changed}), robot))
+    assert said in figures[0].get_suptitle() and "nan" not in figures[0].get_suptitle()
+
+
+def test_a_file_in_which_the_first_sensor_failed_is_in_the_legend(
+    data: ArtifactData, robot: Robot, figures: list[Figure]
+) -> None:
+    """Other sensors are drawn of it; the legend holds it, and is not cut off."""
+    history = data.groups["history"]
+    state = history["state"].copy()
+    state[:, 0] = 1
+    name = np.full(len(state), b"a history with a long name, as folders have them.json")
+    changed = Group({**history.datasets, "state": state, "file": name}, history.attributes)
+    assert "drift" in dict(draw_calibration(ArtifactData(data.kind, {**data.groups, "history": changed}), robot))
+    figure = next(one for one in figures if one.legends)
+    figure.canvas.draw()
+    legend = figure.legends[0]
+    assert name[0].decode() in [text.get_text() for text in legend.texts]
+    box = legend.get_window_extent()
+    assert box.x0 >= 0.0 and box.x1 <= figure.bbox.x1
+
+
+def test_the_page_says_what_pictures_show_and_counts() -> None:
+    """One set is a set; a picture that cannot be seen has words instead, and a set's name is no markup."""
+    mass = RodMass(rod="<b>green</b>", parts=1, mass_kg=0.1, com_m=0.0, inertia_axial_kg_m2=1e-5,
+                   inertia_transverse_kg_m2=1e-3)  # fmt: skip
+    report = CalibrationReport.model_construct(
+        sets=(), history=None, tendons=None, masses=(mass,), used=None, warnings=()
+    )
+    page = calibration_page(report, {"sensors-a": b"", "masses": b""}).decode()
+    assert "Fitted: 1 weighed rod." in page and "&lt;b&gt;green" in page and "<b>green" not in page
+    assert 'alt="sensor lines and their residuals, set a"' in page
+    assert 'alt="weighed parts and centre of mass of every rod"' in page

@@ -6,7 +6,7 @@ import pytest
 
 from r2s2r_cli.commands.execute_outcome import _lasting
 from r2s2r_cli.views.plan import signed, told
-from r2s2r_cli.views.plan_page import _policy, report_tables
+from r2s2r_cli.views.plan_page import _long, _policy, report_tables
 from schemas.results_plan import PlanReport, PolicyFigures
 
 
@@ -42,3 +42,9 @@ def test_the_digits_of_a_shape_are_explained() -> None:
         wall_s=0.0,
     )  # fmt: skip
     assert "a digit a motor, 1: its cable long, 0: short" in next(iter(report_tables(report))).title
+
+
+@pytest.mark.parametrize(("count", "said"), [(0, "0 long policies"), (1, "1 long policy"), (2, "2 long policies")])
+def test_long_policies_are_counted(count: int, said: str) -> None:
+    """One is a policy."""
+    assert _long(count) == said

@@ -73,4 +73,4 @@ def test_the_table_calls_it_as_execute_does() -> None:
     )  # fmt: skip
     _, long, _ = report_tables(report)
     assert [row[0] for row in long.rows] == ["to"]
-    assert long.title == "long policies; to leads to (0.2, 0.1, 30 deg)"
+    assert long.title == "long policies; to leads to (0.2 m, 0.1 m, 30 deg)"

@@ -127,7 +127,7 @@ def diagnose(
             zip(compared.arena.names[: compared.arena.shared], compared.base.z, strict=False))
             if name != SENSOR_LAG or compared.arena.sensors},
         segments=_segments(compared), within_run=evidence.within_run, rollouts=replayer.rollouts,
-        warnings=(*fitted.warnings, *compared.which.warnings),
+        warnings=(*fitted.warnings, *compared.which.warnings), actuated=tuple(evidence.robot.actuated),
     )  # fmt: skip
 
 

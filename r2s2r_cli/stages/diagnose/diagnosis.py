@@ -36,7 +36,8 @@ class SegmentSeen:
 @dataclass(frozen=True)
 class Diagnosis:
     """parity, where: None where they were left out (an ablation). refit: numbers of the refit nominal model by name, as
-    (value, sd). rollouts: simulated stretches. warnings: for people."""
+    (value, sd). rollouts: simulated stretches. warnings: for people. actuated: cable of every motor, empty: of its own
+    number."""
 
     robot: str
     floor: FloorGiven
@@ -50,11 +51,12 @@ class Diagnosis:
     within_run: bool
     rollouts: int
     warnings: tuple[str, ...] = ()
+    actuated: tuple[int, ...] = ()
 
     @property
     def seat(self) -> Seat:
         """Channel and element of the cause."""
-        return seat(self.which, self.where)
+        return seat(self.which, self.where, self.actuated)
 
     @property
     def channel(self) -> str | None:

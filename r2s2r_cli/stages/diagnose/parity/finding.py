@@ -23,9 +23,9 @@ from runs of the same robot, and how far robots are from their robot.toml is kno
 
 @dataclass(frozen=True)
 class Element:
-    """A part that a finding is about. kind: as `ElementFound` of the report has it. index: of the cable for cables,
-    motors and sensors; None where it is all of the kind, or the kind has no numbers. xy_m: of a place on the floor [m],
-    frame W."""
+    """A part that a finding is about. kind: as `ElementFound` of the report has it. index: of the cable for cables and
+    sensors, of the motor among those of the robot; None where it is all of the kind, or the kind has no numbers.
+    xy_m: of a place on the floor [m], frame W."""
 
     kind: str
     index: int | None = None

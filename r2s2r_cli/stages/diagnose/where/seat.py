@@ -8,7 +8,7 @@ it has a place. Both kinds stay in `Diagnosis.where` and the ranking as they are
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -17,8 +17,8 @@ from r2s2r_cli.stages.diagnose.where.found import Where
 from r2s2r_cli.stages.diagnose.which.found import NONE, UNKNOWN, Ranked, Which
 
 T = TypeVar("T", bound=Hashable)
-SAME_STRING = frozenset({"motor", "cable", "sensor"})
-"""Elements that share their numbers: motor and sensor i are those of cable i."""
+ON_A_STRING = frozenset({"motor", "cable", "sensor"})
+"""Elements of one string: a cable, the sensor beside it, the motor that winds it."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class Seat:
     element: Element | None = None
 
 
-def seat(which: Which, where: Where | None) -> Seat:
-    """Of a verdict and, where they were fitted, the probes."""
+def seat(which: Which, where: Where | None, actuated: Sequence[int] = ()) -> Seat:
+    """Of a verdict and, where they were fitted, the probes. actuated: cable of every motor, empty: that of its number."""
     if which.verdict == "no_gap" and which.ranking[0].effect in (NONE, UNKNOWN):
         return Seat()
     if which.verdict in ("effect", "pair"):
@@ -43,19 +43,22 @@ def seat(which: Which, where: Where | None) -> Seat:
         return Seat(where.channel, where.element)
     channel = _likeliest((one.channel, one.probability) for one in names)
     own = [one for one in names if one.channel == channel]
-    return Seat(channel, _element(own))
+    return Seat(channel, _element(own, actuated))
 
 
-def _element(names: list[Ranked]) -> Element | None:
-    """The one that the names of a channel speak for together, as far as they speak of one; of motor, cable and sensor
-    of one number that of the most probable name."""
-    told = [(_string(one.element), one.probability, one.element) for one in names if one.element is not None]
+def _element(names: list[Ranked], actuated: Sequence[int]) -> Element | None:
+    """The one that the names of a channel speak for together, as far as they speak of one; of the motor, cable and
+    sensor of one string that of the most probable name."""
+    told = [(_string(one.element, actuated), one.probability, one.element) for one in names if one.element is not None]
     key = _likeliest((key, probability) for key, probability, _ in told)
     return next((element for own, _, element in told if own == key), None)
 
 
-def _string(element: Element) -> tuple[object, ...]:
-    return ("string" if element.kind in SAME_STRING else element.kind, element.index)
+def _string(element: Element, actuated: Sequence[int]) -> tuple[object, ...]:
+    index = element.index
+    if element.kind == "motor" and index is not None and actuated:
+        index = actuated[index]
+    return ("string" if element.kind in ON_A_STRING else element.kind, index)
 
 
 def _likeliest(weighed: Iterable[tuple[T, float]]) -> T | None:

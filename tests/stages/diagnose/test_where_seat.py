@@ -77,7 +77,7 @@ def test_motor_and_cable_of_one_number_speak_for_the_same_string() -> None:
     )
     found = seat(SimpleNamespace(verdict="ambiguous", effects=(), ranking=names), None)  # type: ignore[arg-type]
     assert found.element == Element("cable", 2)
-    # Of a robot whose motors wind cables 4 and 6 to 10, motor 2 is that of cable 7: three strings, of which 4 is likeliest.
+    # Of a robot whose motors wind cables 4 and 6 to 10, motor 2 is that of cable 7: three strings.
     passive = SimpleNamespace(verdict="ambiguous", effects=(), ranking=names)
     assert seat(passive, None, (4, 6, 7, 8, 9, 10)).element == Element("cable", 4)  # type: ignore[arg-type]
 

@@ -30,7 +30,7 @@ class Seat:
 
 
 def seat(which: Which, where: Where | None, actuated: Sequence[int] = ()) -> Seat:
-    """Of a verdict and, where they were fitted, the probes. actuated: cable of every motor, empty: that of its number."""
+    """Of a verdict and, where they were fitted, the probes. actuated: cable of every motor, empty: of its number."""
     if which.verdict == "no_gap" and which.ranking[0].effect in (NONE, UNKNOWN):
         return Seat()
     if which.verdict in ("effect", "pair"):

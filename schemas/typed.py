@@ -33,8 +33,10 @@ class AtMost:
         return core_schema.no_info_after_validator_function(self.check, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """Hook of pydantic: the bound in the published JSON schema."""
-        return {**handler(schema), "maximum": self.limit}
+        """Hook of pydantic: the bound in the published JSON schema, on both sides where none is stated below."""
+        found = handler(schema)
+        below = {} if found.keys() & {"minimum", "exclusiveMinimum"} else {"minimum": -self.limit}
+        return {**found, **below, "maximum": self.limit}
 
 
 LENGTH_MAX_M = 20.0

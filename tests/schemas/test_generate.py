@@ -11,14 +11,17 @@ from pathlib import Path
 from typing import Any
 
 import jsonschema
+import pydantic
 import pytest
 
 from r2s2r_cli.stages.init.robots import robot_toml
 from r2s2r_cli.store.header import read_header
 from schemas.generate import FILES, HOME, derived, layout, results
+from schemas.robot import Robot
 from schemas.versions import KINDS
 from tests.commands.conftest import invoke
 from tests.guards.listing import ROOT
+from tests.schemas.test_models import changed
 from tests.support.make_golden import GOLDEN, golden_path
 
 DOCUMENTS = {path: json.loads(text) for path, text in derived().items() if path.endswith(".json")}
@@ -52,6 +55,18 @@ def test_robot_descriptions_fit_their_schema() -> None:
         check("robot", tomllib.loads(robot_toml(robot)))
     with pytest.raises(jsonschema.ValidationError):
         check("robot", {**tomllib.loads(robot_toml("threebar")), "wheels": 4})
+
+
+def test_bounds_of_the_schema_are_those_of_the_models() -> None:
+    """A number far out on either side is refused by an editor that reads the schema as it is by r2s2r."""
+    for place, far in (("rest_caps_m.0.0", 20.5), ("rods.0.parts.0.offset_m", 162.5), ("sensors.0.offset_f", 12.5)):
+        for value in (far, -far):
+            wrong = changed(tomllib.loads(robot_toml("threebar")), place, value)
+            with pytest.raises(pydantic.ValidationError, match="at most"):
+                Robot.model_validate(wrong)
+            with pytest.raises(jsonschema.ValidationError) as caught:
+                check("robot", wrong)
+            assert caught.value.instance == value
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,13 @@ def shifted(count: int = 6) -> Recorded:
     return replace(recorded, X_WC=pinhole.pose(camera))
 
 
+def pose(turn: list[float], height: float) -> np.ndarray:
+    """A camera's pose (4, 4) with this diagonal and height [m]."""
+    X_WC = np.diag([*turn, 1.0])
+    X_WC[2, 3] = height
+    return X_WC
+
+
 def test_ground_pose_noise_and_shift_are_found() -> None:
     """Tilt and height to 0.05 degrees and 1 mm, noise to 5 %, the shift of depth to 0.35 px and told; stated pose."""
     source = shifted()
@@ -97,12 +104,10 @@ def test_a_knocked_camera_is_warned_of() -> None:
     assert any("knocked" in word for word in found.warnings)
 
 
-@pytest.mark.slow
-def test_a_floor_full_of_things_is_warned_of() -> None:
-    """Boxes of all heights all about, so that the largest plane is not the ground: it is warned of, and a stated pose
-    is believed instead."""
+@lru_cache
+def littered() -> Recorded:
+    """The same with boxes of all heights all about, so that the largest plane is not the ground."""
     source, rng = shifted(), np.random.default_rng(TUNING)
-    assert source.X_WC is not None
     boxes = np.kron(rng.integers(200, 2000, (30, 40)), np.ones((16, 16))).astype(np.uint16)
     boxes[:, 260:380] = 0
     frames = [
@@ -110,13 +115,35 @@ def test_a_floor_full_of_things_is_warned_of() -> None:
         for frame in source.frames
         if frame.depth is not None
     ]
-    found = survey(replace(source, frames=frames), ROBOT, frames=2, method="numpy")
+    return replace(source, frames=frames)
+
+
+@pytest.mark.slow
+def test_a_floor_full_of_things_is_warned_of() -> None:
+    """The largest plane is not the ground: it is warned of, and a stated pose is believed instead."""
+    source = littered()
+    assert source.X_WC is not None
+    found = survey(source, ROBOT, frames=2, method="numpy")
     assert any("need not be the ground" in word for word in found.warnings)
     assert any("the stated pose is used" in word for word in found.warnings)
     assert found.X_WC[:2, 3] == pytest.approx(source.X_WC[:2, 3])
     assert found.X_WC[:3, :3] == pytest.approx(source.X_WC[:3, :3], abs=1e-3)  # levelled by the ground that is seen
     assert found.X_WC[2, 3] == found.ground.distance
     assert found.ground is not None and found.ground.distance == pytest.approx(1.3)
+
+
+@pytest.mark.parametrize(
+    "stated",
+    [np.eye(4), np.diag([1.0, -1, -1, 1]), pose([1, 1, 1], 1.3), pose([1, -1, -1], -1.3), np.full((4, 4), np.nan)],
+    ids=["unit matrix", "in the floor", "looks up", "below the floor", "nan"],
+)
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_pose_from_which_no_floor_is_seen_is_not_believed(stated: np.ndarray) -> None:
+    """Even where the largest plane need not be the ground: such a camera would see robots that hang in the air."""
+    found = survey(replace(littered(), X_WC=stated), ROBOT, frames=2, method="numpy")
+    assert any("no floor can be seen; the ground that is seen is used" in word for word in found.warnings)
+    assert found.X_WC[2, 3] > 0.5 and found.X_WC[2, 2] < -0.5
+    assert found.noise.sd > 1e-4
 
 
 def changed(kind: str) -> Recorded:

@@ -26,7 +26,14 @@ from r2s2r_cli.stages.estimate.vision.plane import (
 )
 from r2s2r_cli.stages.estimate.vision.plausible import HINT, check_lengths, check_sizes
 from r2s2r_cli.stages.estimate.vision.sight import Sighter
-from r2s2r_cli.stages.estimate.vision.world import HEIGHT_M, TILT_RAD, camera_pose, disagreement, levelled
+from r2s2r_cli.stages.estimate.vision.world import (
+    HEIGHT_M,
+    TILT_RAD,
+    camera_pose,
+    disagreement,
+    levelled,
+    sees_floor,
+)
 from schemas.robot import Robot
 
 FRAMES = 24
@@ -75,7 +82,7 @@ def survey(
         raise _bad("no frame of the run has a picture in colour and one in depth with anything in them",
                    f"{len(index)} frames looked at", "colour and depth", _lacks(looked))  # fmt: skip
     ground = _ground(usable, lens, scale, seed, method, warnings)
-    X_WC, ground, seen = _posed(source.X_WC, ground, warnings)
+    X_WC, ground, seen = _posed(source.X_WC, lens, ground, warnings)
     noise = _noise(usable[:: max(len(usable) // NOISE_FRAMES, 1)][:NOISE_FRAMES], lens, scale, ground)
     first = Survey(X_WC, ground, noise)
     check_sizes(usable, robot, lens, scale)
@@ -88,7 +95,7 @@ def survey(
     height_sd = float("nan")
     if seen:
         ground, height_sd = levelled_ground(ground, usable, rough.places, Lens(lens), scale, noise)
-        X_WC, ground, _ = _posed(source.X_WC, ground, [])
+        X_WC, ground, _ = _posed(source.X_WC, lens, ground, [])
         first = replace(first, X_WC=X_WC, ground=ground)
     shift, shift_sd = _pooled(rough)
     second = first.with_colors(shift_px=shift, swell_px=0.0, swell_sd_px=0.3)
@@ -105,17 +112,21 @@ def survey(
     )  # fmt: skip
 
 
-def _posed(stated: np.ndarray | None, ground: Ground, warnings: list[str]) -> tuple[np.ndarray, Ground, bool]:
+def _posed(
+    stated: np.ndarray | None, lens: Intrinsics, ground: Ground, warnings: list[str]
+) -> tuple[np.ndarray, Ground, bool]:
     """X_WC (4, 4), the ground it stands on, and whether that is the one that is seen."""
     if stated is None:
         return camera_pose(ground), ground, True
     angle, height = disagreement(stated, ground)
     if angle <= TILT_RAD and abs(height) <= HEIGHT_M:
         return levelled(stated, ground), ground, True
-    trusted = ground.share >= MIN_SHARE
+    possible = sees_floor(stated, lens)  # a unit matrix in the place of a pose nobody measured looks up from the floor
+    trusted = ground.share >= MIN_SHARE or not possible
     warnings.append(
         f"the recording's camera pose and the ground that is seen differ by {np.degrees(angle):.1f} degrees, "
-        f"{1e3 * height:.0f} mm; {'the ground that is seen' if trusted else 'the stated pose'} is used"
+        f"{1e3 * height:.0f} mm; {'' if possible else 'from the stated pose no floor can be seen; '}"
+        f"{'the ground that is seen' if trusted else 'the stated pose'} is used"
     )
     if trusted:
         return camera_pose(ground), ground, True

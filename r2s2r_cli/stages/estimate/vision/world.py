@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from r2s2r_cli.devices.camera import Intrinsics
 from r2s2r_cli.stages.estimate.vision.plane import Ground
 
 TILT_RAD, HEIGHT_M = np.radians(1.0), 0.010
@@ -44,6 +45,18 @@ def disagreement(X_WC: np.ndarray, ground: Ground) -> tuple[float, float]:
     """How far a stated pose X_WC and the ground that is seen are apart: angle [rad], height of the camera [m]."""
     cosine = float(np.clip(X_WC[2, :3] @ ground.normal_C, -1.0, 1.0))
     return float(np.arccos(cosine)), float(X_WC[2, 3] - ground.distance)
+
+
+def sees_floor(X_WC: np.ndarray, lens: Intrinsics) -> bool:
+    """Whether a camera with a stated pose (4, 4) is above the floor and has some of it in its picture.
+
+    Distortion is left out: it moves a corner of the picture by a few degrees.
+    """
+    x = (np.array([0.0, lens.width]) - lens.cx) / lens.fx
+    y = (np.array([0.0, lens.height]) - lens.cy) / lens.fy
+    # How far a ray (x, y, 1) rises is linear in x and y, so the one that falls most goes through a corner.
+    rise = X_WC[2, 0] * x[None, :] + X_WC[2, 1] * y[:, None] + X_WC[2, 2]
+    return bool(X_WC[2, 3] > 0 and rise.min() < 0)
 
 
 def to_world(X_WC: np.ndarray, p_C: np.ndarray, cov_C: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:

@@ -24,6 +24,8 @@ from schemas.typed import (
     Radius,
     Share,
     Size,
+    Stiffness,
+    TendonStiffness,
     Tolerance,
     Wait,
     Whole,
@@ -73,7 +75,7 @@ class Cable(Frozen):
 
     caps: tuple[Whole, Whole]
     kind: Literal["actuated", "passive"]
-    stiffness_n_per_m: Positive
+    stiffness_n_per_m: Stiffness
     damping_n_s_per_m: NonNegative
     stiffness2_n_per_m2: Number = 0.0
     stiffness3_n_per_m3: Number = 0.0
@@ -112,7 +114,7 @@ class Sensor(Frozen):
     slope_f_per_m: CapacitanceSlope | None = None
     offset_f: Capacitance | None = None
     """None: not calibrated."""
-    stiffness_n_per_m: NonNegative = 0.0
+    stiffness_n_per_m: TendonStiffness = 0.0
     """Of the sensor tendon that runs parallel to an actuated cable; 0 where the cable itself is the sensor."""
     rest_length_m: Length | None = None
     """Below it the sensor tendon is slack; needed where its stiffness is above 0."""

@@ -42,6 +42,7 @@ class AtMost:
 LENGTH_MAX_M = 20.0
 """Four times the largest robot thought of; 0.02 m, the smallest part that is a length of its own, is 20 in mm."""
 _MM = "looks like millimetres"
+_MODULUS = "looks like the modulus of the material in pascals; times area over length it is N/m"
 
 Number = Annotated[float, Field(strict=True)]
 Positive = Annotated[float, Field(strict=True, gt=0)]
@@ -59,6 +60,11 @@ Radius = Annotated[float, Field(strict=True, gt=0), AtMost(1.0, "m", _MM)]
 Coordinate = Annotated[float, Field(strict=True), AtMost(LENGTH_MAX_M, "m", _MM)]
 Mass = Annotated[float, Field(strict=True, gt=0), AtMost(1000.0, "kg", "looks like grams")]
 """A part [kg]; a ton is what no cable robot of this sort lifts."""
+Stiffness = Annotated[float, Field(strict=True, gt=0), AtMost(1e9, "N/m", _MODULUS)]
+"""Of a tendon: 6 mm of steel wire 1 m long have 6e6 N/m. The engine divides its step by the root of it, and from 1e11 on
+a second of simulation takes hours."""
+TendonStiffness = Annotated[float, Field(strict=True, ge=0), AtMost(1e9, "N/m", _MODULUS)]
+"""The same, 0 where there is none."""
 Tolerance = Annotated[float, Field(strict=True, gt=0), AtMost(1.0, "", "looks like per cent or millimetres: 0.1 is a tenth of the range")]  # fmt: skip
 """Share of a cable's range: beyond 1 every cable would be done before it has moved."""
 Duration = Annotated[float, Field(strict=True, ge=0), AtMost(3600.0, "s", "looks like milliseconds")]

@@ -46,6 +46,9 @@ def read_head(path: Path) -> tuple[JournalHead, int]:
 @contextlib.contextmanager
 def unwatched(path: Path) -> Iterator[None]:
     """Hold the journal's lock while it is sealed. Raises UsageError where it is still being written."""
+    if path.exists() and not path.is_dir() and not path.is_file():  # to open a pipe would wait for its writer for ever
+        raise ArtifactError("this is no regular file", where=str(path), expected="a journal",
+                            received="a pipe, socket or device", hint=f"ls -la {quoted(path)}")  # fmt: skip
     try:
         file = path.open("rb")
     except OSError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import signal
 from pathlib import Path
 from typing import Any
@@ -195,6 +196,15 @@ def test_empty_and_foreign_files_are_no_journals(tmp_path: Path) -> None:
         (tmp_path / "x.journal").write_bytes(content)
         with pytest.raises(ArtifactError):
             read_head(tmp_path / "x.journal")
+
+
+def test_a_pipe_in_the_place_of_a_journal_is_not_waited_for(tmp_path: Path) -> None:
+    """To open one without a writer would block for ever: the test would never end."""
+    pipe = tmp_path / "10-record.h5.journal"
+    os.mkfifo(pipe)
+    with pytest.raises(ArtifactError, match="no regular file") as caught, unwatched(pipe):
+        pass
+    assert caught.value.hint == f"ls -la {pipe}" and caught.value.received
 
 
 def test_sensor_row_tells_its_number() -> None:

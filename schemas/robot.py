@@ -138,6 +138,15 @@ class Pid(Frozen):
     rate_hz: Positive
     step_timeout_s: Wait
 
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.rate_hz * self.step_timeout_s < 1.0:
+            raise ValueError(
+                f"rate_hz must have a tick within step_timeout_s ({self.step_timeout_s:g} s), else every step is given "
+                f"up before the controller has acted once: {self.rate_hz:g} looks like the period in seconds"
+            )
+        return self
+
 
 class Limits(Frozen):
     """What a healthy robot never leaves; `validate` and the host's safety checks use it."""

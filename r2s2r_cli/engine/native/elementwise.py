@@ -68,7 +68,7 @@ def power(g: Graph, a: int, b: int) -> int:
         return g.apply("pow", a, b)
     if n < 0:
         return g.reciprocal(power(g, a, g.const(-n)))
-    result = g.apply("sqrt", a) if n != int(n) else g.const(1.0)
+    result = g.const(1.0) if n == int(n) else g.apply("sqrt", a) if n < 1 else _flat_root(g, a)
     square, left = a, int(n)
     while left:
         if left % 2:
@@ -86,12 +86,16 @@ def sigmoid(g: Graph, a: int) -> int:
     return g.div(g.select(positive, g.const(1.0), small), denominator)
 
 
+def _flat_root(g: Graph, a: int) -> int:
+    """Square root with derivative 0 at 0, for where it meets a factor 0 there: infinity times 0 would be NaN."""
+    zero = g.const(0.0)
+    at_zero = g.compare("eq", a, zero)
+    return g.select(at_zero, zero, g.apply("sqrt", g.select(at_zero, g.const(1.0), a)))
+
+
 def norm(g: Graph, terms: list[int]) -> int:
     """Euclidean norm, with derivative 0 at 0: the root is never taken of 0."""
-    zero = g.const(0.0)
-    squares = g.sum(g.mul(i, i) for i in terms)
-    at_zero = g.compare("eq", squares, zero)
-    return g.select(at_zero, zero, g.apply("sqrt", g.select(at_zero, g.const(1.0), squares)))
+    return _flat_root(g, g.sum(g.mul(i, i) for i in terms))
 
 
 def largest(g: Graph, terms: list[int], op: str) -> int:
@@ -104,10 +108,13 @@ def largest(g: Graph, terms: list[int], op: str) -> int:
     best = g.apply("det", best)
     one, zero = g.const(1.0), g.const(0.0)
     shares = [g.select(g.compare("eq", i, best), one, zero) for i in terms]
-    # Each term below has the value 0: it carries the derivative alone.
-    carried = g.sum(
-        g.mul(share, g.sub(i, g.apply("det", i))) for share, i in zip(shares, terms, strict=True) if g.value(i) is None
-    )
+
+    def carrier(share: int, i: int) -> int:
+        """A term of value 0 that carries the derivative alone, of what is finite: infinity less itself is NaN."""
+        endless = g.compare("eq", g.apply("abs", i), g.const(float("inf")))
+        return g.select(endless, zero, g.mul(share, g.sub(i, g.apply("det", i))))
+
+    carried = g.sum(carrier(share, i) for share, i in zip(shares, terms, strict=True) if g.value(i) is None)
     return g.add(best, g.div(carried, g.sum(shares)))
 
 
@@ -119,6 +126,11 @@ def _xor(g: Graph, a: int, b: int) -> int:
 def quotient(g: Graph, a: int, b: int) -> int:
     """Quotient of two numbers or truth values."""
     return g.div(real(g, a), real(g, b))
+
+
+def _mul(g: Graph, a: int, b: int) -> int:
+    """The product; of two truth values, whether both hold: torch's is a truth value again."""
+    return g.both(a, b) if g.boolean(a) and g.boolean(b) else g.mul(real(g, a), real(g, b))
 
 
 UNARY: dict[str, Scalar] = {
@@ -147,7 +159,7 @@ UNARY: dict[str, Scalar] = {
 """Functions of one number."""
 
 BINARY: dict[str, Scalar] = {
-    "mul": lambda g, a, b: g.mul(real(g, a), real(g, b)),
+    "mul": _mul,
     "maximum": _apply("max"),
     "minimum": _apply("min"),
     "pow": power,

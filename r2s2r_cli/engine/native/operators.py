@@ -30,7 +30,8 @@ def mapped(trace: Trace, fn: Scalar, *args: Any) -> Nodes:
 
 
 def _elementwise(fn: Scalar) -> Operation:
-    return lambda trace, *args, **_: mapped(trace, fn, *args)
+    # An option by name would change the result: unknown ones must fail, not be passed over.
+    return lambda trace, *args: mapped(trace, fn, *args)
 
 
 def _unary(name: str) -> Operation:
@@ -41,7 +42,12 @@ def _unary(name: str) -> Operation:
 
 
 def _add(trace: Trace, a: Any, b: Any, *, alpha: float = 1) -> Nodes:
-    return mapped(trace, lambda g, x, y: g.add(el.real(g, x), g.mul(g.const(alpha), el.real(g, y))), a, b)
+    def total(g: Graph, x: int, y: int) -> int:
+        if g.boolean(x) and g.boolean(y):
+            return g.either(x, y)  # as torch has it: the sum of two truth values is one
+        return g.add(el.real(g, x), g.mul(g.const(alpha), el.real(g, y)))
+
+    return mapped(trace, total, a, b)
 
 
 def _sub(trace: Trace, a: Any, b: Any, *, alpha: float = 1) -> Nodes:
@@ -53,6 +59,16 @@ def _div(trace: Trace, a: Any, b: Any, *, rounding_mode: str | None = None) -> N
     if rounding_mode is None:
         return quotient
     return mapped(trace, el.UNARY[rounding_mode], trace.tensor(quotient))
+
+
+def _round(trace: Trace, x: Any, *, decimals: int = 0) -> Nodes:
+    scale = 10.0**decimals
+
+    def rounded(g: Graph, a: int) -> int:
+        scaled = g.apply("round", g.mul(el.real(g, a), g.const(scale)))
+        return g.div(scaled, g.const(scale))
+
+    return mapped(trace, rounded, x)
 
 
 def _clamp(trace: Trace, a: Any, min: Any = None, max: Any = None) -> Nodes:
@@ -94,7 +110,7 @@ def _total(g: Graph, terms: list[int]) -> int:
 def _product(g: Graph, terms: list[int]) -> int:
     result = g.const(1.0)
     for i in terms:
-        result = g.mul(result, i)
+        result = g.mul(result, el.real(g, i))
     return result
 
 
@@ -157,7 +173,8 @@ def _cross(trace: Trace, a: Any, b: Any, dim: int = -1) -> Nodes:
 
 
 def _cumsum(trace: Trace, x: Any, dim: int, **_: Any) -> Nodes:
-    nodes = np.moveaxis(trace.nodes(x).copy(), dim, 0)
+    numbers = mapped(trace, el.real, x)  # of truth values it counts
+    nodes = np.moveaxis(numbers, dim, 0)
     for k in range(1, len(nodes)):
         nodes[k] = _add(trace, trace.tensor(nodes[k - 1]), trace.tensor(nodes[k]))
     return np.moveaxis(nodes, 0, dim)
@@ -173,6 +190,7 @@ OPERATORS: dict[str, Operation] = {
     **SHAPING,
     "add": _add,
     "sub": _sub,
+    "round": _round,
     "rsub": lambda trace, a, b, alpha=1: _sub(trace, b, a, alpha=alpha),
     "div": _div,
     "clamp": _clamp,

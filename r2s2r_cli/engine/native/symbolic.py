@@ -98,6 +98,8 @@ class _Recording(TorchDispatchMode):
         kwargs = kwargs or {}
         if any(isinstance(x, Symbolic) for x in _flat(args)):
             return _record(self._trace, func, args, kwargs)
+        if torch.Tag.nondeterministic_seeded in func.tags and kwargs.get("generator") is None:
+            raise TracingError(f"{_where()}: {func} cannot be compiled: it is drawn once, for all steps and runs")
         result = func(*args, **kwargs)
         if func.overloadpacket.__name__ in _FACTORIES and result.is_floating_point():
             return self._trace.tensor(self._trace.nodes(result))
@@ -133,6 +135,8 @@ def _record(trace: Trace, func: Any, args: Sequence[Any], kwargs: dict[str, Any]
     if in_place:
         if not isinstance(args[0], Symbolic):
             raise TracingError(f"{_where()}: {func} writes a traced value into an ordinary tensor; use torch.stack")
+        if np.shape(result) != args[0].nodes.shape:
+            raise TracingError(f"{_where()}: {func} changes a shape in place, which cannot be compiled")
         args[0].nodes[...] = result
         return args[0]
     if isinstance(result, list):

@@ -82,6 +82,12 @@ CASES: dict[str, Case] = {
     },
     "add": Case(lambda x: torch.add(x[:, :1], x, alpha=2.5) + 1.0 + (x > 0), PLAIN, ("add",)),
     "sub": Case(lambda x: torch.sub(x[:, :1], x, alpha=2.5) - 1.0, PLAIN, ("sub",)),
+    "round, decimals": Case(lambda x: torch.round(x, decimals=1) + torch.round(8 * x, decimals=-1) * x, PLAIN, ("round",)),
+    "truth values": Case(
+        lambda x: x * ((x > 0) + (x > -1)) + x * ~((x > 0) * (x > 1)) + x * (x > 0).prod(1, keepdim=True)
+        + x * torch.cumsum(x > 0, 1) + x * (x > -1).sum(1, keepdim=True),
+        PLAIN + ZERO, ("add", "mul", "prod", "cumsum", "sum"),
+    ),
     "rsub": Case(lambda x: 1.0 - x, PLAIN, ("rsub",)),
     "mul": Case(lambda x: x * x[:, 1:2] * -3.0 * (x > 0), PLAIN + ZERO, ("mul",)),
     "div": Case(lambda x: x / x[:, 1:2] / 3.0 - x[:, 1:2] / -x, PLAIN, ("div",)),
@@ -89,6 +95,7 @@ CASES: dict[str, Case] = {
     "pow, whole": Case(lambda x: x**3 + x**-2 + x**7 + x**0 + x**1, PLAIN, ("pow",)),
     "pow, at 0": Case(lambda x: x**2 + x**1 + x**0, ZERO, ("pow",)),
     "pow, half": Case(lambda x: x**0.5 + x**1.5 + x**-0.5, POSITIVE, ("pow",)),
+    "pow, half, at 0": Case(lambda x: x**1.5 + torch.relu(x) ** 2.5, [*ZERO[::2], [0.0, -0.0, 4.0]], ("pow",)),
     "pow, other": Case(lambda x: x**2.3 + 1.7**x, POSITIVE, ("pow",)),
     "pow, both": Case(lambda x: x[:, :2] ** x[:, 1:], [[0.5, 2.0, 1.3], [2.0, -1.0, 0.0], [0.0, 2.0, 3.0]], ("pow",)),
     "atan2": Case(lambda x: torch.atan2(x[:, :2], x[:, 1:]), [*PLAIN, [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]], ("atan2",)),
@@ -120,6 +127,10 @@ CASES: dict[str, Case] = {
     "prod": Case(lambda x: x.prod(1, keepdim=True), PLAIN, ("prod",)),
     "amax": Case(lambda x: x.amax(1, keepdim=True), PLAIN + TIES, ("amax",)),
     "amin": Case(lambda x: x.amin(1), PLAIN + TIES, ("amin",)),
+    "amax, amin, beside infinity": Case(
+        lambda x: x.masked_fill(x < 0, -INF).amax(1, keepdim=True) + torch.where(x < 0, INF, x).amin(1, keepdim=True) * x,
+        [*PLAIN, [float("nan"), 1.0, 2.0]], ("amax", "amin"),
+    ),
     "vector_norm": Case(
         lambda x: torch.linalg.vector_norm(x, dim=1, keepdim=True) * x + torch.linalg.vector_norm(x, ord=1, dim=1)[:, None],
         PLAIN + ZERO, ("linalg_vector_norm",),

@@ -98,6 +98,8 @@ def test_equal_operations_are_one_node() -> None:
         (lambda s: s.sum(1, keepdim=True, dtype=torch.float32).expand(1, 2), "float32"),
         (lambda s: s.sum(1, keepdim=True, dtype=torch.int64).expand(1, 2), "int64"),
         (lambda s: torch.ops.aten.select(s, 5, 0), "these arguments|IndexError|range"),
+        (lambda s: s + torch.rand(2, dtype=s.dtype), "rand.*drawn once"),
+        (lambda s: s.clone().unsqueeze_(0)[0], "unsqueeze_.*in place"),
         (lambda s: torch.linalg.vector_norm(s, ord=3, dim=1, keepdim=True).expand(1, 2), "order 3"),
     ],
 )
@@ -106,6 +108,16 @@ def test_what_cannot_be_compiled_is_named(fn: Callable[[Tensor], Tensor], messag
     with pytest.raises(TracingError, match=message):
         step_of(fn).forward(*ONE, h=1.0)
     assert issubclass(TracingError, EngineError)
+
+
+def test_fixed_random_numbers_are_constants() -> None:
+    """Numbers of a seeded generator are the same in every trace, and may be part of a step."""
+
+    def field(s: Tensor) -> Tensor:
+        return s + torch.rand(2, generator=torch.Generator().manual_seed(3), dtype=s.dtype)
+
+    wanted = field(ONE[0])
+    assert torch.equal(step_of(field).forward(*ONE, h=1.0)[:, 1], wanted)
 
 
 def test_the_error_names_the_line() -> None:

@@ -33,7 +33,7 @@ def run_tangent(
     passes = -(-directions // lanes)
     ds, du, dp = (torch.nn.functional.pad(x, (0, passes * lanes - directions)) for x in tangents)
     frames = s0.new_empty((batch, plan.frames(rows), s0.shape[1]))
-    frames[:, 0] = s0
+    frames[:, 0] = s0.detach()
     d_frames = s0.new_empty((*frames.shape, passes * lanes))
     n = plan.steps(rows)
 

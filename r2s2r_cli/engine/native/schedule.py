@@ -36,6 +36,7 @@ def lanes_for(batch: int, dtype: torch.dtype) -> int:
 
 
 def given_arrays(s0: Tensor, u: Tensor, p: Tensor, plan: Schedule, lanes: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """State, inputs and parameters by block, and the step."""
+    """State, inputs and parameters by block, and the step; detached, for autograd cannot see what a kernel does."""
     step = s0.new_full((lanes,), plan.h)
-    return to_lanes(s0, lanes), to_lanes(u, lanes), to_lanes(p, lanes), step
+    state, inputs, parameters = (to_lanes(x.detach(), lanes) for x in (s0, u, p))
+    return state, inputs, parameters, step

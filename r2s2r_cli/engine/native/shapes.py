@@ -37,6 +37,12 @@ class Sizes:
             result.append(x.detach().to(s0.dtype).expand(whole))
         return result[0], result[1], result[2]
 
+    def adjoints(self, s0: Tensor, g_frames: Tensor, frames: int) -> Tensor:
+        """The adjoints of all frames (B, F, NS), of the type of s0; kernels read them by address, whatever is there."""
+        whole = (s0.shape[0], frames, self.n_state)
+        _check("g_frames", g_frames, whole)
+        return g_frames.to(s0.dtype).expand(whole)
+
 
 def checked(
     sizes: Sizes, s0: Tensor, u: Tensor, p: Tensor, h: float, hold: int, every: int

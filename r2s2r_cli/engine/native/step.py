@@ -104,12 +104,12 @@ class NativeStep:
         """
         given = (u.shape, p.shape)
         s0, u, p = checked(self.sizes, s0, u, p, h, hold, every)
+        plan = Schedule(h, hold, every, threads)
+        g_frames = self.sizes.adjoints(s0, g_frames, plan.frames(u.shape[1]))
         if not self.native(s0):
             grads = eager.vjp(self.fn, s0, u, p, g_frames, h=h, hold=hold, every=every)
         else:
-            grads = run_backward(
-                self._builder, s0, u, p, g_frames.to(s0.dtype), Schedule(h, hold, every, threads), states
-            )
+            grads = run_backward(self._builder, s0, u, p, g_frames, plan, states)
         return grads[0], grads[1].sum_to_size(given[0]), grads[2].sum_to_size(given[1])
 
     def jvp(

@@ -250,3 +250,32 @@ def test_other_types_and_missing_tangents_are_refused() -> None:
         step.jvp(s, u, p, ds0=torch.zeros(2, 3, 1, dtype=s.dtype), **PLAN)
     with pytest.raises(EngineInputError, match="no direction"):
         step.jvp(s, u, p, **PLAN)
+
+
+@pytest.mark.parametrize("shape", [(2, 10, 2 * N), (2, 11, 2), (3, 11, 2 * N)])
+def test_adjoints_of_other_frames_are_refused(shape: tuple[int, ...]) -> None:
+    """Kernels read adjoints by address: a frame that is not there would be read from whatever lies behind."""
+    step, s, u, p = setting(2)
+    with pytest.raises(EngineInputError, match="g_frames"):
+        step.vjp(s, u, p, torch.ones(shape, dtype=s.dtype), **PLAN)
+
+
+def test_adjoints_of_one_environment_are_those_of_all() -> None:
+    """A batch of 1 is repeated, as everywhere else."""
+    step, s, u, p = setting(11)
+    shared = torch.randn(1, 11, 2 * N, dtype=torch.float64)
+    whole = step.vjp(s, u, p, shared.expand(11, -1, -1), **PLAN)
+    assert all(torch.equal(a, b) for a, b in zip(step.vjp(s, u, p, shared, **PLAN), whole, strict=True))
+
+
+def test_what_autograd_cannot_see_asks_for_no_gradient() -> None:
+    """Frames of `forward` and `jvp` are detached: only the first came from s0 by torch, and its gradient alone would
+    pass for that of the rollout. `rollout` is what autograd differentiates."""
+    step, s, u, p = setting(2)
+    s.requires_grad_()
+    p.requires_grad_()
+    frames, tangents = step.jvp(s, u, p, ds0=torch.ones(*s.shape, 1, dtype=s.dtype), **PLAN)
+    assert not frames.requires_grad
+    assert not tangents.requires_grad
+    assert not step.forward(s, u, p, **PLAN).requires_grad
+    assert rollout(step, s, u, p, **PLAN).requires_grad

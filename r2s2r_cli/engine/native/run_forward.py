@@ -23,7 +23,8 @@ def run_forward(builder: Builder, s0: Tensor, u: Tensor, p: Tensor, plan: Schedu
     (s_0, s_b), (f_0, f_b), (u_0, u_b), (p_0, p_b) = map(places, (state, frames, inputs, parameters))
     h = step.data_ptr()
 
-    def run(block: int) -> None:
+    def run(block: int, _alive: tuple[Tensor, ...] = (state, frames, inputs, parameters, step)) -> None:
+        # Arrays that the threads write to must live as long as they run, also when the caller has been interrupted.
         at = (s_0 + s_b * block, f_0 + f_b * block, u_0 + u_b * block, p_0 + p_b * block)
         kernel(*at, h, 0, n, plan.hold, plan.every)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
@@ -26,6 +27,8 @@ def spread(run: Callable[[int], None], tasks: Iterable[int], threads: int) -> No
     try:
         work()
     finally:
+        # After an error or Ctrl-C nobody wants the rest: helpers end with what they have in hand.
+        deque(left, maxlen=0)
         wait(helped)
     for one in helped:
         one.result()

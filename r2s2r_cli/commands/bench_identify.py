@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -76,6 +76,10 @@ def identify(
         raise UsageError("--hard is for ours alone: a fit of mujoco.sysid has no initial velocities to free",
                          where="--hard", expected="--cases N --hard", received="--hard alone",
                          hint="r2s2r bench identify --cases 10 --hard")  # fmt: skip
+    if growing and cases is not None:
+        raise UsageError("--growing is for mujoco.sysid, which --cases leaves out",
+                         where="--growing", expected="--growing without --cases", received="both",
+                         hint="r2s2r bench identify --growing")  # fmt: skip
     theirs = () if cases is not None else (DEFAULTS, SCALED, *((GROWING,) if growing else ()))
     if theirs:
         _require_sysid()
@@ -152,7 +156,7 @@ def _one(tool: str, case: Case, predictor: Predictor) -> IdentifiedCase:
         from r2s2r_cli.commands.bench_identify_ours import OurSide
 
         ours = OurSide(case, predictor)
-        return judged(case, ours.truth, _tried(ours.fit))
+        return judged(case, ours.truth, *_tried(ours.fit))
     from r2s2r_cli.commands.bench_identify_mujoco import SysidSide
 
     side = SysidSide(case, predictor.step)
@@ -161,21 +165,24 @@ def _one(tool: str, case: Case, predictor: Predictor) -> IdentifiedCase:
         SCALED: lambda: side.fit(x_scale="jac"),
         GROWING: lambda: side.fit_growing(x_scale="jac"),
     }
-    return judged(case, case.truth, _tried(fits[tool]))
+    return judged(case, case.truth, *_tried(fits[tool]))
 
 
-def _tried(fit: Callable[[], Fit]) -> Any:
-    """The fit, or why there is none: a tool that fails in one case goes on to the next."""
+def _tried(fit: Callable[[], Fit]) -> tuple[Fit | str, float]:
+    """The fit, or why there is none, and the processor time until then [s]: a tool that fails in one case goes on to
+    the next, and has spent time all the same."""
+    clock = time.process_time()
     try:
-        return fit()
+        found: Fit | str = fit()
     except (NumericalError, ArithmeticError, ValueError) as error:
-        return str(error).splitlines()[0] or type(error).__name__
+        found = (str(error).splitlines() or [type(error).__name__])[0]
+    return found, time.process_time() - clock
 
 
 def _print(result: IdentifyBenchResult, console: Console) -> None:
     rows = [
         [tool, f"{by.cpu_median_s:.2f} s", f"{by.cpu_median_ratio:.1f}x", f"{by.cpu_ratio:.1f}x", _of(by.solved),
-         f"{100 * by.error_median:.2g} %", _of(by.covered), f"{by.without_interval}", f"{_rms(by):.2f} mm"]
+         f"{100 * by.error_median:.2g} %", _of(by.covered), f"{by.without_interval}", _rms(by)]
         for tool, by in result.tools.items()
     ]  # fmt: skip
     console.table(
@@ -201,10 +208,12 @@ def _of(share: Share) -> str:
     return f"{share.count} of {share.total}{known}"
 
 
-def _rms(by: IdentifiedBy) -> float:
+def _rms(by: IdentifiedBy) -> str:
+    """Of the fits that there are: one that failed leaves nothing to look at, and not nothing."""
     from statistics import median
 
-    return median(one.rms_mm for one in by.cases)
+    left = [one.rms_mm for one in by.cases if not one.failed]
+    return f"{median(left):.2f} mm" if left else "none"
 
 
 def _row(one: IdentifiedCase) -> list[str]:

@@ -18,13 +18,14 @@ NEAR_RAD = 0.02
 """The same share for attachment phases, whose planted value may be 0 [rad]."""
 
 
-def judged(case: Case, truth: np.ndarray, fit: Fit | str) -> IdentifiedCase:
-    """A fit beside what was planted, (n,), phases after the values of the case; a text says why there is none."""
+def judged(case: Case, truth: np.ndarray, fit: Fit | str, spent_s: float = 0.0) -> IdentifiedCase:
+    """A fit beside what was planted, (n,), phases after the values of the case; a text says why there is none, and
+    spent_s, processor time [s], what that took."""
     start = np.concatenate([case.start, np.zeros(len(truth) - len(case.start))])
     failed = fit if isinstance(fit, str) else None
     if isinstance(fit, str):
         none = np.full(len(truth), np.nan)
-        fit = Fit(estimate=start, low=none, high=none, cpu_s=0.0, rollouts=0.0, rms_m=0.0)
+        fit = Fit(estimate=start, low=none, high=none, cpu_s=spent_s, rollouts=0.0, rms_m=0.0)
     known = np.isfinite(fit.low) & np.isfinite(fit.high)
     sd = np.where(known, (fit.high - fit.low) / (2.0 * NORMAL_95), 0.0)
     near = np.where(np.arange(len(truth)) < len(case.start), NEAR * np.abs(truth), NEAR_RAD)

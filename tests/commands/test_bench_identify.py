@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from r2s2r_cli.commands.bench_identify import _rms, _tried
 from r2s2r_cli.commands.bench_identify_case import BOUNDS, NOISE_M, NUMBERS, OFF, SPREAD, Case, Fit, make_case
 from r2s2r_cli.commands.bench_identify_mujoco import SysidSide
 from r2s2r_cli.commands.bench_identify_ours import PHASE, OurSide, predictor_of
@@ -135,6 +136,25 @@ def test_covered_counts_values_and_none_is_not_covered() -> None:
     assert (by.solved.count, by.solved.total) == (2, 2)
 
 
+def test_a_fit_that_failed_spent_its_time_and_leaves_no_residual(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three seconds until an error are three seconds, not none: else who fails is fast, and nobody else's ratio to it
+    means anything. The median residual is of the fits that there are."""
+    case = _case()
+    ticks = iter((1.0, 4.0))
+    monkeypatch.setattr("time.process_time", lambda: next(ticks))
+
+    def fails() -> Fit:
+        raise ArithmeticError
+
+    failed = judged(case, case.truth, *_tried(fails))
+    assert (failed.failed, failed.cpu_s) == ("ArithmeticError", 3.0)
+    found = judged(case, case.truth, _fit(list(case.truth), 1.0))
+    by = summed_up("x", [failed, found], ours_cpu_s=[failed.cpu_s, found.cpu_s])
+    assert (by.cpu_ratio, by.cpu_median_ratio, by.cpu_median_s) == (1.0, 1.0, 2.5)
+    assert _rms(by) == "1.00 mm"
+    assert _rms(summed_up("x", [failed], ours_cpu_s=[failed.cpu_s])) == "none"
+
+
 def test_the_interval_of_a_share_solves_wilsons_equation() -> None:
     """Both ends p satisfy |count/n - p| = 1.96 sqrt(p (1 - p) / n); 0 of n and n of n touch 0 and 1."""
     for count, total in ((3, 10), (38, 40), (190, 200)):
@@ -166,10 +186,13 @@ def test_without_sysid_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.parametrize(
     ("arguments", "says"),
-    [(("--hard",), "--hard is for ours alone"), (("--cases", "1", "--robot", "fourbar"), "unknown robot")],
-)
+    [
+        (("--hard",), "--hard is for ours alone"), (("--cases", "1", "--robot", "fourbar"), "unknown robot"),
+        (("--cases", "1", "--growing"), "--growing is for mujoco.sysid"),
+    ],
+)  # fmt: skip
 def test_wrong_requests_are_refused(arguments: tuple[str, ...], says: str) -> None:
-    """An unknown robot; unknown velocities for a tool that cannot free them."""
+    """An unknown robot; unknown velocities for a tool that cannot free them; a tool that is not asked for."""
     result = invoke("bench", "identify", *arguments)
     assert result.exit_code == 2
     assert says in result.stderr

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import time
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import R2S2RError, UsageError
+from r2s2r_cli.errors import InputError, R2S2RError, UsageError, install_extra
 from r2s2r_cli.options import JsonOption, QuietOption
 
 if TYPE_CHECKING:
@@ -49,6 +50,9 @@ def estimate(
     from r2s2r_cli.commands.bench_estimate_case import REPORT_SEEDS, SETTINGS, TUNING_SEEDS
 
     console = Console(json=json, quiet=quiet)
+    if importlib.util.find_spec("mujoco") is None:
+        raise InputError("MuJoCo is not installed", where="bench estimate", expected="mujoco of the extra `rig`",
+                         received="none", hint=install_extra("rig"))  # fmt: skip
     names = case or list(SETTINGS)
     unknown = [name for name in names if name not in SETTINGS]
     if unknown:

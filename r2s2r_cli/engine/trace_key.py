@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import sys
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
+from types import ModuleType
 from uuid import uuid4
 
 import torch
@@ -25,7 +27,8 @@ def trace_key(structure: Structure) -> str:
         try:
             # The law may lie in a base class: every class between the effect and Hooks counts.
             for law in type(effect).__mro__[: type(effect).__mro__.index(Hooks)]:
-                digest.update(Path(inspect.getfile(law)).read_bytes())
+                for path in _files_of(law):
+                    digest.update(path.read_bytes())
             known = type(effect).__repr__ is not object.__repr__
         except (OSError, TypeError):
             known = False
@@ -34,6 +37,28 @@ def trace_key(structure: Structure) -> str:
             # law next time, so nothing is found on disk again.
             digest.update(uuid4().bytes)
     return digest.hexdigest()
+
+
+def _files_of(law: type) -> list[Path]:
+    """The file of a class, and those of the modules of its package, or of its folder, that it takes anything from: a
+    law may keep its formulas in one of them. Raises OSError, TypeError as `inspect.getfile`."""
+    own = Path(inspect.getfile(law))
+    package = law.__module__.rpartition(".")[0]
+    found: dict[str, Path] = {}
+    waiting = [law.__module__]
+    while waiting:
+        name = waiting.pop()
+        module = sys.modules.get(name)
+        file = getattr(module, "__file__", None)
+        if module is None or file is None or name in found:
+            continue
+        if not (package and name.startswith(f"{package}.")) and Path(file).parent != own.parent:
+            continue
+        found[name] = Path(file)
+        for value in list(vars(module).values()):
+            of = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
+            waiting += [of] if isinstance(of, str) else []
+    return [own, *(found[name] for name in sorted(found) if found[name] != own)]
 
 
 def _sources() -> bytes:

@@ -3,6 +3,8 @@ compiles, and is the same in machine code and in torch."""
 
 from __future__ import annotations
 
+import importlib
+import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -204,6 +206,29 @@ def test_its_source_is_part_of_the_key(model: Variant, plain: Variant, tmp_path:
         )
         made[scale] = trace_key(plain.structure.with_effects(_loaded(path).Law()))
     assert len({key, *made.values()}) == 3
+
+
+@pytest.mark.parametrize("how", ["from formula import share", "import formula"])
+def test_what_its_law_takes_from_a_file_beside_it_is_part_of_the_key(
+    plain: Variant, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
+) -> None:
+    """The same class with a formula beside it that was changed is another law; with another neighbour the same."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    share = "share" if "from" in how else "formula.share"
+    keys = []
+    for scale, more in (("1.0", ""), ("2.0", ""), ("2.0", "unused = 1\n")):
+        (tmp_path / "formula.py").write_text(f"def share(x):\n    return {scale} * x\n")
+        (tmp_path / "neighbour.py").write_text(more)
+        (tmp_path / "lawful.py").write_text(
+            f"from r2s2r_cli.engine.hooks import Hooks\n{how}\n\n\nclass Law(Hooks):\n    name = 'law'\n\n"
+            "    def __repr__(self):\n        return 'Law()'\n\n"
+            f"    def contact(self, x, terms, friction):\n        return {share}(friction)\n"
+        )
+        for name in ("formula", "lawful"):
+            sys.modules.pop(name, None)
+        importlib.invalidate_caches()
+        keys.append(trace_key(plain.structure.with_effects(importlib.import_module("lawful").Law())))
+    assert keys[0] != keys[1] == keys[2]
 
 
 def _loaded(path: Path) -> object:

@@ -133,6 +133,12 @@ def _compute(
     from r2s2r_cli.commands.interrupts import loaded
 
     request, robot = asked.request(settings), asked.project.robot()
+    if not request.belief.identified:
+        # The report says it as well, but after minutes of work: whoever forgot `identify` would rather stop now.
+        console.say(
+            f"nothing was identified in iteration {asked.iteration.number}: the gaits are searched with the numbers of "
+            f"robot.toml; with those of runs: r2s2r identify --iteration {asked.iteration.number}"
+        )
     stage = loaded("r2s2r_cli.stages.plan.stage")
     clock = Clock()
     with console.parts() as show:

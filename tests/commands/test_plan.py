@@ -102,7 +102,7 @@ def test_an_interrupted_plan_goes_on_to_the_same(planned: Path, monkeypatch: pyt
     assert not list(planned.rglob("*.partial"))
 
 
-def _interrupt(*_: object) -> None:
+def _interrupt(*_: object, **__: object) -> None:
     raise KeyboardInterrupt
 
 
@@ -135,6 +135,22 @@ def test_what_cannot_be_planned_is_said_at_once(project: Path, arguments: list[s
     result = invoke("plan", *arguments)
     assert result.exit_code in (2, 4) and said in result.stderr
     assert not list(project.rglob("40-plan*"))
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_that_nothing_was_identified_is_said_before_the_work(
+    project: Path, monkeypatch: pytest.MonkeyPatch, known: bool
+) -> None:
+    """Whoever forgot `identify` is told while the search can still be stopped; with one nothing is said."""
+    import r2s2r_cli.stages.plan.stage as stage
+
+    monkeypatch.setattr(stage, "plan", _interrupt)
+    if known:
+        write_artifact(project / IDENTIFY, builders.identification(), builders.provenance())
+    stopped = invoke(*small())
+    assert stopped.exit_code == 130, stopped.stderr
+    assert ("nothing was identified in iteration 1" in stopped.stderr) != known
+    assert ("r2s2r identify --iteration 1" in stopped.stderr) != known
 
 
 def test_numbers_of_another_robot_are_refused(project: Path) -> None:

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from r2s2r_cli.console import NO_PROGRESS, Console
+from r2s2r_cli.console import LINE_S, NO_PROGRESS, Console
 
 if TYPE_CHECKING:
     from r2s2r_cli.stages.record import Now
@@ -86,9 +86,16 @@ def _bar(position: float, aim: float) -> str:
 
 @contextlib.contextmanager
 def shown(live: Live, console: Console) -> Iterator[None]:
-    """Draw it on stderr while the context lasts; silent when piped, with --quiet, or where R2S2R_NO_PROGRESS is set."""
-    if console.quiet or not sys.stderr.isatty() or os.environ.get(NO_PROGRESS):
+    """Draw it on stderr while the context lasts; silent with --quiet, or where R2S2R_NO_PROGRESS is set.
+
+    Where stderr is no terminal a line every LINE_S seconds says how far the runs are, as other long work does.
+    """
+    if console.quiet or os.environ.get(NO_PROGRESS):
         yield
+        return
+    if not sys.stderr.isatty():
+        with _spoken(live, console):
+            yield
         return
     from rich.console import Console as RichConsole
     from rich.live import Live as RichLive
@@ -106,6 +113,24 @@ def shown(live: Live, console: Console) -> Iterator[None]:
     finally:
         with contextlib.suppress(OSError):  # the terminal was closed, which ends the run: what there is must be sealed
             drawn.stop()
+
+
+@contextlib.contextmanager
+def _spoken(live: Live, console: Console) -> Iterator[None]:
+    """The first line of what would be drawn, said by a thread of its own: the control loop waits for no pipe."""
+    over = threading.Event()
+
+    def speak() -> None:
+        while not over.wait(LINE_S):
+            console.say(live.lines()[0])
+
+    # A daemon: where nobody reads the pipe, the line that waits in it must not keep the command from its end.
+    speaker = threading.Thread(target=speak, name="progress", daemon=True)
+    speaker.start()
+    try:
+        yield
+    finally:
+        over.set()
 
 
 @contextlib.contextmanager

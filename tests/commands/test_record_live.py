@@ -8,8 +8,11 @@ import termios
 import threading
 
 import numpy as np
+import pytest
 
-from r2s2r_cli.commands.record_live import Live, stop_key
+from r2s2r_cli.commands import record_live
+from r2s2r_cli.commands.record_live import Live, shown, stop_key
+from r2s2r_cli.console import Console
 from r2s2r_cli.devices.link import LinkStatistics
 from r2s2r_cli.stages.record import Now
 from tests.support.desk import wait_until
@@ -49,6 +52,25 @@ def test_an_unknown_loss_is_not_zero() -> None:
     live = Live([4])
     live.watch(Now(**{**vars(now("a", 1)), "link": LinkStatistics(received=5)}))
     assert "lost ?" in live.lines()[1]
+
+
+def test_without_a_terminal_a_line_now_and_then_says_how_far_it_is(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A log of minutes without a word looks like one that hangs; with --quiet it is silent all the same."""
+    monkeypatch.setattr(record_live, "LINE_S", 0.01)
+    monkeypatch.delenv("R2S2R_NO_PROGRESS", raising=False)
+    said: list[str] = []
+    monkeypatch.setattr(Console, "say", lambda self, text: said.append(text))
+    live = Live([4, 4])
+    live.watch(now("a-1", 3))
+    with shown(live, Console()):
+        wait_until(lambda: len(said) > 1, 5.0)
+    assert all(line.startswith("run a-1: target 3 of 4, 3.0 s; 2 of 8 in all") for line in said)
+    said.clear()
+    with shown(live, Console(quiet=True)):
+        threading.Event().wait(0.1)
+    assert said == [] and capsys.readouterr().err == ""
 
 
 def test_the_space_bar_stops_and_no_other_key_does() -> None:

@@ -58,11 +58,23 @@ def recover(
     for path in removed:
         console.data(f"{path}: removed, a command that was killed left it unfinished")
     if not paths and not removed:
-        console.say("nothing to recover: no unsealed recording, no damaged artifact, no unfinished file")
+        console.say("nothing to recover: no unsealed recording, no damaged artifact, nothing of a killed command")
+    if not files:
+        _say_checkpoints(project, console)
     for problem in failed.values():
         print_error(problem, as_json=False)
     if failed:
         raise typer.Exit(int(max(problem.exit_code for problem in failed.values())))
+
+
+def _say_checkpoints(start: Path | None, console: Console) -> None:
+    """What was interrupted and waits to be gone on with: `recover` leaves it alone, and must not seem to deny it."""
+    from r2s2r_cli.commands.unfinished import checkpoints
+    from r2s2r_cli.store.project import Project
+
+    project = Project.find(start)
+    for kept in checkpoints(project).values():
+        console.say(f"{project.relative(kept.path)}: interrupted, kept to be gone on with: {kept.command}")
 
 
 def _leftovers(start: Path | None) -> tuple[list[Path], list[Path]]:

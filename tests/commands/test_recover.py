@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from r2s2r_cli.store.atomic import temp_beside
+from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_of
 from r2s2r_cli.store.lock import writing
 from r2s2r_cli.store.project import Project, journal_of
 from schemas.results import RecoverResult
@@ -36,6 +37,20 @@ def test_without_files_the_project_is_recovered(cut_off: Path) -> None:
     assert cut_off.with_name("10-record.h5").exists() and not cut_off.exists() and not temp.exists()
     again = invoke("recover")
     assert (again.exit_code, again.stdout) == (0, "") and "nothing to recover" in again.stderr
+
+
+def test_what_was_interrupted_is_left_and_named(project: Path) -> None:
+    """A checkpoint is no wreck: recover keeps it and says what goes on from it."""
+    place = Project.find(project).iteration(1, create=True)
+    place.path.mkdir(parents=True)
+    kept = checkpoint_of(place.artifact("plan"))
+    CheckpointFile(kept, "0" * 64, command=("plan", "--to=1,2,0")).save({"cost": 1.0})
+    result = invoke("recover")
+    assert (result.exit_code, result.stdout) == (0, "") and kept.exists()
+    said = result.stderr.splitlines()
+    words = "iterations/001/40-plan.partial: interrupted, kept to be gone on with: r2s2r plan --to=1,2,0 --resume"
+    assert said[1:] == [words]
+    assert "nothing to recover" in said[0] and "unfinished" not in said[0]
 
 
 def test_what_is_recovered_validates(cut_off: Path) -> None:

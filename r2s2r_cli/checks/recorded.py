@@ -24,4 +24,4 @@ def recorded_without_warning(links: Links) -> Iterator[Found]:
         if not isinstance(run, dict) or not isinstance(run.get("warnings"), list):
             continue
         for text in run["warnings"]:
-            yield Found(f"runs/{run.get('run')}", "the recording has a warning of this run", "no warning", str(text))
+            yield Found(f"runs/{run.get('run')}", "the recording warns of this run", "no warning", str(text))

@@ -21,8 +21,8 @@ FAILS: tuple[Case, ...] = (
         "recorded_without_warning",
         lambda: _recorded(["3 lines were corrupt", "ended at target 2 of 5: the link broke"]),
         (
-            ("runs/b", "the recording has a warning of this run", "no warning", "3 lines were corrupt"),
-            ("runs/b", "the recording has a warning of this run", "no warning", "ended at target 2 of 5: the link broke"),
+            ("runs/b", "the recording warns of this run", "no warning", "3 lines were corrupt"),
+            ("runs/b", "the recording warns of this run", "no warning", "ended at target 2 of 5: the link broke"),
         ),
     ),
     Case(

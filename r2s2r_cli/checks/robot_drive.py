@@ -77,7 +77,7 @@ def pid_range_in_limits(robot: Robot) -> Iterator[Found]:
     Robot,
     what="every sensor is calibrated",
     why="without slope and offset its capacitance says nothing about the length",
-    fix="r2s2r calibrate --points points.csv   # a table of lengths and capacitances",
+    fix="r2s2r calibrate --points points.csv   # lengths and capacitances; of several sets one with --use SET",
 )
 def sensors_are_calibrated(robot: Robot) -> Iterator[Found]:
     """Sensors without a line."""

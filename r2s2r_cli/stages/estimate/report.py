@@ -135,7 +135,8 @@ def _warnings(state: RunState, caps: tuple[CapFigures, ...]) -> tuple[str, ...]:
     for cap in caps:
         if cap.outliers + cap.jumps > BROKEN_SHARE * n:
             found.append(
-                f"end cap {cap.cap}: {cap.outliers} outliers and {cap.jumps} jumps in {n} frames; "
+                f"end cap {cap.cap}: {cap.outliers} outlier{'s' * (cap.outliers != 1)} and "
+                f"{cap.jumps} jump{'s' * (cap.jumps != 1)} in {n} frames; "
                 "frames/quality marks them, the velocity beside a jump is weakly known"
             )
         if any(cap.held):

@@ -105,6 +105,5 @@ def _warnings(
         if one.goal is None and one.far > request.reach:
             said.append(f"{one.name}: comes {one.far:.2f} m from its start, and {request.reach:.2f} m are allowed: "
                         "the camera may lose the robot")  # fmt: skip
-        if off := one.off_goal():
-            said.append(f"{one.name}: {off}")
+        said += [f"{one.name}: {words}" for words in (one.back_again(), one.off_goal()) if words]
     return said

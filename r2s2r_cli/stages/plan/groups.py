@@ -47,6 +47,19 @@ class LongPolicy:
         moves[:, 2] += 2 * np.pi * np.round((self.expected[2] - moves[:, 2].mean()) / (2 * np.pi))
         return moves
 
+    def back_again(self) -> str:
+        """What is to be said where it is to go far, of several gaits, and ends nearer to its start than half of what
+        one of them goes on paper; else empty."""
+        legs = np.linalg.norm(np.diff(self.path.xy[0], axis=0), axis=-1)
+        far = float(np.linalg.norm(self.reached.mean(axis=0)[:2]))
+        if self.name != "straight" or len(legs) < 2 or far >= 0.5 * float(legs.max()):
+            return ""
+        return (
+            f"simulated whole, it ends {far:.2f} m from its start, and one of its {len(legs)} gaits goes "
+            f"{legs.max():.2f} m on paper: they undo each other, or do nothing; more of plan.cycles, plan.depth or "
+            "plan.beam leave more to choose from"
+        )
+
     def off_goal(self) -> str:
         """How far it ends from its goal, and what is near enough, where it is not: simulated, else on paper. Empty
         where both are near enough, and without a goal."""

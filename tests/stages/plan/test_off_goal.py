@@ -46,6 +46,29 @@ def test_what_ends_elsewhere_says_how_far_and_how_far_is_near_enough(
     assert ended(paper, simulated, None).off_goal() == ""
 
 
+def test_a_straight_policy_that_comes_back_to_its_start_is_said_to() -> None:
+    """Two gaits of 0.2 m that lead back, or forth and to the side; one gait alone has nothing to undo it, and other
+    policies are not to go far."""
+    path = start_paths()
+
+    def policy(name: str, xy: list[tuple[float, float]], end: tuple[float, float]) -> LongPolicy:
+        one = replace(ended((*xy[-1], 0.0), (*end, 0.0), None), name=name)
+        way = {name: getattr(path, name) for name in path.__dataclass_fields__}
+        return replace(
+            one, path=cast(Paths, type("Way", (), {**way, "xy": np.array([xy]), "heading": np.zeros((1, 3))}))
+        )
+
+    there, back = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.2)], [(0.0, 0.0), (0.2, 0.0), (0.01, 0.0)]
+    assert policy("straight", there, (0.2, 0.2)).back_again() == ""
+    assert (
+        "ends 0.01 m from its start, and one of its 2 gaits goes 0.20 m"
+        in policy("straight", back, (0.01, 0.0)).back_again()
+    )
+    assert policy("straight", there, (0.05, 0.0)).back_again()  # on paper it goes far, simulated whole it does not
+    assert policy("arching", back, (0.01, 0.0)).back_again() == ""
+    assert policy("straight", there[:2], (0.01, 0.0)).back_again() == ""
+
+
 @pytest.mark.parametrize(
     "turns", [(-88.0, -92.0, -91.0, -89.0), (268.0, -92.0, 269.0, -89.0), (91.0, 89.0, 90.0, 90.0)]
 )

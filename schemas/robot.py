@@ -140,10 +140,11 @@ class Pid(Frozen):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if self.rate_hz * self.step_timeout_s < 1.0:
+        if self.rate_hz * self.step_timeout_s < 1.0 - 1e-9:
+            period = f": {self.rate_hz:g} looks like the period in seconds" if self.rate_hz < 1.0 else ""
             raise ValueError(
-                f"rate_hz must have a tick within step_timeout_s ({self.step_timeout_s:g} s), else every step is given "
-                f"up before the controller has acted once: {self.rate_hz:g} looks like the period in seconds"
+                f"rate_hz ({self.rate_hz:g} Hz) must have a tick within step_timeout_s ({self.step_timeout_s:g} s), else "
+                f"every step is given up before the controller has acted once{period}"
             )
         return self
 

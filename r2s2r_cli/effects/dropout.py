@@ -40,11 +40,12 @@ class Dropout(Effect):
     def observation(self, x: Values, t: Tensor, p_WE: Tensor) -> Tensor:
         """With gaps and exchanged caps."""
         caps = p_WE.shape[2]
-        number = torch.arange(1, caps + 1, dtype=t.dtype, device=t.device)  # from 1: sin(0) is a certain loss
+        number = torch.arange(caps, dtype=t.dtype, device=t.device)
         rod = _chance(t, 100.0 + number[::2])[None].repeat_interleave(2, dim=-1)
         around = p_WE.unflatten(2, (-1, 2)).flip(3).flatten(2, 3)
         seen = torch.where((rod < x["swapped"][..., None])[..., None], around, p_WE)
-        lost = _chance(t, number)[None] < x["lost"][..., None]
+        # The first cap has another number than 0, which at 0 s is a certain loss.
+        lost = _chance(t, torch.where(number > 0, number, float(caps)))[None] < x["lost"][..., None]
         return torch.where(lost[..., None], torch.full_like(seen, torch.nan), seen)
 
 

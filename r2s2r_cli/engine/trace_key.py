@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import inspect
-import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
-from types import ModuleType
 from uuid import uuid4
 
 import torch
@@ -40,25 +40,38 @@ def trace_key(structure: Structure) -> str:
 
 
 def _files_of(law: type) -> list[Path]:
-    """The file of a class, and those of the modules of its package, or of its folder, that it takes anything from: a
-    law may keep its formulas in one of them. Raises OSError, TypeError as `inspect.getfile`."""
+    """The file of a class, and those beside it or of its package that it imports, wherever it does, and so on: a law
+    may keep its formulas and constants in one of them. Raises OSError, TypeError as `inspect.getfile`."""
     own = Path(inspect.getfile(law))
-    package = law.__module__.rpartition(".")[0]
-    found: dict[str, Path] = {}
-    waiting = [law.__module__]
+    parts = law.__module__.split(".")[:-1]
+    if own.suffix != ".py" or len(own.parents) <= len(parts):
+        return [own]
+    root = own.parents[len(parts)]
+    # Our own effects need no more than their folder: the engine's sources count anyway.
+    within = root / parts[0] if parts and parts[0] != __name__.partition(".")[0] else own.parent
+    found = {own}
+    waiting = [own]
     while waiting:
-        name = waiting.pop()
-        module = sys.modules.get(name)
-        file = getattr(module, "__file__", None)
-        if module is None or file is None or name in found:
-            continue
-        if not (package and name.startswith(f"{package}.")) and Path(file).parent != own.parent:
-            continue
-        found[name] = Path(file)
-        for value in list(vars(module).values()):
-            of = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
-            waiting += [of] if isinstance(of, str) else []
-    return [own, *(found[name] for name in sorted(found) if found[name] != own)]
+        file = waiting.pop()
+        for name in _imports(file, file.relative_to(root).parent.parts):
+            stem = root.joinpath(*name)
+            for path in (stem.with_suffix(".py"), stem / "__init__.py"):
+                if path not in found and path.is_relative_to(within) and path.is_file():
+                    found.add(path)
+                    waiting.append(path)
+    return sorted(found)
+
+
+def _imports(file: Path, package: Sequence[str]) -> Iterator[Sequence[str]]:
+    """Names that a source of a package imports, in their parts; what is taken from a module may be one itself."""
+    for node in ast.walk(ast.parse(file.read_bytes())):
+        if isinstance(node, ast.Import):
+            yield from (one.name.split(".") for one in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else ()
+            base = [*above, *(node.module or "").split(".")] if node.module else [*above]
+            yield base
+            yield from ([*base, one.name] for one in node.names)
 
 
 def _sources() -> bytes:

@@ -208,26 +208,63 @@ def test_its_source_is_part_of_the_key(model: Variant, plain: Variant, tmp_path:
     assert len({key, *made.values()}) == 3
 
 
-@pytest.mark.parametrize("how", ["from formula import share", "import formula"])
+@pytest.mark.parametrize(
+    ("top", "inside", "scaled"),
+    [
+        ("from formula import share", "", "share(friction)"),
+        ("import formula", "", "formula.share(friction)"),
+        ("from formula import SCALE", "", "SCALE * friction"),
+        ("", "from formula import SCALE", "SCALE * friction"),
+    ],
+)
 def test_what_its_law_takes_from_a_file_beside_it_is_part_of_the_key(
-    plain: Variant, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
+    plain: Variant, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, top: str, inside: str, scaled: str
 ) -> None:
-    """The same class with a formula beside it that was changed is another law; with another neighbour the same."""
+    """The same class with a formula or a constant beside it that was changed is another law, wherever it is imported;
+    with another neighbour the same."""
     monkeypatch.syspath_prepend(str(tmp_path))
-    share = "share" if "from" in how else "formula.share"
     keys = []
     for scale, more in (("1.0", ""), ("2.0", ""), ("2.0", "unused = 1\n")):
-        (tmp_path / "formula.py").write_text(f"def share(x):\n    return {scale} * x\n")
+        (tmp_path / "formula.py").write_text(f"SCALE = {scale}\n\n\ndef share(x):\n    return SCALE * x\n")
         (tmp_path / "neighbour.py").write_text(more)
         (tmp_path / "lawful.py").write_text(
-            f"from r2s2r_cli.engine.hooks import Hooks\n{how}\n\n\nclass Law(Hooks):\n    name = 'law'\n\n"
+            f"from r2s2r_cli.engine.hooks import Hooks\n{top}\n\n\nclass Law(Hooks):\n    name = 'law'\n\n"
             "    def __repr__(self):\n        return 'Law()'\n\n"
-            f"    def contact(self, x, terms, friction):\n        return {share}(friction)\n"
+            f"    def contact(self, x, terms, friction):\n        {inside or 'pass'}\n        return {scaled}\n"
         )
         for name in ("formula", "lawful"):
             sys.modules.pop(name, None)
         importlib.invalidate_caches()
         keys.append(trace_key(plain.structure.with_effects(importlib.import_module("lawful").Law())))
+    assert keys[0] != keys[1] == keys[2]
+
+
+def test_what_its_package_keeps_elsewhere_is_part_of_the_key(
+    plain: Variant, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A law in a package of packages, whose constant comes through a relative import of a module that imports another;
+    what nobody imports does not count."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    top = tmp_path / "labwork"
+    (top / "laws").mkdir(parents=True)
+    (top / "common").mkdir()
+    for folder in (top, top / "laws", top / "common"):
+        (folder / "__init__.py").write_text("")
+    (top / "common" / "shared.py").write_text("from labwork.numbers_of import SCALE\n")
+    (top / "laws" / "law.py").write_text(
+        "from r2s2r_cli.engine.hooks import Hooks\nfrom ..common import shared\n\n\n"
+        "class Law(Hooks):\n    name = 'law'\n\n"
+        "    def __repr__(self):\n        return 'Law()'\n\n"
+        "    def contact(self, x, terms, friction):\n        return shared.SCALE * friction\n"
+    )
+    keys = []
+    for scale, more in (("1.0", ""), ("2.0", ""), ("2.0", "unused = 1\n")):
+        (top / "numbers_of.py").write_text(f"SCALE = {scale}\n")
+        (top / "laws" / "other.py").write_text(more)
+        for name in [name for name in sys.modules if name.partition(".")[0] == "labwork"]:
+            sys.modules.pop(name)
+        importlib.invalidate_caches()
+        keys.append(trace_key(plain.structure.with_effects(importlib.import_module("labwork.laws.law").Law())))
     assert keys[0] != keys[1] == keys[2]
 
 

@@ -126,6 +126,7 @@ def test_robots_of_other_sizes_are_taken(factor: float) -> None:
         ("cables.0.stiffness_n_per_m", 2e11, "modulus of the material in pascals"),
         ("sensors.0.stiffness_n_per_m", 1e11, "modulus of the material in pascals"),
         ("pid.rate_hz", 0.02, "looks like the period in seconds"),
+        ("pid.step_timeout_s", 0.001, r"within step_timeout_s \(0\.001 s\), else every step is given up"),
         ("pid.tolerance", 12, "looks like per cent"),
         ("pid.step_timeout_s", 6000, "looks like milliseconds"),
         ("limits.cable_length_max_m", 350.0, "looks like millimetres"),

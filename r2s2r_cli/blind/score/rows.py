@@ -15,7 +15,7 @@ from schemas.results_blind import BlindRow, Tier
 
 Pair = tuple[Truth, Said]
 MOTOR_KINDS = frozenset({"motor", "cable", "sensor"})
-"""Elements that share their numbers: motor and sensor i are those of cable i."""
+"""Elements of one string, which have one number on the robot of the trials: its motor i winds cable i."""
 BINS = 10
 
 

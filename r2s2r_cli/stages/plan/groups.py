@@ -51,8 +51,8 @@ class LongPolicy:
         """What is to be said where it is to go far, of several gaits, and ends nearer to its start than half of what
         one of them goes on paper; else empty."""
         legs = np.linalg.norm(np.diff(self.path.xy[0], axis=0), axis=-1)
-        far = float(np.linalg.norm(self.reached.mean(axis=0)[:2]))
-        if self.name != "straight" or len(legs) < 2 or far >= 0.5 * float(legs.max()):
+        far = float(np.median(np.linalg.norm(self.reached[:, :2], axis=1)))
+        if self.name != "straight" or len(legs) < 2 or not far < 0.5 * float(legs.max()):
             return ""
         return (
             f"simulated whole, it ends {far:.2f} m from its start, and one of its {len(legs)} gaits goes "

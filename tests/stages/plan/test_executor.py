@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import torch
 
-from r2s2r_cli.engine import settle
+from r2s2r_cli.effects.cap_radius import CapRadius
+from r2s2r_cli.engine import end_caps, settle
 from r2s2r_cli.engine.closed_loop import closed_loop
 from r2s2r_cli.engine.flat import pack_state, unpack_state
 from r2s2r_cli.engine.link import Link
@@ -20,7 +21,8 @@ from r2s2r_cli.stages.identify.free.mapping import Mapping
 from r2s2r_cli.stages.plan.belief import Belief, assumed
 from r2s2r_cli.stages.plan.executor import Executor
 from r2s2r_cli.stages.plan.robust import start_poses
-from tests.support.robots import subject
+from r2s2r_cli.stages.plan.standing import Standing
+from tests.support.robots import rested, subject
 
 
 def executor(belief: Belief, draws: np.ndarray, timeout_s: float = 6.0) -> Executor:
@@ -121,6 +123,27 @@ def test_a_sensor_that_drifts_reads_too_much_by_the_time_of_the_run() -> None:
     assert run.last.t.numpy() == pytest.approx(np.array([40.0, 0.0]) + run.total * made.period)
     still = made.run(replace(at, t=torch.zeros(2, dtype=torch.float64)), target)
     assert float((still.last.s[0] - run.last.s[0]).abs().max()) > 1e-3
+
+
+def test_caps_and_readings_are_those_of_the_numbers_that_effects_make(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With an effect that makes rods a tenth longer for every unit of its number, caps lie where the longer rods have
+    them, and the controller's numbers are theirs."""
+    monkeypatch.setattr(
+        CapRadius,
+        "parameters",
+        lambda self, x, theta: replace(theta, p_BE=theta.p_BE * (1 + 100.0 * x["change_m"].mean())),
+    )
+    robot = subject().robot
+    free = entries(robot)["cap_radius.change_m"].free
+    model = Identified("a test", robot, Mapping(robot, (free,)), np.array([1e-3]), np.zeros((1, 1)))
+    made = Executor(robot, Belief(model, True), np.array([[1e-3]]), step=1e-3)
+    s = pack_state(subject().structure, rested().state)
+    zero = torch.zeros(1, dtype=torch.long)
+    at = Standing(s, s.new_zeros(1, 2, made.structure.n_actuated), zero, s.new_zeros(1))
+    middle = made.caps(at).reshape(1, -1, 2, 3).mean(axis=2, keepdims=True)
+    there = end_caps(subject().theta, rested().state).numpy().reshape(1, -1, 2, 3)
+    assert made.caps(at).reshape(there.shape) == pytest.approx(middle + 1.1 * (there - middle), abs=1e-12)
+    assert torch.equal(made.numbers(zero)[0].p_BE, made.seen.p_BE) and not torch.equal(made.seen.p_BE, made.theta.p_BE)
 
 
 def test_a_robot_starts_where_its_sensors_say_that_it_is_at_rest() -> None:

@@ -13,6 +13,7 @@ from r2s2r_cli.stages.plan.goal import Goal
 from r2s2r_cli.stages.plan.groups import LongPolicy
 from r2s2r_cli.stages.plan.rewards import Outcomes
 from r2s2r_cli.stages.plan.route import Paths, start_paths
+from r2s2r_cli.stages.plan.ways import worth_of_lost
 from r2s2r_cli.views.plan_page import report_tables
 from schemas.results_plan import PlanReport, PolicyFigures
 
@@ -67,6 +68,14 @@ def test_a_straight_policy_that_comes_back_to_its_start_is_said_to() -> None:
     assert policy("straight", there, (0.05, 0.0)).back_again()  # on paper it goes far, simulated whole it does not
     assert policy("arching", back, (0.01, 0.0)).back_again() == ""
     assert policy("straight", there[:2], (0.01, 0.0)).back_again() == ""
+
+
+def test_a_robot_that_gives_up_is_worth_no_more_than_one_that_ends_far_off() -> None:
+    """-10, or the least that a robot of any sequence for this purpose is worth that did not give up."""
+    some = np.array([False, True])
+    assert worth_of_lost([(np.array([-1.0, 3.0]), some), (np.array([-2.0, -99.0]), some)]) == -10.0
+    assert worth_of_lost([(np.array([-1.0, 3.0]), ~some), (np.array([-50.0, -99.0]), some)]) == -50.0
+    assert worth_of_lost([(np.array([-50.0, -99.0]), np.array([True, True]))]) == -10.0
 
 
 @pytest.mark.parametrize(

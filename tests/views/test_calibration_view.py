@@ -105,19 +105,6 @@ def test_a_camera_and_its_rods_are_named_as_they_were_typed(name: str) -> None:
     assert draw_preview(picture, np.ones((60, 80)), None, masks={name: mask}, title=name).startswith(PNG)
 
 
-@pytest.fixture
-def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    """What the pictures draw, instead of files."""
-    found: list[Figure] = []
-
-    def kept(figure: Figure) -> bytes:
-        found.append(figure)
-        return b""
-
-    monkeypatch.setattr("r2s2r_cli.views.calibration.png_bytes", kept)
-    return found
-
-
 @pytest.mark.parametrize(("rms", "said"), [(np.nan, "all sensors are dead"), (0.0012, "rms 1.20 mm over all points")])
 def test_a_set_without_a_live_sensor_has_no_rms(
     data: ArtifactData, robot: Robot, figures: list[Figure], rms: float, said: str

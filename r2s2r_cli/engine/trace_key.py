@@ -5,8 +5,8 @@ from __future__ import annotations
 import ast
 import hashlib
 import inspect
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from uuid import uuid4
@@ -27,10 +27,10 @@ def trace_key(structure: Structure) -> str:
         try:
             # The law may lie in a base class: every class between the effect and Hooks counts.
             for law in type(effect).__mro__[: type(effect).__mro__.index(Hooks)]:
-                for path in _files_of(law):
-                    digest.update(path.read_bytes())
+                for source in _sources_of(law):
+                    digest.update(source)
             known = type(effect).__repr__ is not object.__repr__
-        except (OSError, TypeError):
+        except (OSError, TypeError, SyntaxError, ValueError):
             known = False
         if not known:
             # Typed at a prompt, or without a `__repr__` that says what it holds: nobody can tell whether it is the same
@@ -39,39 +39,42 @@ def trace_key(structure: Structure) -> str:
     return digest.hexdigest()
 
 
-def _files_of(law: type) -> list[Path]:
+def _sources_of(law: type) -> list[bytes]:
     """The file of a class, and those beside it or of its package that it imports, wherever it does, and so on: a law
-    may keep its formulas and constants in one of them. Raises OSError, TypeError as `inspect.getfile`."""
+    may keep its formulas and constants in one of them. Raises OSError, TypeError as `inspect.getfile`, SyntaxError and
+    ValueError where one of them is no Python."""
     own = Path(inspect.getfile(law))
-    parts = law.__module__.split(".")[:-1]
+    parts = law.__module__.split(".")[: None if own.stem == "__init__" else -1]
     if own.suffix != ".py" or len(own.parents) <= len(parts):
-        return [own]
+        return [own.read_bytes()]
     root = own.parents[len(parts)]
     # Our own effects need no more than their folder: the engine's sources count anyway.
     within = root / parts[0] if parts and parts[0] != __name__.partition(".")[0] else own.parent
-    found = {own}
+    found = {own: own.read_bytes()}
     waiting = [own]
     while waiting:
         file = waiting.pop()
-        for name in _imports(file, file.relative_to(root).parent.parts):
+        for name in _imports(found[file], file.relative_to(root).parent.parts):
             stem = root.joinpath(*name)
             for path in (stem.with_suffix(".py"), stem / "__init__.py"):
                 if path not in found and path.is_relative_to(within) and path.is_file():
-                    found.add(path)
+                    found[path] = path.read_bytes()
                     waiting.append(path)
-    return sorted(found)
+    return [found[path] for path in sorted(found)]
 
 
-def _imports(file: Path, package: Sequence[str]) -> Iterator[Sequence[str]]:
+@lru_cache(maxsize=256)  # the base of all effects would be parsed for every one of them
+def _imports(source: bytes, package: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
     """Names that a source of a package imports, in their parts; what is taken from a module may be one itself."""
-    for node in ast.walk(ast.parse(file.read_bytes())):
+    names: list[tuple[str, ...]] = []
+    for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
-            yield from (one.name.split(".") for one in node.names)
+            names += [tuple(one.name.split(".")) for one in node.names]
         elif isinstance(node, ast.ImportFrom):
             above = package[: len(package) - node.level + 1] if node.level else ()
-            base = [*above, *(node.module or "").split(".")] if node.module else [*above]
-            yield base
-            yield from ([*base, one.name] for one in node.names)
+            base = (*above, *(node.module.split(".") if node.module else ()))
+            names += [base, *((*base, one.name) for one in node.names)]
+    return tuple(names)
 
 
 def _sources() -> bytes:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from r2s2r_cli.artifact import Group
@@ -30,12 +32,12 @@ def sensed_lengths(sensors: Group, robot: Robot) -> tuple[np.ndarray, np.ndarray
     return np.asarray((values - offset) / slope), cable
 
 
-def of_robot(length: np.ndarray, cable: np.ndarray, robot: Robot) -> np.ndarray:
-    """The same lengths with a column for each sensor of robot.toml, in that order, (sample, sensor) [m]; NaN where the
-    recording has none of its cable."""
-    found = np.full((len(length), len(robot.sensors)), np.nan)
-    for i, sensor in enumerate(robot.sensors):
-        column = np.flatnonzero(cable == sensor.cable)
+def columns_of(values: np.ndarray, cable: np.ndarray, wanted: Sequence[int]) -> np.ndarray:
+    """Numbers of sensors (..., sensor) in the order of the wanted cables, (..., wanted); NaN where no sensor measures
+    one. cable: of each sensor, (sensor,)."""
+    found = np.full((*values.shape[:-1], len(wanted)), np.nan)
+    for i, one in enumerate(wanted):
+        column = np.flatnonzero(cable == one)
         if len(column):
-            found[:, i] = length[:, column[0]]
+            found[..., i] = values[..., column[0]]
     return found

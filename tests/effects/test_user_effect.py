@@ -268,6 +268,30 @@ def test_what_its_package_keeps_elsewhere_is_part_of_the_key(
     assert keys[0] != keys[1] == keys[2]
 
 
+def test_a_law_in_the_init_of_a_package_and_a_neighbour_that_is_no_python(
+    plain: Variant, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the package imports of itself by its full name counts; where that cannot be read any more nobody can tell
+    whether it is the same law, so every key is new."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    top = tmp_path / "initlaws"
+    top.mkdir()
+    (top / "formula.py").write_text("SCALE = 1.0\n")
+    (top / "__init__.py").write_text(
+        "from r2s2r_cli.engine.hooks import Hooks\nfrom initlaws.formula import SCALE\n\n\n"
+        "class Law(Hooks):\n    name = 'law'\n\n    def __repr__(self):\n        return 'Law()'\n\n"
+        "    def contact(self, x, terms, friction):\n        return SCALE * friction\n"
+    )
+    importlib.invalidate_caches()
+    structure = plain.structure.with_effects(importlib.import_module("initlaws").Law())
+    first = trace_key(structure)
+    assert trace_key(structure) == first
+    (top / "formula.py").write_text("SCALE = 2.0\n")
+    assert trace_key(structure) != first
+    (top / "formula.py").write_text("SCALE = (\n")
+    assert trace_key(structure) != trace_key(structure)
+
+
 def _loaded(path: Path) -> object:
     import importlib.util
     import sys

@@ -9,7 +9,7 @@ import numpy as np
 from r2s2r_cli.artifact import ArtifactData, Group
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.segments import Intervals
-from r2s2r_cli.stages.sensed import of_robot, sensed_lengths
+from r2s2r_cli.stages.sensed import columns_of, sensed_lengths
 from schemas.robot import Robot
 
 
@@ -69,10 +69,10 @@ def sensed_run(name: str, recording: ArtifactData, run: str, robot: Robot) -> Se
     found = sensed_lengths(sensors, robot)
     if found is None:
         return None
-    length = of_robot(*found, robot)
+    cable = np.array([sensor.cable for sensor in robot.sensors], dtype=np.int64)
+    length = columns_of(*found, cable.tolist())
     if not np.isfinite(length).any():
         return None
-    cable = np.array([sensor.cable for sensor in robot.sensors], dtype=np.int64)
     return SensedRun(name, sensors["t"], length, cable, *_reached(Intervals.from_group(intervals), recording, run))
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.stages.identify.data import RunData, Selection
+from r2s2r_cli.stages.sensed import columns_of
 from schemas.robot import Robot
 
 FEWEST = 8
@@ -90,11 +91,8 @@ def seen_by_camera(
     errors = np.full((len(mine), len(robot.actuated)), np.nan)
     for row, run in enumerate(mine):
         if run.sensor_bias is not None:
-            cables = [s.cable for s in robot.sensors] if run.sensor_cable is None else run.sensor_cable.tolist()
-            of_cable = {cable: i for i, cable in enumerate(cables)}
-            for k, cable in enumerate(robot.actuated):
-                if cable in of_cable:
-                    errors[row, k] = run.sensor_bias[of_cable[cable]]
+            own = np.array([s.cable for s in robot.sensors]) if run.sensor_cable is None else run.sensor_cable
+            errors[row] = columns_of(run.sensor_bias, own, robot.actuated)
     known = np.isfinite(errors)
     mean = np.where(known, errors, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
     late = [run.sensor_delay for run in mine if run.sensor_delay is not None]

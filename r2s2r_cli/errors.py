@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
 
@@ -134,3 +135,10 @@ class NumericalError(R2S2RError):
     """The numbers went wrong: not finite, not converged, not identifiable."""
 
     exit_code = ExitCode.NUMERICAL
+
+
+def require_mujoco(where: str) -> None:
+    """Raises InputError where MuJoCo is not installed, which the command `where` needs."""
+    if find_spec("mujoco") is None:
+        raise InputError("MuJoCo is not installed", where=where, expected="mujoco of the extra `rig`", received="none",
+                         hint=install_extra("rig"))  # fmt: skip

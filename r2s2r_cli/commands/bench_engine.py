@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json as jsonlib
 import os
 import platform
@@ -19,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import InputError, NumericalError, UsageError, install_extra
+from r2s2r_cli.errors import NumericalError, UsageError, require_mujoco
 from r2s2r_cli.options import JsonOption, QuietOption
 from schemas.results_bench import Comparison, EngineBenchResult
 
@@ -61,9 +60,7 @@ def engine(
     from r2s2r_cli.commands.bench_probe import Plan
 
     console = Console(json=json, quiet=quiet)
-    if importlib.util.find_spec("mujoco") is None:
-        raise InputError("MuJoCo is not installed", where="bench engine", expected="mujoco of the extra `rig`",
-                         received="none", hint=install_extra("rig"))  # fmt: skip
+    require_mujoco("bench engine")
     ticks = 0.02 / step
     if abs(ticks - round(ticks)) > 1e-9:
         raise UsageError("motor commands change every 20 ms", where="--step", received=f"{step:g} s",

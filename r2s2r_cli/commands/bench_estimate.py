@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import time
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import InputError, R2S2RError, UsageError, install_extra
+from r2s2r_cli.errors import R2S2RError, UsageError, require_mujoco
 from r2s2r_cli.options import JsonOption, QuietOption
 
 if TYPE_CHECKING:
@@ -50,9 +49,7 @@ def estimate(
     from r2s2r_cli.commands.bench_estimate_case import REPORT_SEEDS, SETTINGS, TUNING_SEEDS
 
     console = Console(json=json, quiet=quiet)
-    if importlib.util.find_spec("mujoco") is None:
-        raise InputError("MuJoCo is not installed", where="bench estimate", expected="mujoco of the extra `rig`",
-                         received="none", hint=install_extra("rig"))  # fmt: skip
+    require_mujoco("bench estimate")
     names = case or list(SETTINGS)
     unknown = [name for name in names if name not in SETTINGS]
     if unknown:

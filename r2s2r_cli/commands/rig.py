@@ -17,7 +17,7 @@ import typer
 
 from r2s2r_cli.commands.typed import typed_instead
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import InputError, UsageError, install_extra
+from r2s2r_cli.errors import InputError, UsageError, require_mujoco
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from schemas.results_rig import RigResult
 
@@ -102,7 +102,7 @@ def rig(
         raise UsageError("only a pty has a device", where="--device", expected="--link pty", received=f"--link {link}",
                          hint=f"r2s2r rig --link {link}")  # fmt: skip
     body, surroundings = _robot(robot, project), _world(world, seed)
-    _need_mujoco()
+    require_mujoco("r2s2r rig")
     if points is not None:
         _measure(console, body, surroundings, points)
         return
@@ -159,14 +159,6 @@ def _world(path: Path | None, seed: int | None) -> World:
 
     world = World() if path is None else load_world(path)
     return world if seed is None else world.model_copy(update={"seed": seed})
-
-
-def _need_mujoco() -> None:
-    import importlib.util
-
-    if importlib.util.find_spec("mujoco") is None:
-        raise InputError("MuJoCo is not installed", where="r2s2r rig", expected="mujoco of the extra `rig`",
-                         received="no such package", hint=install_extra("rig"))  # fmt: skip
 
 
 @contextmanager

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterator
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from r2s2r_cli.views.figure import (
     RED,
     as_typed,
     legend_columns,
+    legend_entries,
     new_figure,
     png_bytes,
     texts,
@@ -111,7 +112,6 @@ def _drift(history: Group, drift: Group) -> bytes:
     ticks = sorted({round(t / DAY_S) for t in np.linspace(history["time"].min(), history["time"].max(), 4)})
     labels = [f"{datetime.fromtimestamp(DAY_S * day, UTC):%d %b\n%Y}" for day in ticks]
     first: Axes | None = None
-    entries = dict[str, Any]()
     for sensor in range(n):
         row, column = divmod(sensor, columns)
         axes = figure.add_subplot(grid[row, column], sharex=first, sharey=first)
@@ -120,9 +120,7 @@ def _drift(history: Group, drift: Group) -> bytes:
         axes.set_xticks(ticks, labels)
         if column == 0:
             axes.set_ylabel("deviation [mm]")
-        # Of every sensor: the first one may have no usable line in a file.
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            entries.setdefault(label, handle)
+    entries = legend_entries(figure.axes)  # of every sensor: the first one may have no usable line in a file
     columns = legend_columns(figure.get_figwidth(), list(entries))
     figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncol=columns, fontsize=8,
                   frameon=False)  # fmt: skip

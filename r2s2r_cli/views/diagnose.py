@@ -12,7 +12,7 @@ from r2s2r_cli.views.diagnose_floor import floor_picture
 from r2s2r_cli.views.diagnose_gains import ranking_picture
 from r2s2r_cli.views.diagnose_robot import robot_picture
 from r2s2r_cli.views.diagnose_words import HELD_OUT, LEFT_OUT, MARKED, PLAIN, accused, drawn_effects
-from r2s2r_cli.views.figure import BLUE, GREEN, PURPLE, legend_columns, new_figure, png_bytes
+from r2s2r_cli.views.figure import BLUE, GREEN, PURPLE, legend_columns, legend_entries, new_figure, png_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -86,9 +86,7 @@ def _gap(data: ArtifactData, report: DiagnoseReport) -> bytes:
     axes[0].annotate("target interval", (0.0, 1.0), xycoords="axes fraction", xytext=(-4, 0),
                      textcoords="offset points", ha="right", va="bottom", fontsize=7, color=PLAIN)  # fmt: skip
     axes[0].set_ylim(bottom=0.0)  # of all panels, once every one of them is drawn
-    # Of all panels: there may be no point of the effect in the first one.
-    entries = {label: handle for own in axes[::-1]
-               for handle, label in zip(*own.get_legend_handles_labels(), strict=True)}  # fmt: skip
+    entries = legend_entries(axes)  # of all panels: there may be no point of the effect in the first one
     handles, labels = list(entries.values()), list(entries)
     if not rows["gap"].all():
         handles.append(Patch(color=PLAIN, alpha=BAND))

@@ -108,12 +108,18 @@ def legend_beside(axes: Axes, **options: Any) -> None:
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, frameon=False, **options)
 
 
-def legend_below(figure: Figure | SubFigure, axes: Sequence[Axes], columns: int = 6) -> None:
-    """One legend under all panels, each label once."""
+def legend_entries(axes: Sequence[Axes]) -> dict[str, Any]:
+    """What a legend of several panels has, handles by label, each label once."""
     entries: dict[str, Any] = {}
     for panel in axes:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
+    return entries
+
+
+def legend_below(figure: Figure | SubFigure, axes: Sequence[Axes], columns: int = 6) -> None:
+    """One legend under all panels, each label once."""
+    entries = legend_entries(axes)
     if entries:
         figure.legend(
             list(entries.values()),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
 from enum import IntEnum
-from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
 
@@ -139,6 +139,6 @@ class NumericalError(R2S2RError):
 
 def require_mujoco(where: str) -> None:
     """Raises InputError where MuJoCo is not installed, which the command `where` needs."""
-    if find_spec("mujoco") is None:
+    if importlib.util.find_spec("mujoco") is None:
         raise InputError("MuJoCo is not installed", where=where, expected="mujoco of the extra `rig`", received="none",
                          hint=install_extra("rig"))  # fmt: skip

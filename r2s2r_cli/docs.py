@@ -19,7 +19,7 @@ _WIDTH = 100
 def pages() -> dict[str, str]:
     """File name below docs/reference -> text."""
     from r2s2r_cli.checks.docs import checks_page
-    from r2s2r_cli.effects import CATALOGUE
+    from r2s2r_cli.effects import CATALOGUE, FURTHER
     from r2s2r_cli.effects.words import page as effects_page
     from r2s2r_cli.rig.world.page import world_page
     from r2s2r_cli.stages.identify.free.page import free_parameters_page
@@ -27,7 +27,7 @@ def pages() -> dict[str, str]:
     return {
         "cli.md": cli_page(), "exit-codes.md": exit_codes_page(), "checks.md": _NOTE + checks_page(),
         "free-parameters.md": _NOTE + free_parameters_page(), "world.md": _NOTE + world_page(),
-        "effects.md": _NOTE + effects_page(CATALOGUE),
+        "effects.md": _NOTE + effects_page(CATALOGUE, FURTHER),
     }  # fmt: skip
 
 

@@ -38,6 +38,8 @@ class EffectInfo(Frozen):
     numbers: tuple[EffectNumber, ...]
     text: dict[str, str]
     """The headings of its file: what it is, where it acts, source ..."""
+    looked_for: bool
+    """Whether `diagnose` looks for it without being told to."""
     brought_by: str
     """"" for the catalogue, else the module of an installed package."""
 

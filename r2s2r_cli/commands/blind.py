@@ -217,9 +217,9 @@ def _settings(items: list[str] | None, without: str | None) -> dict[str, object]
     parsed = (parse_override(item, hint=lambda key: "--set with_parity=false", words=False) for item in items or [])
     found: dict[str, object] = dict(parsed)
     if without is not None:
-        from r2s2r_cli.effects.known import known_effects
+        from r2s2r_cli.effects import looked_for
 
-        ids = [effect.name for effect in known_effects()]
+        ids = [effect.name for effect in looked_for()]
         if without not in ids:
             raise UsageError("the catalogue has no such effect", where="--without", expected=", ".join(ids),
                              received=without, hint="r2s2r effects")  # fmt: skip

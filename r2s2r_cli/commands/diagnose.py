@@ -53,7 +53,8 @@ def diagnose(
     ] = None,
     effect: Annotated[
         list[str] | None,
-        typer.Option("--effect", metavar="ID", help="Consider only this effect; repeatable. Default: the catalogue."),
+        typer.Option("--effect", metavar="ID", help="Consider only this effect; repeatable. "
+                     "catalogue: beside the catalogue, which is the default."),
     ] = None,
     model: Annotated[
         Path | None, typer.Option("--model", metavar="FILE", help="Another 30-identify.h5 as the nominal simulator.")
@@ -109,7 +110,7 @@ def diagnose(
         force=force, dry_run=dry_run,
     )  # fmt: skip
     with whole_hints(typed, asked.artifacts, "r2s2r diagnose"):
-        _require_effects(asked.effects)
+        _require_effects(asked.named)
         settings = here.config(place, overrides).diagnose
         unfinished = checkpoint_of(here.artifact("diagnosis", place))
         if resume and not unfinished.exists():
@@ -130,12 +131,12 @@ def diagnose(
         with resumable(checkpoint, here.relative(unfinished), again, done="simulated"):
             result, report = run.run(
                 lambda: _compute(asked, settings, checkpoint, console, draw),
-                partial(pictures, asked=asked.effects, link=here.file.link) if draw else None,
+                partial(pictures, asked=asked.named, link=here.file.link) if draw else None,
                 lambda said: checkpoint.clear(),
             )  # fmt: skip
     show_outcome(answer(result, report), console)
     if report is not None:
-        show(report, console, asked.effects, link=here.file.link)
+        show(report, console, asked.named, link=here.file.link)
 
 
 def _require_effects(names: tuple[str, ...]) -> None:
@@ -169,7 +170,7 @@ def _compute(
     begun = time.monotonic()
     with _shown(console, seconds) as progress:
         data, report = stage.diagnosed(
-            evidence, settings, seed=asked.seed, effects=asked.effects or None, policies=asked.policies(),
+            evidence, settings, seed=asked.seed, effects=asked.considered(), policies=asked.policies(),
             cache_dir=asked.project.cache, progress=progress, checkpoint=checkpoint,
         )  # fmt: skip
     if report.next_gait is not None and draw:  # the policy is a file beside the pictures

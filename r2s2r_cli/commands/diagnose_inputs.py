@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from r2s2r_cli.stages.identified import Identified
 
 
+CATALOGUE = "catalogue"
+"""Word for all effects that are looked for without being named."""
+
+
 @dataclass(frozen=True)
 class Asked:
     """The request of one command line, its texts as typed."""
@@ -43,6 +47,19 @@ class Asked:
             "train": list(self.train), "test": list(self.test), "healthy": list(self.healthy),
             "effects": list(self.effects), "also": list(self.also), "seed": self.seed,
         }  # fmt: skip
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Effects that were named, without the word for the rest."""
+        return tuple(name for name in self.effects if name != CATALOGUE)
+
+    def considered(self) -> tuple[str, ...] | None:
+        """Ids of the effects to choose from; None: the catalogue. Raises InputError as `all_effects`."""
+        from r2s2r_cli.stages.effects import effects_looked_for
+
+        if CATALOGUE not in self.effects:
+            return self.effects or None
+        return tuple(effect.name for effect in effects_looked_for(self.named)) if self.named else None
 
     @property
     def identification(self) -> Path:

@@ -23,11 +23,13 @@ def effects(
 ) -> None:
     """List the effects that `diagnose` looks for and `identify --with-effect` uses, or explain some of them.
 
+    Those marked with * `diagnose` looks for only where they are named (`--effect ID`).
     An effect is a physical law that the nominal simulator lacks. Explained: what it is, where it acts, its numbers with
     bounds, what it looks like in data, what it is confused with, and its source. Installed packages can bring more.
 
     Example: r2s2r effects friction_field
     """
+    from r2s2r_cli.effects import FURTHER
     from r2s2r_cli.stages.effects import all_effects, effect_of
     from schemas.results_effects import EffectsResult
 
@@ -38,12 +40,15 @@ def effects(
         for one in chosen:
             _explain(one, console)
         return
-    rows = [[one.name, str(one.channel), one.signature()] for one in chosen]
+    named = {one.name for one in FURTHER}
+    rows = [[one.name + "*" * (one.name in named), str(one.channel), one.signature()] for one in chosen]
     console.table("effects", ["id", "channel", "what it looks like in data"], rows)
+    console.say("* only where it is named: r2s2r diagnose --effect catalogue --effect ID")
     console.say("r2s2r effects ID explains one of them")
 
 
 def _info(effect: Effect) -> EffectInfo:
+    from r2s2r_cli.effects import FURTHER
     from r2s2r_cli.effects.words import sections
     from schemas.results_effects import EffectInfo, EffectNumber
 
@@ -57,6 +62,7 @@ def _info(effect: Effect) -> EffectInfo:
         id=effect.name, title=effect.title, channel=str(effect.channel), signature=effect.signature(),
         look_alikes=effect.look_alikes, numbers=numbers, text=sections(effect),
         brought_by="" if module.startswith("r2s2r_cli.effects.") else module,
+        looked_for=effect not in FURTHER,
     )  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """The catalogue of effects: physical laws that the nominal simulator lacks, one a file, in the design's order."""
 
+from r2s2r_cli.effects.air_drag import AirDrag
 from r2s2r_cli.effects.backlash import Backlash
 from r2s2r_cli.effects.base import (
     Effect as Effect,
@@ -17,7 +18,7 @@ from r2s2r_cli.effects.command_latency import CommandLatency
 from r2s2r_cli.effects.dropout import Dropout
 from r2s2r_cli.effects.friction_field import FrictionField
 from r2s2r_cli.effects.ground_slope import GroundSlope
-from r2s2r_cli.effects.known import known_effects as known_effects
+from r2s2r_cli.effects.known import known_effects as known_effects, looked_for as looked_for
 from r2s2r_cli.effects.load_droop import LoadDroop
 from r2s2r_cli.effects.motor_dead_zone import MotorDeadZone
 from r2s2r_cli.effects.motor_lag import MotorLag
@@ -61,4 +62,7 @@ CATALOGUE: tuple[Effect, ...] = (
     CameraDelay(),
     Dropout(),
 )
-"""Every effect, in the order of the way of the data."""
+"""What `diagnose` looks for, in the order of the way of the data: its calibration rests on these."""
+
+FURTHER: tuple[Effect, ...] = (AirDrag(),)
+"""Looked for only where they are named, in the same order: no calibration set has them."""

@@ -1,7 +1,9 @@
-"""The effects that are known here: the catalogue, and those that installed packages bring (entry points)."""
+"""The effects that are known here: the catalogue, what is looked for only where it is named, and those that installed
+packages bring (entry points)."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from functools import lru_cache
 from importlib.metadata import EntryPoint
 
@@ -12,17 +14,25 @@ from r2s2r_cli.installed import GROUP, installed
 
 @lru_cache
 def known_effects() -> tuple[Effect, ...]:
-    """The catalogue, then the effects of installed packages by name. Raises EngineInputError for one that is none, or
-    that takes a name that is taken."""
-    from r2s2r_cli.effects import CATALOGUE
+    """The catalogue, then `FURTHER`, then the effects of installed packages by name. Raises EngineInputError for one
+    that is none, or that takes a name that is taken."""
+    from r2s2r_cli.effects import CATALOGUE, FURTHER
 
-    found = list(CATALOGUE)
+    found = [*CATALOGUE, *FURTHER]
     for entry in installed():
         effect = loaded(entry)
         if effect.name in {one.name for one in found}:
             raise _bad(entry, "an effect of this id is there already", f"another id than {effect.name}", effect.name)
         found.append(effect)
     return tuple(found)
+
+
+def looked_for(asked: Collection[str] = ()) -> tuple[Effect, ...]:
+    """What a diagnosis has at hand: the catalogue, the effects of installed packages, and what is `asked` for by id."""
+    from r2s2r_cli.effects import FURTHER
+
+    left_out = {effect.name for effect in FURTHER} - set(asked)
+    return tuple(effect for effect in known_effects() if effect.name not in left_out)
 
 
 def loaded(entry: EntryPoint) -> Effect:

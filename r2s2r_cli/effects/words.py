@@ -23,6 +23,11 @@ command, motor, cable, mass, contact, world, sensing (what the controller reads 
 the camera sees).
 """
 
+_FURTHER = """Looked for only where they are named, `r2s2r diagnose --effect ID`, alone or, with `--effect catalogue`, beside
+those above: the thresholds of `diagnose` are calibrated on sets without them. Everything else knows them as it does the
+others.
+"""
+
 
 def sections(effect: Effect) -> dict[str, str]:
     """Text by heading, one line each; headings that the file lacks are left out."""
@@ -32,13 +37,17 @@ def sections(effect: Effect) -> dict[str, str]:
     return {heading: " ".join(body.split()) for heading, body in zip(parts[1::2], parts[2::2], strict=True)}
 
 
-def page(effects: Sequence[Effect]) -> str:
-    """Markdown of effects: a table of all, then one section each."""
+def page(effects: Sequence[Effect], further: Sequence[Effect]) -> str:
+    """Markdown of effects: a table of those that are looked for, one of those `further`, then one section each."""
+    sections = "".join(_section(one) for one in (*effects, *further))
+    return f"{_HEAD}\n{_table(effects)}\n{_FURTHER}\n{_table(further)}{sections}"
+
+
+def _table(effects: Sequence[Effect]) -> str:
     rows = "\n".join(
         f"| [`{one.name}`](#{one.name}) | {one.title} | {one.channel} | {one.signature()} |" for one in effects
     )
-    table = f"| id | effect | channel | what it looks like in data |\n| --- | --- | --- | --- |\n{rows}\n"
-    return _HEAD + "\n" + table + "".join(_section(one) for one in effects)
+    return f"| id | effect | channel | what it looks like in data |\n| --- | --- | --- | --- |\n{rows}\n"
 
 
 def bounds(own: EffectParameter) -> str:

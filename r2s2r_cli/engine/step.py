@@ -79,7 +79,7 @@ def step(structure: Structure, theta: Parameters, state: State, u: Tensor, h: Te
 def _pushed_by_the_world(
     structure: Structure, theta: Parameters, memory: dict[str, Values], rods: Bodies, v: Tensor, w: Tensor, h: Tensor
 ) -> tuple[Tensor, Tensor]:
-    terms = WorldTerms(rods.p, v, rods.R_GR, w, rods.w, rods.inverse_inertia)
+    terms = WorldTerms(rods.p, v, rods.R_GR, w, rods.w, rods.inverse_inertia, rods.inverse_mass)
     force, torque = torch.zeros_like(v), torch.zeros_like(w)
     for effect in structure.effects:
         force, torque = effect.world(theta.of(effect.name), terms, force, torque)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from r2s2r_cli.errors import InputError, UsageError
@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
 
 def all_effects() -> tuple[Effect, ...]:
-    """The catalogue and the effects of installed packages. Raises InputError for a package whose effect is none."""
+    """Whatever is known by name: the catalogue, what is looked for only where it is named, the effects of installed
+    packages. Raises InputError for a package whose effect is none."""
     from r2s2r_cli.effects import known_effects
     from r2s2r_cli.engine import EngineInputError
 
@@ -24,6 +25,14 @@ def all_effects() -> tuple[Effect, ...]:
             error.what, where=error.field, expected=error.expected, received=error.received,
             hint="pip uninstall PACKAGE   # the one that brings this effect, or mend it (docs/how-to-extend.md)",
         ) from error  # fmt: skip
+
+
+def effects_looked_for(asked: Collection[str] = ()) -> tuple[Effect, ...]:
+    """What a diagnosis has at hand where these ids are `asked` for. Raises InputError as `all_effects`."""
+    from r2s2r_cli.effects import looked_for
+
+    all_effects()
+    return looked_for(asked)
 
 
 def effect_of(name: str, *, where: str, command: str) -> Effect:

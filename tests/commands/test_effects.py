@@ -8,8 +8,9 @@ from pathlib import Path
 from typer.testing import CliRunner
 
 from r2s2r_cli.app import app
-from r2s2r_cli.effects import CATALOGUE
+from r2s2r_cli.effects import CATALOGUE, FURTHER
 
+ALL = (*CATALOGUE, *FURTHER)
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "effects.md"
 
 
@@ -23,9 +24,9 @@ def invoke(*words: str) -> str:
 def test_the_list_has_all() -> None:
     """Every id, with its channel and signature, in the catalogue's order."""
     text = invoke()
-    places = [text.index(f" {effect.name} ") for effect in CATALOGUE]
+    places = [text.index(f" {effect.name}{'*' * (effect in FURTHER)} ") for effect in ALL]
     assert places == sorted(places)
-    assert all(effect.signature()[:30] in text for effect in CATALOGUE)
+    assert all(effect.signature()[:30] in text for effect in ALL)
 
 
 def test_one_is_explained() -> None:
@@ -42,11 +43,12 @@ def test_the_document_says_the_same() -> None:
     """With --json: schema, and every number of every effect."""
     document = json.loads(invoke("--json"))
     assert document["schema"] == "r2s2r.effects/1"
-    assert [one["id"] for one in document["effects"]] == [effect.name for effect in CATALOGUE]
-    for one, effect in zip(document["effects"], CATALOGUE, strict=True):
+    assert [one["id"] for one in document["effects"]] == [effect.name for effect in ALL]
+    for one, effect in zip(document["effects"], ALL, strict=True):
         assert [number["name"] for number in one["numbers"]] == [own.name for own in effect.own]
         assert set(one["text"]) >= {"What it is", "Where it acts", "Source"}
         assert one["brought_by"] == ""
+        assert one["looked_for"] == (effect in CATALOGUE)
 
 
 def test_an_unknown_one_is_a_usage_error() -> None:
@@ -60,6 +62,6 @@ def test_an_unknown_one_is_a_usage_error() -> None:
 def test_the_reference_has_a_section_of_each() -> None:
     """With a row for every number."""
     text = REFERENCE.read_text()
-    for effect in CATALOGUE:
+    for effect in ALL:
         assert f"\n## {effect.name}\n" in text
         assert all(f"| `{effect.name}.{own.name}` |" in text for own in effect.own)

@@ -10,7 +10,7 @@ import roma
 import torch
 from torch import Tensor
 
-from r2s2r_cli.effects import CATALOGUE, Effect, with_off_values
+from r2s2r_cli.effects import CATALOGUE, FURTHER, Effect, with_off_values
 from r2s2r_cli.engine import Channel, Simulator, State, flat_step, observe, pack_parameters, pack_state, sense
 from r2s2r_cli.engine.trace_key import trace_key
 from tests.support import parity
@@ -18,7 +18,8 @@ from tests.support.engine import lowest_gap, random_gait, simulator
 from tests.support.phases import STEP, phases, raised, shaken, stirred
 from tests.support.variants import Variant, pair, plugged, robot
 
-EFFECTS = pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
+ALL = (*CATALOGUE, *FURTHER)
+EFFECTS = pytest.mark.parametrize("effect", ALL, ids=lambda effect: effect.name)
 OUTSIDE = ("command_latency", "sensor_bias", "sensor_gain", "camera_pose", "camera_scale", "camera_delay", "dropout")
 """Effects that the step does not see: they act before it, or on what is read off its states."""
 DESIGN = [
@@ -26,6 +27,10 @@ DESIGN = [
     "spool_buildup", "backlash", "tendon_stiffness", "tendon_relaxation", "tendon_set", "com_offset", "payload",
     "friction_field", "rolling_resistance", "soft_ground", "cap_friction", "cap_radius", "ground_slope", "tether_drag",
     "sensor_bias", "sensor_gain", "camera_pose", "camera_scale", "camera_delay", "dropout",
+]  # fmt: skip
+SECOND = [
+    "tendon_hysteresis", "capstan_friction", "attachment_offset", "friction_anisotropy", "stribeck", "viscous_contact",
+    "obstacle", "air_drag", "sensor_saturation",
 ]  # fmt: skip
 
 
@@ -44,7 +49,7 @@ def bare(nominal: Variant) -> Tensor:
 @pytest.fixture(scope="module")
 def whole(nominal: Variant) -> Variant:
     """The same with all effects, every number away from its off value."""
-    return plugged(nominal, *CATALOGUE, on=True)
+    return plugged(nominal, *ALL, on=True)
 
 
 def falling(model: Variant, n: int) -> State:
@@ -78,7 +83,8 @@ def after_steps(model: Variant, nominal: Variant, steps: int = 4) -> Tensor:
 def test_the_catalogue_is_the_designs() -> None:
     """All ids of the first release, in the order of the design, each in a file of its name."""
     assert [effect.name for effect in CATALOGUE] == DESIGN
-    assert all(type(effect).__module__.endswith(f".{effect.name}") for effect in CATALOGUE)
+    assert [effect.name for effect in FURTHER] == [name for name in SECOND if name in {one.name for one in FURTHER}]
+    assert all(type(effect).__module__.endswith(f".{effect.name}") for effect in ALL)
 
 
 @EFFECTS
@@ -89,7 +95,7 @@ def test_off_is_bitwise_off(effect: Effect, nominal: Variant, bare: Tensor) -> N
 
 def test_all_off_together_is_bitwise_off(nominal: Variant, bare: Tensor) -> None:
     """All effects of the catalogue plug in together, at their off values still bit by bit nothing."""
-    off = plugged(nominal, *CATALOGUE, on=False)
+    off = plugged(nominal, *ALL, on=False)
     assert torch.equal(bare, after_steps(off, nominal))
 
 
@@ -114,13 +120,13 @@ def test_off_is_bitwise_off_outside_the_step(effect: Effect, nominal: Variant) -
 
 def test_off_is_off_in_machine_code() -> None:
     """One step in every phase of motion: at their off values effects change no number by 1e-12 of its size."""
-    _machine_code_off(pair(rod_contact=False), *CATALOGUE)
+    _machine_code_off(pair(rod_contact=False), *ALL)
 
 
 @pytest.mark.slow
 def test_off_is_off_in_machine_code_of_the_robot() -> None:
     """The same for the 3-bar robot."""
-    _machine_code_off(robot(), *CATALOGUE)
+    _machine_code_off(robot(), *ALL)
 
 
 def _machine_code_off(plain: Variant, *effects: Effect) -> None:
@@ -157,7 +163,7 @@ def test_every_number_has_its_true_derivative(whole: Variant) -> None:
     middle = torch.cat([whole.theta.extra[name] for name in names], dim=1).requires_grad_()
     (gradient,) = torch.autograd.grad(outcome(middle).sum(), middle)
     n = middle.shape[1]
-    scales = {f"{effect.name}.{one.name}": one.scale for effect in CATALOGUE for one in effect.own}
+    scales = {f"{effect.name}.{one.name}": one.scale for effect in ALL for one in effect.own}
     counts = [whole.theta.extra[name].shape[1] for name in names]
 
     def central(share: float) -> Tensor:
@@ -178,7 +184,7 @@ def test_every_number_has_its_true_derivative(whole: Variant) -> None:
 def test_every_number_moves_the_robot(nominal: Variant) -> None:
     """A gait of 2.4 s on the example robot, and again upside down: every number of every effect, by itself away from
     its off value, moves an end cap, a length that is read or a cap that is seen."""
-    off = plugged(nominal, *CATALOGUE, on=False)
+    off = plugged(nominal, *ALL, on=False)
     around, mirror = off.start.q_WR.new_tensor([1.0, 0.0, 0.0, 0.0]), off.start.p_WB.new_tensor([1.0, -1.0, -1.0])
     turned = roma.quat_product(around.expand_as(off.start.q_WR), off.start.q_WR)
     over = replace(off.start, q_WR=turned, p_WB=off.start.p_WB * mirror)
@@ -188,7 +194,7 @@ def test_every_number_moves_the_robot(nominal: Variant) -> None:
         "tendon_relaxation.share": 0.3, "soft_ground.compliance_m_per_n": 1e-3, "tether_drag.force_n": 0.2,
     }  # fmt: skip
     found = {}
-    for effect in CATALOGUE:
+    for effect in ALL:
         own = {f"{effect.name}.{one.name}": one for one in effect.own}
         base = {name: off.theta.extra[name].clone() for name in own}
         help_ = {name: torch.full_like(base[name], aided[name]) for name in own if name in aided and len(own) > 1}
@@ -225,7 +231,7 @@ def test_it_says_what_it_is(effect: Effect) -> None:
     assert effect.title
     assert effect.signature()
     assert effect.name
-    assert set(effect.look_alikes) < set(DESIGN) - {effect.name}
+    assert set(effect.look_alikes) < {*DESIGN, *SECOND} - {effect.name}
     for parameter in effect.own:
         assert parameter.lower <= parameter.off <= parameter.upper
         assert 0 < parameter.scale <= parameter.upper - parameter.lower
@@ -238,7 +244,7 @@ def test_it_says_what_it_is(effect: Effect) -> None:
 
 def test_off_values_are_filled_in(nominal: Variant) -> None:
     """`with_off_values` gives every own parameter its off value, and leaves those that are given."""
-    structure = nominal.structure.with_effects(*CATALOGUE)
+    structure = nominal.structure.with_effects(*ALL)
     given = {"motor_lag.tau_s": torch.full((1, 1), 0.03, dtype=torch.float64)}
     theta = with_off_values(structure, nominal.theta.with_values(given))
     assert float(theta.extra["motor_lag.tau_s"]) == 0.03

@@ -11,7 +11,7 @@ import roma
 import torch
 from torch import Tensor
 
-from r2s2r_cli.effects import CATALOGUE, Effect, with_off_values
+from r2s2r_cli.effects import CATALOGUE, FURTHER, Effect, with_off_values
 from r2s2r_cli.engine import Detach, Parameters, State, Structure, tilted
 from r2s2r_cli.engine.state import cable_ends
 from r2s2r_cli.stages.model import parameters_of, rest_state, structure_of
@@ -178,7 +178,7 @@ def with_memory(structure: Structure, state: State) -> State:
 SMALL: dict[str, Callable[[], Variant]] = {
     "pair": pair,
     "pair, every law": lambda: plugged(
-        pair(cubic=True, tendons=True, axial=False, lag=True, droop=True, sweeps=3), *CATALOGUE, on=True
+        pair(cubic=True, tendons=True, axial=False, lag=True, droop=True, sweeps=3), *CATALOGUE, *FURTHER, on=True
     ),
     "free rods": free_rods,
     "one crooked rod": one_crooked_rod,
@@ -202,8 +202,8 @@ VARIANTS: dict[str, Callable[[], Variant]] = {
     "rod ends": lambda: robot(attachment="rod_end"),
     "sixbar": lambda: robot("sixbar"),
     "no winches": without_winches,
-    "all effects off": lambda: plugged(robot(), *CATALOGUE, on=False),
-    "all effects on": lambda: plugged(robot(), *CATALOGUE, on=True),
+    "all effects off": lambda: plugged(robot(), *CATALOGUE, *FURTHER, on=False),
+    "all effects on": lambda: plugged(robot(), *CATALOGUE, *FURTHER, on=True),
 }
 
 

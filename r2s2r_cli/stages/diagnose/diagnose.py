@@ -84,7 +84,7 @@ def diagnose(
         )
     progress("parity", 1, 1)
     starts = Starts(Filter(members=settings.members, seed=settings.seed))
-    model = Model(evidence.model)
+    model = Model(evidence.model, asked=settings.effects or ())
     how = {"step": settings.step, "cache_dir": cache_dir, "threads": threads}
     replayer = Replayer(model, **how) if checkpoint is None else Remembered(model, checkpoint, **how)
     fitted = refit(evidence, replayer, starts=starts, told=progress,

@@ -6,13 +6,13 @@ value an effect is not there, to the last bit.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from r2s2r_cli.stages.effects import all_effects
+from r2s2r_cli.stages.effects import effects_looked_for
 from r2s2r_cli.stages.identified import Identified
 from r2s2r_cli.stages.identify.free.base import Coordinate, Free
 from r2s2r_cli.stages.identify.free.mapping import Mapping, Observation
@@ -89,12 +89,13 @@ class Model:
     values0 (n,): the nominal simulator.
     """
 
-    def __init__(self, nominal: Identified, effects: Sequence[str] | None = None) -> None:
-        """effects: those plugged in, by default the whole catalogue and what installed packages bring. Raises
-        InputError as `Mapping`, and for a package whose effect is none."""
+    def __init__(self, nominal: Identified, effects: Sequence[str] | None = None, asked: Collection[str] = ()) -> None:
+        """effects: those plugged in, by default the whole catalogue, what installed packages bring and what is `asked`
+        for by id. Raises InputError as `Mapping`, and for a package whose effect is none."""
         own = nominal.mapping
         self.robot = nominal.robot
-        self.effects = tuple(effect for effect in all_effects() if effects is None or effect.name in effects)
+        at_hand = effects_looked_for(asked if effects is None else effects)
+        self.effects = tuple(effect for effect in at_hand if effects is None or effect.name in effects)
         names = tuple(effect.name for effect in self.effects)
         self._nominal, self._values = own, nominal.values
         self._mapping = Mapping(own.robot, own.frees, names, fixed=own.fixed, structure=own.structure)

@@ -1,0 +1,54 @@
+"""Drag of the air against closed forms: flight, turning, and what mass does."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from r2s2r_cli.effects import with_off_values
+from r2s2r_cli.effects.air_drag import AirDrag
+from r2s2r_cli.engine import Parameters, Structure
+from tests.support.engine import MASS, G, free_rods, parameters, roll, state, vector
+
+H, DRAG = 1e-3, 0.4
+
+
+def rod(drag: float, **numbers: float) -> tuple[Structure, Parameters]:
+    """One free rod in air of this drag."""
+    structure = free_rods(1, rod_contact=False).with_effects(AirDrag())
+    theta = with_off_values(structure, parameters(free_rods(1, rod_contact=False), **numbers))
+    return structure, theta.with_values({"air_drag.drag_n_s_per_m": torch.full((1, 1), drag, dtype=torch.float64)})
+
+
+def test_flight_dies_away() -> None:
+    """Thrown sideways the speed is v0 (1 - h c / m)^n, to first order exp(-c t / m); downwards it nears m g / c."""
+    structure, theta = rod(DRAG)
+    start = state(structure, vector(0.0, 0.0, 50.0)[None], v=vector(0.5, -0.2, 0.0).expand(1, 1, 3))
+    after = roll(structure, theta, start, 400, H)[-1]
+    kept = (1.0 - H * DRAG / MASS) ** 400
+    assert after.v_WB[0, 0, :2].numpy() == pytest.approx([0.5 * kept, -0.2 * kept], rel=1e-12)
+    falling = roll(structure, theta, start, 4000, H, every=4000)[-1]
+    # Gravity of a step counts before the drag on it.
+    end = MASS * G / DRAG * (1.0 - H * DRAG / MASS)
+    assert float(falling.v_WB[0, 0, 2]) == pytest.approx(-end, rel=1e-4)
+
+
+def test_turning_dies_away_at_the_same_rate() -> None:
+    """A rod that spins about its axis, or across it, loses its turning as it does its speed."""
+    structure, theta = rod(DRAG)
+    kept = (1.0 - H * DRAG / MASS) ** 200
+    for spin in (vector(0.0, 0.0, 3.0), vector(2.0, 0.0, 0.0)):
+        start = state(structure, vector(0.0, 0.0, 50.0)[None], w=spin.expand(1, 1, 3))
+        after = roll(structure, theta, start, 200, H)[-1]
+        assert after.w_R[0, 0].norm().item() == pytest.approx(float(spin.norm()) * kept, rel=1e-12)
+
+
+def test_a_heavy_rod_is_braked_less() -> None:
+    """Twice the mass with twice the inertia, half the rate: the drag is one of shape, not of mass."""
+    structure, theta = rod(DRAG)
+    _, heavy = rod(DRAG, mass=2 * MASS)
+    start = state(structure, vector(0.0, 0.0, 50.0)[None], v=vector(0.5, 0.0, 0.0).expand(1, 1, 3))
+    after = roll(structure, heavy, start, 100, H)[-1]
+    assert float(after.v_WB[0, 0, 0]) == pytest.approx(0.5 * (1.0 - H * DRAG / (2 * MASS)) ** 100, rel=1e-12)
+    light = roll(structure, theta, start, 100, H)[-1]
+    assert float(light.v_WB[0, 0, 0]) < float(after.v_WB[0, 0, 0])

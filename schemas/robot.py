@@ -14,19 +14,24 @@ from schemas.typed import (
     Capacitance,
     CapacitanceSlope,
     Coordinate,
+    Damping,
     Flag,
     Fraction,
+    Frequency,
+    Friction,
+    Gain,
     Length,
     Mass,
-    NonNegative,
-    Number,
-    Positive,
+    Name,
     Radius,
     Share,
     Size,
     Stiffness,
+    Stiffness2,
+    Stiffness3,
     TendonStiffness,
     Tolerance,
+    Turning,
     Wait,
     Whole,
 )
@@ -40,7 +45,7 @@ Channel = Annotated[float, Field(strict=True, ge=0, le=255)]
 class Lump(Frozen):
     """A part of a rod, counted as a solid of its own around the rod's axis."""
 
-    name: str
+    name: Name
     mass_kg: Mass
     offset_m: Coordinate
     """Centre along the rod from the middle between the caps; positive towards the odd cap."""
@@ -53,7 +58,7 @@ class Lump(Frozen):
 class Rod(Frozen):
     """A rigid rod with two spherical end caps, numbered 2 i (offset -length/2) and 2 i + 1 (+length/2)."""
 
-    name: str
+    name: Name
     length_m: Length
     """Cap centre to cap centre."""
     radius_m: Radius
@@ -76,9 +81,9 @@ class Cable(Frozen):
     caps: tuple[Whole, Whole]
     kind: Literal["actuated", "passive"]
     stiffness_n_per_m: Stiffness
-    damping_n_s_per_m: NonNegative
-    stiffness2_n_per_m2: Number = 0.0
-    stiffness3_n_per_m3: Number = 0.0
+    damping_n_s_per_m: Damping
+    stiffness2_n_per_m2: Stiffness2 = 0.0
+    stiffness3_n_per_m3: Stiffness3 = 0.0
     """Force [N] = stiffness x + stiffness2 x^2 + stiffness3 x^3, x the stretch beyond the rest length [m]."""
     rest_length_m: Length | None = None
     """Passive cables only: an actuated cable's rest length is set by its winch."""
@@ -98,7 +103,7 @@ class Motor(Frozen):
     """The winch of one actuated cable."""
 
     cable: Index
-    no_load_rad_per_s: Positive
+    no_load_rad_per_s: Turning
     speed: Share
     """Fraction of the no-load speed at full command (the paper's motor speed)."""
     winch_radius_m: Radius
@@ -129,13 +134,13 @@ class Sensor(Frozen):
 class Pid(Frozen):
     """The low-level controller: position = (length - min_length) / range, latched `done` within the tolerance."""
 
-    p: NonNegative
-    i: NonNegative
-    d: NonNegative
+    p: Gain
+    i: Gain
+    d: Gain
     tolerance: Tolerance
     min_length_m: Length
     range_m: Length
-    rate_hz: Positive
+    rate_hz: Frequency
     step_timeout_s: Wait
 
     @model_validator(mode="after")
@@ -160,7 +165,7 @@ class Limits(Frozen):
 class Contact(Frozen):
     """Prior of the ground contact, before identification."""
 
-    friction: NonNegative
+    friction: Friction
     restitution: Fraction
 
 
@@ -177,7 +182,7 @@ class Robot(Frozen):
     """A cable-driven robot of rigid rods and cables. Any number of both."""
 
     schema_version: Literal[1]
-    name: str
+    name: Name
     title: str
     illustrative: Flag = False
     """True: a made-up robot, not one that was measured."""

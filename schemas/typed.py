@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import AfterValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 
@@ -39,6 +39,12 @@ class AtMost:
         return {**found, **below, "maximum": self.limit}
 
 
+def _named(text: str) -> str:
+    if not text.strip():
+        raise PydanticCustomError("no_name", "a name with at least one letter")
+    return text
+
+
 LENGTH_MAX_M = 20.0
 """Four times the largest robot thought of; 0.02 m, the smallest part that is a length of its own, is 20 in mm."""
 _MM = "looks like millimetres"
@@ -65,6 +71,19 @@ Stiffness = Annotated[float, Field(strict=True, gt=0), AtMost(1e9, "N/m", _MODUL
 a second of simulation takes hours."""
 TendonStiffness = Annotated[float, Field(strict=True, ge=0), AtMost(1e9, "N/m", _MODULUS)]
 """The same, 0 where there is none."""
+Stiffness2 = Annotated[float, Field(strict=True), AtMost(1e12, "N/m^2", _MODULUS)]
+"""Coefficient of the squared stretch: one that a millimetre of stretch makes of the stiffest tendon."""
+Stiffness3 = Annotated[float, Field(strict=True), AtMost(1e15, "N/m^3", _MODULUS)]
+"""Of the cube, likewise."""
+Damping = Annotated[float, Field(strict=True, ge=0), AtMost(1e6, "N s/m", "is more than any cable has")]
+Turning = Annotated[float, Field(strict=True, gt=0), AtMost(1e4, "rad/s", "looks like revolutions per minute")]
+"""Of a motor without load: dental drills reach 4e4, winches 1e3."""
+Frequency = Annotated[float, Field(strict=True, gt=0), AtMost(1e5, "Hz", "is faster than any controller")]
+Friction = Annotated[float, Field(strict=True, ge=0), AtMost(10.0, "", "looks like per cent: rubber on concrete has 1")]
+Gain = Annotated[float, Field(strict=True, ge=0), AtMost(1e4, "", "looks like counts of a motor board: the error is a share of the cable's range, full command is 1")]  # fmt: skip
+"""Of the controller: 1e4 is full command for an error of a ten-thousandth of the range."""
+Name = Annotated[str, AfterValidator(_named)]
+"""What something is called: not empty, nor blanks alone."""
 Tolerance = Annotated[float, Field(strict=True, gt=0), AtMost(1.0, "", "looks like per cent or millimetres: 0.1 is a tenth of the range")]  # fmt: skip
 """Share of a cable's range: beyond 1 every cable would be done before it has moved."""
 Duration = Annotated[float, Field(strict=True, ge=0), AtMost(3600.0, "s", "looks like milliseconds")]

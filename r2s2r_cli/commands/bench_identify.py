@@ -40,7 +40,9 @@ _WHAT = {
 
 def identify(
     robot: Annotated[str, typer.Option("--robot", help="One of the robots that `init` knows.")] = "threebar",
-    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Cases for both tools.")] = SEEDS,
+    seeds: Annotated[
+        int | None, typer.Option("--seeds", min=1, help=f"Cases for both tools; {SEEDS} by default.")
+    ] = None,
     cases: Annotated[
         int | None, typer.Option("--cases", min=1, help="So many cases for ours alone; needs no MuJoCo.")
     ] = None,
@@ -80,11 +82,15 @@ def identify(
         raise UsageError("--growing is for mujoco.sysid, which --cases leaves out",
                          where="--growing", expected="--growing without --cases", received="both",
                          hint="r2s2r bench identify --growing")  # fmt: skip
+    if seeds is not None and cases is not None:
+        raise UsageError("--cases says how many cases there are, for ours alone; --seeds the same for both tools",
+                         where="--seeds", expected="one of the two", received="both",
+                         hint=f"r2s2r bench identify --cases {cases}")  # fmt: skip
     theirs = () if cases is not None else (DEFAULTS, SCALED, *((GROWING,) if growing else ()))
     if theirs:
         _require_sysid()
     step_ms = step or (STEP_MS if theirs else OWN_STEP_MS)
-    result = _measured(robot, range(cases or seeds), theirs, hard, seconds, 1e-3 * step_ms, console)
+    result = _measured(robot, range(cases or seeds or SEEDS), theirs, hard, seconds, 1e-3 * step_ms, console)
     console.document(result)
     _print(result, console)
 

@@ -53,8 +53,11 @@ def diagnose(
     ] = None,
     effect: Annotated[
         list[str] | None,
-        typer.Option("--effect", metavar="ID", help="Consider only this effect; repeatable. "
-                     "catalogue: beside the catalogue, which is the default."),
+        typer.Option(
+            "--effect",
+            metavar="ID",
+            help="Consider only this effect; repeatable. catalogue: beside the catalogue, which is the default.",
+        ),
     ] = None,
     model: Annotated[
         Path | None, typer.Option("--model", metavar="FILE", help="Another 30-identify.h5 as the nominal simulator.")

@@ -95,8 +95,8 @@ class ContactTerms:
 class WorldTerms:
     """All rods at the start of a step, frame G. p_GB, v_GB: centre of mass [m], [m/s], (B, rod, 3);
     R_GR: (B, rod, 3, 3); w_R: angular velocity in rod axes [rad/s], (B, rod, 3); v_GB and w_R with what gravity and
-    cables add within the step, turning: w_R without. inverse_inertia: rod axes [1/(kg m^2)], (B, rod, 3, 3); inverse_mass:
-    [1/kg], (B, rod, 1)."""
+    cables add within the step, turning: w_R without. inverse_inertia: rod axes [1/(kg m^2)], (B, rod, 3, 3);
+    inverse_mass: [1/kg], (B, rod, 1)."""
 
     p_GB: Tensor
     v_GB: Tensor

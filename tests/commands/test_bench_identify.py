@@ -189,6 +189,7 @@ def test_without_sysid_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) 
     [
         (("--hard",), "--hard is for ours alone"), (("--cases", "1", "--robot", "fourbar"), "unknown robot"),
         (("--cases", "1", "--growing"), "--growing is for mujoco.sysid"),
+        (("--cases", "1", "--seeds", "2"), "--cases says how many cases there are"),
     ],
 )  # fmt: skip
 def test_wrong_requests_are_refused(arguments: tuple[str, ...], says: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import torch
@@ -53,8 +54,8 @@ def checked(
     for name, value in (("hold", hold), ("every", every)):
         if value < 1:
             raise EngineInputError(name, "not positive", expected="1 or more", received=str(value))
-    if not h > 0:
-        raise EngineInputError("h", "not positive", expected="a time above 0 s", received=f"{h}")
+    if not 0 < h < math.inf:
+        raise EngineInputError("h", "no time of a step", expected="a time above 0 s, and a finite one", received=f"{h}")
     batch = s0.shape[0] if s0.ndim else 0
     rows = u.shape[1] if u.ndim > 1 else 0
     whole = {"s0": (batch, sizes.n_state), "u": (batch, rows, sizes.n_input), "p": (batch, sizes.n_param)}

@@ -23,9 +23,9 @@ command, motor, cable, mass, contact, world, sensing (what the controller reads 
 the camera sees).
 """
 
-_FURTHER = """Looked for only where they are named: `r2s2r diagnose --effect ID`, alone or, with `--effect catalogue`, beside
-those above. The thresholds of `diagnose` are calibrated on sets without them. Everything else knows them as it does
-the others.
+_FURTHER = """Looked for only where they are named: `r2s2r diagnose --effect ID`, alone or, with `--effect catalogue`,
+beside those above. The thresholds of `diagnose` are calibrated on sets without them. Everything else knows them as it
+does the others.
 """
 
 

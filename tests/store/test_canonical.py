@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given, settings, strategies as st
 
 from r2s2r_cli.store.canonical import canonical_json, file_sha256, folder_sha256, json_sha256, source_sha256
 
@@ -25,6 +25,7 @@ def reordered(value: Any) -> Any:
     return [reordered(item) for item in value] if isinstance(value, list) else value
 
 
+@settings(max_examples=40)
 @given(VALUES)
 def test_order_of_keys_does_not_matter(value: Any) -> None:
     """Two mappings with the same items have the same canonical text."""

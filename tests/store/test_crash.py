@@ -27,7 +27,7 @@ from tests.support.soak import drawn
 from tests.support.versions import current, write_toy
 
 Check = Callable[[Path, dict], None]
-MANY, FEW = drawn(50, 200), 12
+MANY = drawn(50, 200)
 ROWS = 300
 
 
@@ -139,16 +139,10 @@ def kill_at_random(nursery: Nursery, tmp_path: Path, job: str, count: int) -> No
     assert killed > count / 3, "the job was done before most kills: they proved nothing"
 
 
-@pytest.mark.parametrize("job", CHECKS)
-def test_killed_at_random_moments(nursery: Nursery, tmp_path: Path, job: str) -> None:
-    """A dozen kills each of writing, recording and sealing."""
-    kill_at_random(nursery, tmp_path, job, FEW)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("job", CHECKS)
-def test_killed_at_many_random_moments(nursery: Nursery, tmp_path: Path, job: str) -> None:
-    """The same with 50 kills each, in a soak test 200."""
+def test_killed_at_random_moments(nursery: Nursery, tmp_path: Path, job: str) -> None:
+    """Fifty kills each of writing, recording and sealing, in a soak test 200."""
     kill_at_random(nursery, tmp_path, job, MANY)
 
 

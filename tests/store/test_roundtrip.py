@@ -25,7 +25,7 @@ def test_every_kind_comes_back(tmp_path: Path, kind: str) -> None:
     assert found == header and same(_text_as_bytes(data), back)
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     kind=st.sampled_from(sorted(KINDS)),
     sizes=st.dictionaries(st.text("abcdef", min_size=1, max_size=2), st.integers(0, 7)),
@@ -65,7 +65,7 @@ def test_blocks_and_whole_arrays_are_the_same_artifact(tmp_path: Path) -> None:
 
 
 @given(st.lists(st.binary(max_size=300), max_size=12))
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_images_of_any_length_come_back_one_by_one(tmp_path: Path, images: list[bytes]) -> None:
     """Encoded frames, empty ones among them, keep their order and their bytes."""
     count = len(images)

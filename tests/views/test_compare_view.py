@@ -190,9 +190,9 @@ def test_frames_are_drawn_of_every_run() -> None:
     assert picked(25)[0] == 0 and picked(25)[-1] == 24 and len(picked(25)) == COLUMNS
 
 
-@pytest.mark.parametrize("name", [r"cost $\\frac$ b", "$x$", "a$"])
-def test_a_name_is_no_formula(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_name_is_no_formula(monkeypatch: pytest.MonkeyPatch) -> None:
     """Between two `$` matplotlib would read one; what it cannot read would lose the whole comparison."""
+    name = r"cost $\\frac$ b $x$ a$"
     read: list[str] = []
     monkeypatch.setattr("matplotlib.mathtext.MathTextParser.parse", lambda parser, text, *more: read.append(text))
     plain, said = builders.comparison(), report()

@@ -122,7 +122,7 @@ def test_what_may_show_the_time_before_the_run_is_not_of_it() -> None:
 
     link.read = after_the_pictures  # type: ignore[method-assign]
     plan = plans([random_policy(robot, 20, 0)], repeats=1, rest=0.0)
-    Session(plan, robot, link, RecordSettings(), feed=feed).record(rows)
+    Session(plan, robot, link, RecordSettings(camera_gone_s=60.0), feed=feed).record(rows)
     stamps = rows.column("runs/random-0/camera", "t")
     assert np.allclose(stamps, [0.02 * i for i in range(12) if 0.02 * i >= LATE_S - 1e-9]) and len(stamps) > 5
 

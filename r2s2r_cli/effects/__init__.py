@@ -16,6 +16,7 @@ from r2s2r_cli.effects.cap_radius import CapRadius
 from r2s2r_cli.effects.com_offset import ComOffset
 from r2s2r_cli.effects.command_latency import CommandLatency
 from r2s2r_cli.effects.dropout import Dropout
+from r2s2r_cli.effects.friction_anisotropy import FrictionAnisotropy
 from r2s2r_cli.effects.friction_field import FrictionField
 from r2s2r_cli.effects.ground_slope import GroundSlope
 from r2s2r_cli.effects.known import known_effects as known_effects, looked_for as looked_for
@@ -29,10 +30,12 @@ from r2s2r_cli.effects.sensor_bias import SensorBias
 from r2s2r_cli.effects.sensor_gain import SensorGain
 from r2s2r_cli.effects.soft_ground import SoftGround
 from r2s2r_cli.effects.spool_buildup import SpoolBuildup
+from r2s2r_cli.effects.stribeck import Stribeck
 from r2s2r_cli.effects.tendon_relaxation import TendonRelaxation
 from r2s2r_cli.effects.tendon_set import TendonSet
 from r2s2r_cli.effects.tendon_stiffness import TendonStiffness
 from r2s2r_cli.effects.tether_drag import TetherDrag
+from r2s2r_cli.effects.viscous_contact import ViscousContact
 
 CATALOGUE: tuple[Effect, ...] = (
     MotorDeadZone(),
@@ -64,5 +67,10 @@ CATALOGUE: tuple[Effect, ...] = (
 )
 """What `diagnose` looks for, in the order of the way of the data: its calibration rests on these."""
 
-FURTHER: tuple[Effect, ...] = (AirDrag(),)
+FURTHER: tuple[Effect, ...] = (
+    FrictionAnisotropy(),
+    Stribeck(),
+    ViscousContact(),
+    AirDrag(),
+)
 """Looked for only where they are named, in the same order: no calibration set has them."""

@@ -142,6 +142,9 @@ def _machine_code_off(plain: Variant, *effects: Effect) -> None:
 def test_every_number_has_its_true_derivative(whole: Variant) -> None:
     """Three steps with all effects on: the derivative by every number of every effect is that of central differences,
     and none is 0. A number that did nothing would be a dead hook."""
+    # These caps slide too fast for a usual Stribeck speed to tell.
+    slow = {"stribeck.speed_m_per_s": torch.full((1, 1), 0.19, dtype=torch.float64)}
+    whole = replace(whole, theta=whole.theta.with_values(slow))
     names = [name for name in whole.theta.extra if not name.startswith(OUTSIDE)]
     moving = falling(whole, 4)
     # The play is taken up within these steps.

@@ -14,9 +14,24 @@ from r2s2r_cli.effects import with_off_values
 from r2s2r_cli.effects.friction_anisotropy import CREEP, FrictionAnisotropy
 from r2s2r_cli.engine import Parameters, Structure, energy
 from r2s2r_cli.engine.hooks import ContactTerms
-from tests.support.engine import RADIUS, G, after, free_rods, lying, parameters, pointing, simulate, slope, state, vector
+from tests.support.engine import (
+    RADIUS,
+    G,
+    after,
+    free_rods,
+    lying,
+    parameters,
+    pointing,
+    simulate,
+    slope,
+    state,
+    vector,
+)
 
 H, FRICTION = 1e-3, 0.4
+ROUNDING = 1e-6
+"""[J] that a step may add to a rod which rolls without slip, by the order of the scheme, with no effect at all; a slip
+loses a hundred times that."""
 
 
 def rod(ratio: float, angle: float) -> tuple[Structure, Parameters]:
@@ -108,7 +123,7 @@ def test_sliding_only_loses_energy() -> None:
     start = replace(lying(structure, batch=30, v=v), w_R=vector(2.0, 0.0, 0.0).expand(30, 1, 3))
     run = simulate(structure, theta, start, 150, H)
     kept = torch.stack([energy(structure, theta, run.at(k)) for k in range(151)])
-    assert float(torch.diff(kept, dim=0).max()) < 1e-9
+    assert float(torch.diff(kept, dim=0).max()) < ROUNDING
     assert float((kept[-1] / kept[0]).max()) < 0.99
 
 

@@ -13,9 +13,24 @@ from r2s2r_cli.effects import with_off_values
 from r2s2r_cli.effects.viscous_contact import SLOW, ViscousContact
 from r2s2r_cli.engine import Parameters, Structure, energy
 from r2s2r_cli.engine.hooks import ContactTerms
-from tests.support.engine import RADIUS, G, after, free_rods, lying, parameters, pointing, simulate, slope, state, vector
+from tests.support.engine import (
+    RADIUS,
+    G,
+    after,
+    free_rods,
+    lying,
+    parameters,
+    pointing,
+    simulate,
+    slope,
+    state,
+    vector,
+)
 
 H, FRICTION = 1e-3, 0.2
+ROUNDING = 1e-6
+"""[J] that a step may add to a rod which rolls without slip, by the order of the scheme, with no effect at all; a slip
+loses a hundred times that."""
 
 
 def rod(drag: float) -> tuple[Structure, Parameters]:
@@ -34,7 +49,7 @@ def coefficients(v: Tensor, drag: Tensor) -> Tensor:
 
 def test_the_curve() -> None:
     """The plain coefficient at rest, exactly, and drag times speed more in a slip; vertical speed does not count."""
-    v = torch.tensor([[0, 0, 0], [0, 0, -3], [0.6, 0.8, 0], [-0.06, 0.08, 5]]).double()
+    v = torch.tensor([[0, 0, 0], [0, 0, -3], [0.6, 0.8, 0], [-0.06, 0.08, 5]], dtype=torch.float64)
     found = coefficients(v, vector(1.5))
     assert found[:2].tolist() == [FRICTION, FRICTION]
     assert found[2:].numpy() == pytest.approx([FRICTION + 1.5, FRICTION + 0.15], rel=1e-4)
@@ -72,10 +87,10 @@ def test_on_a_slope_it_nears_the_speed_of_a_viscous_descent() -> None:
     theta = replace(theta, gravity=slope(angle)[None])
     end = (math.tan(angle) - FRICTION) / drag
     v = torch.stack([vector(0.0, 0.0, 0.0), vector(0.5, 0.0, 0.0)])[:, None]
-    speed = simulate(structure, theta, lying(structure, batch=2, v=v), 600, H).states.v_WB[:, :, 0, 0]
-    assert speed[:, -1].numpy() == pytest.approx([end, end], rel=1e-3)
-    assert float(speed[0].max()) <= end * (1 + 1e-6)
-    assert float(speed[1].min()) >= end * (1 - 1e-6)
+    speed = simulate(structure, theta, lying(structure, batch=2, v=v), 900, H).states.v_WB[:, :, 0, 0]
+    assert speed[:, -1].numpy() == pytest.approx([end, end], rel=1e-4)
+    assert float(speed[0].max()) <= end * (1 + 1e-4)
+    assert float(speed[1].min()) >= end * (1 - 1e-4)
 
 
 def test_what_is_held_does_not_creep() -> None:
@@ -115,7 +130,7 @@ def test_sliding_only_loses_energy() -> None:
     start = replace(lying(structure, batch=30, v=v), w_R=vector(2.0, 0.0, 0.0).expand(30, 1, 3))
     run = simulate(structure, theta, start, 60, H)
     kept = torch.stack([energy(structure, theta, run.at(k)) for k in range(61)])
-    assert float(torch.diff(kept, dim=0).max()) < 1e-9
+    assert float(torch.diff(kept, dim=0).max()) < ROUNDING
     off = energy(structure, theta, after(structure, rod(0.0)[1], start, 60, H))
     assert float((kept[-1] / off).max()) < 1.0
 

@@ -29,7 +29,7 @@ class ViscousContact(Effect):
     channel = Channel.CONTACT
     title = "viscous drag of the contact"
     own = (
-        EffectParameter("drag_s_per_m", "s/m", 0.0, 10.0, off=0.0, scale=1.0, what="friction coefficient per speed"),
+        EffectParameter("drag_s_per_m", "s/m", 0.0, 10.0, off=0.0, scale=2.0, what="friction coefficient per speed"),
     )
     look_alikes = ("air_drag", "stribeck")
 

@@ -109,7 +109,7 @@ def test_every_direction_alike() -> None:
 
 
 def test_sliding_only_loses_energy() -> None:
-    """Lying rods thrown and turned every way lose energy in every step, and stand sooner than without."""
+    """Lying rods thrown and turned every way lose energy in every step, and on the whole more of it than without."""
     structure, theta = rod(1.6, 0.2)
     v = torch.randn(30, 1, 3, generator=torch.Generator().manual_seed(4), dtype=torch.float64) * vector(0.3, 0.3, 0.0)
     start = replace(lying(structure, batch=30, v=v), w_R=vector(2.0, 0.0, 0.0).expand(30, 1, 3))
@@ -117,4 +117,4 @@ def test_sliding_only_loses_energy() -> None:
     kept = torch.stack([energy(structure, theta, run.at(k)) for k in range(41)])
     assert float(torch.diff(kept, dim=0).max()) < ROUNDING
     off = energy(structure, theta, after(structure, rod(1.0, 0.2)[1], start, 40, H))
-    assert float((kept[-1] / off).max()) < 1.0
+    assert float(kept[-1].sum() / off.sum()) < 0.998

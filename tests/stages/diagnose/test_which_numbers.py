@@ -77,6 +77,18 @@ def test_a_share_of_a_size_stays_where_it_is(model: Model) -> None:
     assert patch.shape.sum() == 3
 
 
+def test_a_grain_is_tried_along_and_across_both_axes_and_diagonals() -> None:
+    """An angle or a speed alone changes nothing: it is tried with every size, and a share of a size keeps it."""
+    made = candidates(Model(nominal(robot()), ("friction_anisotropy", "stribeck"), ("friction_anisotropy", "stribeck")))
+    grain, curve = (next(one for one in made if one.effect == name) for name in ("friction_anisotropy", "stribeck"))
+    assert grain.shape.tolist() == curve.shape.tolist() == [False, True]
+    for angle in (0.0, np.pi / 4, -np.pi / 4):
+        found = grain.tries[np.isclose(grain.tries[:, 1], angle), 0]
+        assert np.any(found > 1) and np.any(found < 1)
+    assert np.all(curve.tries[:, 0] > 1) and len(set(curve.tries[:, 1])) > 1
+    assert grain.share(grain.tries[-1], 0.5)[1] == grain.tries[-1, 1]
+
+
 def test_what_is_a_nuisance_too_is_tried_from_where_the_refit_has_it(model: Model) -> None:
     """The camera of another engine is 20 ms early: tries lie about that, and what parity measured is added to it."""
     values = model.values0.copy()

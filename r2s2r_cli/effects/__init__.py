@@ -1,6 +1,7 @@
 """The catalogue of effects: physical laws that the nominal simulator lacks, one a file, in the design's order."""
 
 from r2s2r_cli.effects.air_drag import AirDrag
+from r2s2r_cli.effects.attachment_offset import AttachmentOffset
 from r2s2r_cli.effects.backlash import Backlash
 from r2s2r_cli.effects.base import (
     Effect as Effect,
@@ -13,6 +14,7 @@ from r2s2r_cli.effects.camera_pose import CameraPose
 from r2s2r_cli.effects.camera_scale import CameraScale
 from r2s2r_cli.effects.cap_friction import CapFriction
 from r2s2r_cli.effects.cap_radius import CapRadius
+from r2s2r_cli.effects.capstan_friction import CapstanFriction
 from r2s2r_cli.effects.com_offset import ComOffset
 from r2s2r_cli.effects.command_latency import CommandLatency
 from r2s2r_cli.effects.dropout import Dropout
@@ -31,6 +33,7 @@ from r2s2r_cli.effects.sensor_gain import SensorGain
 from r2s2r_cli.effects.soft_ground import SoftGround
 from r2s2r_cli.effects.spool_buildup import SpoolBuildup
 from r2s2r_cli.effects.stribeck import Stribeck
+from r2s2r_cli.effects.tendon_hysteresis import TendonHysteresis
 from r2s2r_cli.effects.tendon_relaxation import TendonRelaxation
 from r2s2r_cli.effects.tendon_set import TendonSet
 from r2s2r_cli.effects.tendon_stiffness import TendonStiffness
@@ -68,6 +71,9 @@ CATALOGUE: tuple[Effect, ...] = (
 """What `diagnose` looks for, in the order of the way of the data: its calibration rests on these."""
 
 FURTHER: tuple[Effect, ...] = (
+    TendonHysteresis(),
+    CapstanFriction(),
+    AttachmentOffset(),
     FrictionAnisotropy(),
     Stribeck(),
     ViscousContact(),

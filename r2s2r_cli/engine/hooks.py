@@ -8,11 +8,13 @@ its off value must return bitwise what it received.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from torch import Tensor
+
+from r2s2r_cli.engine.state import cable_ends
 
 if TYPE_CHECKING:
     from r2s2r_cli.engine.parameters import Parameters
@@ -117,6 +119,9 @@ def effective(structure: Structure, theta: Parameters) -> Parameters:
     forces or energy off a state; the step itself does the same and must be handed the parameters before."""
     for effect in overrides(structure, "parameters"):
         theta = effect.parameters(theta.of(effect.name), theta)
+    for effect in overrides(structure, "tied"):
+        points = effect.tied(theta.of(effect.name), theta, cable_ends(structure, theta.p_BS.device))
+        theta = replace(theta, p_BS=points)
     return theta
 
 
@@ -148,6 +153,12 @@ class Hooks:
         """Every channel: change the numbers of the nominal laws. Machine code computes it once a rollout."""
         del x
         return theta
+
+    def tied(self, x: Values, theta: Parameters, rods: Tensor) -> Tensor:
+        """Channel cable: attachment points of both ends of each cable [m], frames B, (B, cable, 2, 3). rods: of these
+        ends, (cable, 2), for indexing. Machine code computes it once a rollout."""
+        del x, rods
+        return theta.p_BS
 
     def mass(self, x: Values, terms: MassTerms) -> MassTerms:
         """Channel mass: mass, inertia and centre of mass of every rod. States stay those of the origin of frame B, so

@@ -9,6 +9,7 @@ import roma
 import torch
 from torch import Tensor
 
+from r2s2r_cli.engine.batch import common_batch, tensors_of
 from r2s2r_cli.engine.body import angular_change, bodies, gyroscopic
 from r2s2r_cli.engine.cable import cable_rows, pulled, rest_lengths, spring_force, tension_impulse
 from r2s2r_cli.engine.centred import centred, weighed
@@ -108,6 +109,9 @@ def longest_step(structure: Structure, theta: Parameters, state: State) -> float
     if structure.n_cables == 0:
         return float("inf")
     with torch.no_grad():
+        batch = common_batch(tensors_of(theta))
+        if len(state.p_WB) < batch:  # one start for a batch of robots
+            state = state.select(torch.zeros(batch, dtype=torch.long, device=state.p_WB.device))
         theta, state, _ = centred(structure, effective(structure, theta), state)
         rods = bodies(theta, state, axial=structure.axial)
         rows = cable_rows(structure, theta, rods)

@@ -195,7 +195,7 @@ def test_every_number_moves_the_robot(nominal: Variant) -> None:
     aided = {
         "payload.mass_kg": 0.05, "payload.place_m": 0.1, "friction_field.patch_factor": 0.4,
         "tendon_relaxation.share": 0.3, "soft_ground.compliance_m_per_n": 1e-3, "tether_drag.force_n": 0.2,
-        "friction_anisotropy.ratio": 1.3, "stribeck.static_factor": 1.2,
+        "friction_anisotropy.ratio": 1.3, "stribeck.static_factor": 1.2, "tendon_hysteresis.force_n": 1.0,
     }  # fmt: skip
     found = {}
     for effect in ALL:

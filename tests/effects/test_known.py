@@ -67,7 +67,7 @@ def test_the_guides_example_is_an_effect_like_any_other(install: Install) -> Non
     assert fitted.names == ("side_wind.force_n",)
     assert [one.name for one in fitted.structure.effects] == ["side_wind"]
     assert "side_wind" in {one.name for one in Model(nominal(threebar())).effects}
-    assert "- *Source*: statics." in page([effect])
+    assert "- *Source*: statics." in page([effect], ())
     structure = free_rods(2, rod_contact=False).with_effects(effect)
     start = state(structure, torch.stack([vector(0.0, 0.0, 1.0), vector(0.0, 1.0, 1.0)]))
     bare = parameters(free_rods(2, rod_contact=False))

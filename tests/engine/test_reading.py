@@ -34,6 +34,7 @@ from tests.support.engine import (
     parameters,
     roll,
     state,
+    threebar_engine,
     vector,
 )
 from tests.support.robots import frames, rested, subject
@@ -184,6 +185,22 @@ def test_longest_step_reads_the_slope_of_a_cubic_cable() -> None:
     structure, x = replace(structure, tendons=True), LENGTH - REST
     k = K + 3 * 9000 * x**2 + 40
     assert longest_step(structure, theta, start) == pytest.approx(1.1 * math.sqrt(MASS / (2 * k)), rel=1e-6)
+
+
+@pytest.mark.parametrize("field", ["stiffness", "rest", "mass", "inertia", "p_BS"])
+def test_longest_step_of_many_robots_from_one_start(field: str) -> None:
+    """A batch of robots that differ in one field and share a start: the shortest step of any of them."""
+    structure, theta, start = threebar_engine()
+    # Cubic cables, so that rest lengths count as well.
+    structure, theta = replace(structure, cubic=True), replace(theta, stiffness3=torch.full_like(theta.stiffness, 1e5))
+    start = replace(start, rest=start.rest - 0.01)
+    factors = torch.tensor([1.0, 1.3, 0.8], dtype=torch.float64)
+    number = getattr(theta, field)
+    robots = [replace(theta, **{field: number * factor}) for factor in factors]
+    many = replace(theta, **{field: torch.cat([getattr(one, field) for one in robots])})
+    alone = [longest_step(structure, one, start) for one in robots]
+    assert longest_step(structure, many, start) == pytest.approx(min(alone), rel=1e-9)
+    assert min(alone) < max(alone)
 
 
 def test_without_cables_any_step_will_do() -> None:

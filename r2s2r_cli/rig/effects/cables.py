@@ -158,7 +158,7 @@ class TendonHysteresis(EffectSection):
     """Change of length over which it turns round [m]."""
 
     def law(self, scene: Scene) -> Law:
-        """Dahl's friction."""
+        """Dahl's friction, where the catalogue has Bouc and Wen's."""
         return _Dahl(self, scene)
 
 
@@ -186,7 +186,8 @@ class CapstanFriction(EffectSection):
     """Motion of the cable over which the friction turns round [m]."""
 
     def law(self, scene: Scene) -> Law:
-        """Euler and Eytelwein's law with a Dahl transition between both directions, where the catalogue has a sign."""
+        """Euler and Eytelwein's law by what the winch moves, where the catalogue goes by the cable's length; Dahl's
+        transition between both directions, where the catalogue has Bouc and Wen's."""
         return _Rub(self, scene)
 
 

@@ -91,7 +91,7 @@ class AttachmentOffset(EffectSection):
     """The ends that are tied elsewhere."""
 
     def law(self, scene: Scene) -> Law:
-        """Sites of the MuJoCo model moved."""
+        """Sites of the MuJoCo model moved, each by itself, where the catalogue moves all that is tied to a cap."""
         for one in self.moved:
             cap = scene.robot.cables[one.cable].caps[one.end]
             site = scene.sim.model.site(f"cable{one.cable}_cap{cap}").id

@@ -1,7 +1,7 @@
 """The base of every effect of the catalogue: what it is called, where it acts, which numbers it has.
 
 An effect is a physical law that the nominal simulator lacks, and the identity at its off value. To add one, copy the
-shortest file beside this one, fill in the headings of its docstring and add the class to `CATALOGUE`.
+shortest file beside this one, fill in the headings of its docstring and add the class to `FURTHER`.
 """
 
 from __future__ import annotations

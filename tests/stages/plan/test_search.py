@@ -76,6 +76,7 @@ def test_like_poses_are_told_their_future() -> None:
     assert alike(group, np.array(shapes), p, np.zeros((6, 6)), 1e-6).leader.tolist() == [0, 0, 0, 3, 0, 0]
 
 
+@pytest.mark.slow
 def test_every_gait_of_the_search_is_what_the_simulator_says() -> None:
     """Gaits that were only told, simulated: the same displacement to the size of the classes, the same triangle; with
     classes fewer targets are simulated."""

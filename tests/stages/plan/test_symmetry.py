@@ -216,7 +216,7 @@ def renamed(s: State, g: Symmetry) -> State:
     return State(s.p_WB[:, rods], q[:, rods], s.v_WB[:, rods], w_R[:, rods], s.rest[:, winches], s.winding[:, winches])
 
 
-@pytest.mark.parametrize("k", [1, 2, 5])
+@pytest.mark.parametrize("k", [pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow), 5])
 def test_the_engine_knows_the_symmetries(k: int) -> None:
     """simulate(relabel(policy, g)) from g(pose) = g(simulate(policy)): turns and half-turns of the prism, the robot's
     controller included, to the accuracy of the contact solver; what moves, moves by centimetres."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from importlib import import_module
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -33,14 +32,13 @@ class Made(NamedTuple):
     data: ArtifactData
     report: SimulateReport
     seen: dict[str, list[int]]
-    cache: Path
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
-    """One compilation and two runs for all tests here."""
-    cache, robot, settings = tmp_path_factory.mktemp("cache"), builders.robot(), SimulateSettings()
-    first, _ = simulate(robot, [Request(POLICY)], settings, cache_dir=cache)
+def made() -> Made:
+    """Two runs for all tests here."""
+    robot, settings = builders.robot(), SimulateSettings()
+    first, _ = simulate(robot, [Request(POLICY)], settings)
     commands = first.groups["runs/bend/commands"]
     t = commands["t"]
     replay = Replay("bend", t, commands["target"], commands["control"], 0.0, float(t[-1]) + 0.02, 0)
@@ -49,8 +47,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
     def progress(name: str, done: int) -> None:
         seen.setdefault(name, []).append(done)
 
-    data, report = simulate(robot, [Request(POLICY), Request(replay)], settings, cache_dir=cache, progress=progress)
-    return Made(data, report, seen, cache)
+    data, report = simulate(robot, [Request(POLICY), Request(replay)], settings, progress=progress)
+    return Made(data, report, seen)
 
 
 def test_the_controller_brings_every_cable_to_its_target(made: Made) -> None:
@@ -140,7 +138,7 @@ def test_the_report_recomputes(made: Made) -> None:
 def test_fewer_frames_and_a_tail(made: Made) -> None:
     """At 10 Hz every fifth tick is stored, and the last; after the last target the motors rest for the tail."""
     settings = SimulateSettings(frame_rate_hz=10.0, tail_s=0.3)
-    data, report = simulate(builders.robot(), [Request(POLICY)], settings, cache_dir=made.cache)
+    data, report = simulate(builders.robot(), [Request(POLICY)], settings)
     t, whole = data.groups["runs/bend/frames"]["t"], made.data.groups["runs/bend/frames"]
     assert np.diff(t)[:-1] == pytest.approx(0.1)
     assert report.runs[0].duration_s == pytest.approx(made.report.runs[0].duration_s + 0.3, abs=0.021)
@@ -153,7 +151,7 @@ def test_a_start_is_brought_to_rest_where_it_was(made: Made) -> None:
     rest = np.array(builders.robot().rest_caps_m)
     c, s = np.cos(0.7), np.sin(0.7)
     moved = rest @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) + [1.0, -2.0, 0.0]
-    driver = Driver(builders.robot(), SimulateSettings(), made.cache)
+    driver = Driver(builders.robot(), SimulateSettings(), None)
     _, shift = driver.settled(Start("there", moved))
     assert shift == pytest.approx(made.report.runs[0].start_shift_m, abs=1e-3)
 

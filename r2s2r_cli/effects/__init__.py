@@ -26,10 +26,12 @@ from r2s2r_cli.effects.load_droop import LoadDroop
 from r2s2r_cli.effects.motor_dead_zone import MotorDeadZone
 from r2s2r_cli.effects.motor_lag import MotorLag
 from r2s2r_cli.effects.motor_speed_mismatch import MotorSpeedMismatch
+from r2s2r_cli.effects.obstacle import Obstacle
 from r2s2r_cli.effects.payload import Payload
 from r2s2r_cli.effects.rolling_resistance import RollingResistance
 from r2s2r_cli.effects.sensor_bias import SensorBias
 from r2s2r_cli.effects.sensor_gain import SensorGain
+from r2s2r_cli.effects.sensor_saturation import SensorSaturation
 from r2s2r_cli.effects.soft_ground import SoftGround
 from r2s2r_cli.effects.spool_buildup import SpoolBuildup
 from r2s2r_cli.effects.stribeck import Stribeck
@@ -77,6 +79,8 @@ FURTHER: tuple[Effect, ...] = (
     FrictionAnisotropy(),
     Stribeck(),
     ViscousContact(),
+    Obstacle(),
     AirDrag(),
+    SensorSaturation(),
 )
 """Looked for only where they are named, in the same order: no calibration set has them."""

@@ -60,17 +60,14 @@ def contact_rows(
     free = row_velocity(arm, v, w)
     friction = theta.friction.expand(gap.shape)
     if structure.effects:
-        p_GC = rods.p[:, :, None] + (rods.R_GR[:, :, None] * theta.p_BE[..., None, :]).sum(-1)
-        p_GC = p_GC * p_GC.new_tensor([1.0, 1.0, 0.0])
-        terms = ContactTerms(p_GC, before.unflatten(-1, (2, 3)), gap)
+        terms = ContactTerms(ground_points(theta, rods), before.unflatten(-1, (2, 3)), gap)
         for effect in structure.effects:
             friction = effect.contact(theta.of(effect.name), terms, friction)
     v0, v1 = before[..., 2::3], free[..., 2::3]
     surface = None
     for effect in overrides(structure, "surface"):
-        zero = torch.zeros_like(gap)
         own = (memory or {})[effect.name]
-        surface = effect.surface(theta.of(effect.name), own, surface or GroundTerms(zero, zero, zero, zero), h)
+        surface = effect.surface(theta.of(effect.name), own, surface or _plane(theta, rods, gap, mobility), h)
     if surface is not None:
         gap, v0, v1 = gap + surface.sunk, v0 - surface.rising, v1 - surface.rising
     # Predicted, not gap < 0: a cap at rest 1e-12 above the ground must stay active.
@@ -84,6 +81,23 @@ def contact_rows(
     target, give, creep = target + surface.rising, surface.give.expand_as(gap), surface.creep.expand_as(gap)
     softer = torch.diag_embed(torch.stack([creep, creep, give], dim=-1).flatten(-2))
     return GroundRows(gap, arm, mobility + softer, free, target, active, toi, friction, between, give)
+
+
+def ground_points(theta: Parameters, rods: Bodies) -> Tensor:
+    """Ground points below the cap centres [m], frame G, (B, rod, 2, 3)."""
+    p_GC = rods.p[:, :, None] + (rods.R_GR[:, :, None] * theta.p_BE[..., None, :]).sum(-1)
+    return p_GC * p_GC.new_tensor([1.0, 1.0, 0.0])
+
+
+def _plane(theta: Parameters, rods: Bodies, gap: Tensor, mobility: Tensor) -> GroundTerms:
+    """A hard plane."""
+    zero = torch.zeros_like(gap)
+    turning = torch.linalg.cross(rods.w[:, :, None].expand(*gap.shape, 3), theta.p_BE.expand(*gap.shape, 3))
+    # Of the centre, not of the lowest point: a cap that rolls moves over the ground as well.
+    v_GC = rods.v[:, :, None] + (rods.R_GR[:, :, None] * turning[..., None, :]).sum(-1)
+    along = torch.diagonal(mobility, dim1=-2, dim2=-1).unflatten(-1, (2, 3))
+    v_GC = v_GC * v_GC.new_tensor([1.0, 1.0, 0.0])
+    return GroundTerms(zero, zero, zero, zero, p_GC=ground_points(theta, rods), v_GC=v_GC, mobility=along)
 
 
 def _rebound(theta: Parameters, v0: Tensor, gain: Tensor, toi: Tensor) -> Tensor:

@@ -75,12 +75,17 @@ class MassTerms:
 class GroundTerms:
     """The surface below each cap, (B, rod, 2). sunk: how far it lies below the plane [m]; rising: its speed upwards if
     nothing loads it [m/s]; give: how much slower per normal impulse [1/kg]; creep: the same sideways, of a cap that
-    friction holds."""
+    friction holds. Given: p_GC, v_GC: ground point below each cap centre and its velocity, as the cap moves over the
+    ground [m], [m/s], frame G, (B, rod, 2, 3); mobility: of the cap's lowest point, along each axis of G by an impulse
+    along it [1/kg], same shape."""
 
     sunk: Tensor
     rising: Tensor
     give: Tensor
     creep: Tensor
+    p_GC: Tensor
+    v_GC: Tensor
+    mobility: Tensor
 
 
 @dataclass(frozen=True)
@@ -202,6 +207,12 @@ class Hooks:
         """Channel contact: a ground that gives way."""
         del x, z, h
         return terms
+
+    def push(self, x: Values, z: Values, p_GC: Tensor, force: Tensor) -> Tensor:
+        """Channel contact: level force of a ground that is not level on each cap centre [N], frame G, (B, rod, 2, 3);
+        p_GC: ground point below it [m], same shape."""
+        del x, z, p_GC
+        return force
 
     def resist(self, x: Values, z: Values, terms: WorldTerms, torque: Tensor, h: Tensor) -> Tensor:
         """Channel contact: torque of the ground on each rod [N m], rod axes, (B, rod, 3)."""

@@ -14,7 +14,7 @@ from torch import Tensor
 from r2s2r_cli.engine.body import Bodies, angular_change, bodies, gyroscopic, moved
 from r2s2r_cli.engine.cable import cable_rows, pulled, rest_lengths, spring_force, tension_impulse
 from r2s2r_cli.engine.centred import centred, returned
-from r2s2r_cli.engine.contact import contact_rows, pose_velocity
+from r2s2r_cli.engine.contact import contact_rows, ground_points, pose_velocity
 from r2s2r_cli.engine.friction_solve import solve
 from r2s2r_cli.engine.hooks import MotorTerms, Values, WorldTerms, effective, overrides
 from r2s2r_cli.engine.parameters import Parameters
@@ -84,5 +84,11 @@ def _pushed_by_the_world(
     for effect in structure.effects:
         force, torque = effect.world(theta.of(effect.name), terms, force, torque)
         torque = effect.resist(theta.of(effect.name), memory[effect.name], terms, torque, h)
+    for effect in overrides(structure, "push"):
+        zero = torch.zeros_like(rods.p)[:, :, None].expand(-1, -1, 2, -1)
+        sideways = effect.push(theta.of(effect.name), memory[effect.name], ground_points(theta, rods), zero)
+        own = (rods.R_GR.mT[:, :, None] * sideways[..., None, :]).sum(-1)
+        force = force + sideways.sum(-2)
+        torque = torque + torch.linalg.cross(theta.p_BE.expand_as(own), own).sum(-2)
     dv = h[..., None] * rods.inverse_mass * force
     return v + dv, w + angular_change(rods.inverse_inertia, h[..., None] * torque)

@@ -67,6 +67,23 @@ def test_a_patch_is_tried_where_caps_stood(model: Model) -> None:
     assert centres == {(0.1, 0.2), (-0.3, 0.4)}
 
 
+def test_what_is_looked_for_where_it_is_named_is_a_hypothesis_there_only(model: Model) -> None:
+    """Beside the whole catalogue, and with lines of a ridge through the places that were touched, three directions
+    each, at its own height; ends of a sensor's range are two laws, tried with their shares."""
+    assert "obstacle" not in {one.effect for one in candidates(model)}
+    asked = Model(nominal(robot()), asked=("obstacle", "sensor_saturation"))
+    touched = np.array([[0.1, 0.2], [-0.3, 0.4]])
+    made = candidates(asked, None, touched)
+    assert {one.effect for one in made} - {one.effect for one in candidates(model)} == {"obstacle", "sensor_saturation"}
+    ridge = next(one for one in made if one.effect == "obstacle")
+    height, distance, angle, _ = ridge.tries.T
+    away = touched[:, 0] * np.cos(angle[:, None]) + touched[:, 1] * np.sin(angle[:, None]) - distance[:, None]
+    assert len(ridge.tries) == 6 and np.all(height == 0.004) and np.all(np.abs(away).min(axis=1) < 1e-12)
+    assert ridge.shape.tolist() == [False, True, True, True]
+    ends = {tuple(name.split(".")[1] for name in one.names) for one in made if one.effect == "sensor_saturation"}
+    assert ends == {("top_share", "top_m"), ("bottom_share", "bottom_m")}
+
+
 def test_a_share_of_a_size_stays_where_it_is(model: Model) -> None:
     """Half a patch has half the factor's distance from off, in the same place and as wide."""
     patch = next(one for one in candidates(model) if any("patch_x_m" in name for name in one.names))

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 import torch
 
-from r2s2r_cli.effects import CATALOGUE, with_off_values
+from r2s2r_cli.effects import with_off_values
+from r2s2r_cli.effects.known import known_effects
 from r2s2r_cli.engine import Simulator, observe
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.identify.data import RunData, Selection
@@ -48,6 +49,12 @@ def test_an_effect_frees_its_numbers() -> None:
     assert [free.name for free in frees if free.name.startswith("cap")] == [
         f"cap_friction.factor.{k}" for k in range(6)
     ]
+    # Those that are looked for only where they are named as well.
+    further = effects_asked(["air_drag", "obstacle"], threebar())
+    assert further.specs == (
+        "air_drag.drag_n_s_per_m", "obstacle.height_m", "obstacle.ridge_distance_m", "obstacle.ridge_angle_rad",
+        "obstacle.ridge_width_m",
+    )  # fmt: skip
     assert effects_asked(["none"], threebar()) == effects_asked([], threebar())
 
 
@@ -127,13 +134,14 @@ def test_the_next_iteration_keeps_the_effect_and_starts_from_it() -> None:
 PLANTED = {
     "command_latency.tau_s": 0.08, "tendon_set.shift_m.6": 0.006,
     "com_offset.axial_m.1": 0.012, "soft_ground.compliance_m_per_n": 1.5e-3, "camera_scale.factor": 1.02,
+    "air_drag.drag_n_s_per_m": 1.5,
 }  # fmt: skip
 
 
 def planted(name: str, size: float) -> RunData:
     """The walk of 3.5 s of a robot with one effect, its commands as sent and its caps as seen, with 1 mm of noise."""
     run = walk(5, seconds=0.7)
-    effect = next(one for one in CATALOGUE if one.name == name.split(".")[0])
+    effect = next(one for one in known_effects() if one.name == name.split(".")[0])
     structure = structure_of(threebar()).with_effects(effect)
     theta = with_off_values(structure, parameters_of(threebar()))
     field = ".".join(name.split(".")[:2])
@@ -161,7 +169,9 @@ def test_a_planted_effect_comes_back(name: str) -> None:
         begin = with_memory(predictor.structure, start())
         fitted = fit([run], TRAIN, predictor, Recipe(noise=NOISE, filtered=0), known={"walk": begin})
         costs.append(fitted.solution.cost)
-    off = next(own.off for effect in CATALOGUE for own in effect.own if name.startswith(f"{effect.name}.{own.name}"))
+    off = next(
+        own.off for effect in known_effects() for own in effect.own if name.startswith(f"{effect.name}.{own.name}")
+    )
     assert fitted.values[2] - off == pytest.approx(size - off, rel=0.1)
     assert fitted.values[0] == pytest.approx(0.8, rel=0.01)
     assert costs[0] > costs[1] + 20

@@ -19,6 +19,8 @@ STEP = 1.0
 """Size, in scales of a number, at which responses are tried, to both sides of off; the screening takes shares of it."""
 AZIMUTHS = 6
 """Directions in which the far end of something is tried."""
+LINES = 3
+"""Directions in which a line through a place is tried."""
 SAME_AS_NUISANCE = ("motor_speed_mismatch", "cap_friction", "tendon_stiffness", "tendon_set")
 """Effects that are a nuisance where all elements have them alike."""
 PASSIVE_ONLY = ("tendon_set",)
@@ -26,6 +28,7 @@ PASSIVE_ONLY = ("tendon_set",)
 PARTS = {
     "friction_field": (("gradient_x_per_m", "gradient_y_per_m"),
                        ("patch_factor", "patch_x_m", "patch_y_m", "patch_radius_m")),
+    "sensor_saturation": (("top_share", "top_m"), ("bottom_share", "bottom_m")),
 }  # fmt: skip
 """Effects that are several laws, each a candidate of its own."""
 
@@ -168,12 +171,13 @@ def _tries(keys: Sequence[str], origin: np.ndarray, scale: np.ndarray, touched: 
 
 def _only_shape(key: str, keys: Sequence[str]) -> bool:
     """Numbers that say where or how something acts, and nothing while its size is off."""
-    where = key.startswith(("anchor_", "patch_x", "patch_y", "patch_radius")) or key == "place_m"
+    where = key.startswith(("anchor_", "patch_x", "patch_y", "patch_radius", "ridge_"))
+    where = where or key in ("place_m", "top_m", "bottom_m")
     return where or (key in ("tau_s", "angle_rad", "speed_m_per_s") and len(keys) > 1)
 
 
 def _has_place(keys: Sequence[str]) -> bool:
-    return any(key.startswith(("anchor_x", "patch_x")) for key in keys)
+    return any(key.startswith(("anchor_x", "patch_x", "ridge_distance")) for key in keys)
 
 
 def _shaped(
@@ -187,6 +191,13 @@ def _shaped(
             one = row.copy()
             one[at["patch_x_m"]], one[at["patch_y_m"]] = x, y
             found.append(one)
+    elif "ridge_distance_m" in at:
+        for x, y in touched:
+            for angle in np.pi * np.arange(LINES) / LINES:
+                one = row.copy()
+                one[at["ridge_distance_m"]] = x * np.cos(angle) + y * np.sin(angle)
+                one[at["ridge_angle_rad"]] = angle
+                found.append(one)
     elif "anchor_x_m" in at:
         middle = touched.mean(axis=0)
         for angle in 2 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS:

@@ -58,8 +58,8 @@ class Obstacle(Effect):
         del z, h
         height, slope = _ridge(x, terms.p_GC)
         rising = (slope * terms.v_GC).sum(-1)
-        # On a slope so steep that the push of one load makes the next one swing from step to step, the floor gives way by
-        # what that push takes off its rise.
+        # On a slope so steep that the push of one load makes the next one swing from step to step, the floor gives way
+        # by what that push takes off its rise.
         sideways = terms.mobility[..., 0] + terms.mobility[..., 1]
         give = torch.relu(2.0 * (slope * slope).sum(-1) * sideways - terms.mobility[..., 2])
         return replace(terms, sunk=terms.sunk - height, rising=terms.rising + rising, give=terms.give + give)

@@ -35,7 +35,7 @@ class FrictionAnisotropy(Effect):
     title = "friction that depends on the direction of slip"
     own = (
         EffectParameter("ratio", "1", 0.5, 2.0, off=1.0, scale=0.3, what="grip along the axis over grip across it"),
-        EffectParameter("angle_rad", "rad", -math.pi / 2, math.pi / 2, off=0.0, scale=math.pi / 4,
+        EffectParameter("angle_rad", "rad", -1.6, 1.6, off=0.0, scale=math.pi / 4,
                         what="of the axis, from the world's x towards its y"),
     )  # fmt: skip
     look_alikes = ("ground_slope", "friction_field")

@@ -29,12 +29,15 @@ def diagnose_commands(report: DiagnoseReport, robot: str = ROBOT) -> list[tuple[
 def use(report: DiagnoseReport) -> str:
     """The command that puts what was named into the simulator, empty where nothing with a number was: in an iteration
     that has nothing yet, from the runs of the diagnosed one. The fit begins at the sizes that were found: where an
-    effect is off, a patch of the floor has no place."""
+    effect is off, a patch of the floor has no place. No fit begins on a bound: a number that ended there begins where
+    it does by itself."""
     words: list[str] = []
     for one in (one for one in report.ranking if one.effect in report.effects and one.size):
         seats = {name.split(".")[2] for name in one.size if name.count(".") == 2}
         words.append(f"--with-effect {one.effect}" + (f":{seats.pop()}" if len(seats) == 1 else ""))
-        words += [f"--free +{name}={value:.4g}" for name, value in one.size.items()]
+        words += [
+            f"--free +{name}" + ("" if name in one.on_bound else f"={value:.4g}") for name, value in one.size.items()
+        ]
     also = "" if report.iteration is None else f" --also {report.iteration}"
     return " ".join([f"r2s2r identify{_free(report)}{also}", *words]) if words else ""
 

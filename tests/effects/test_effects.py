@@ -241,6 +241,7 @@ def test_it_says_what_it_is(effect: Effect) -> None:
     assert set(effect.look_alikes) < {*DESIGN, *SECOND} - {effect.name}
     for parameter in effect.own:
         assert parameter.lower <= parameter.off <= parameter.upper
+        assert all(float(f"{bound:.4g}") == bound for bound in (parameter.lower, parameter.upper))  # as they are typed
         assert 0 < parameter.scale <= parameter.upper - parameter.lower
         assert parameter.what
     text = sys.modules[type(effect).__module__].__doc__ or ""

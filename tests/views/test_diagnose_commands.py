@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
 from r2s2r_cli.commands.diagnose_outcome import show
 from r2s2r_cli.console import Console
+from r2s2r_cli.effects import FURTHER
 from r2s2r_cli.reached import ROBOT
+from r2s2r_cli.stages.diagnose.which.candidates import candidates
+from r2s2r_cli.stages.diagnose.which.numbers import Model
+from r2s2r_cli.stages.identified import nominal
+from r2s2r_cli.stages.identify.data import Selection
+from r2s2r_cli.stages.identify.effects_asked import effects_asked
+from r2s2r_cli.stages.identify.free import select
+from r2s2r_cli.stages.identify.request import Request
+from r2s2r_cli.stages.identify.task import specs_asked
 from r2s2r_cli.stages.record.plan import plans
 from r2s2r_cli.stages.record.policies import random_targets
 from r2s2r_cli.views.diagnose_commands import AFTER_REPAIR, REPEATS, diagnose_commands, use
 from r2s2r_cli.views.diagnose_page import diagnose_page, diagnose_tables
-from schemas.config import LinkSettings
+from schemas.config import IdentifySettings, LinkSettings
 from schemas.results_diagnose import DiagnoseReport, NextGaitFound
 from tests.support.diagnosed import report
 from tests.support.rig_robots import known
@@ -31,6 +42,37 @@ def test_what_was_named_comes_with_the_command_that_uses_it() -> None:
     assert not use(report().model_copy(update={"verdict": "ambiguous", "effects": ()}))
     lost = report().ranking[0].model_copy(update={"effect": "dropout", "size": {}})
     assert not use(report().model_copy(update={"effects": ("dropout",), "ranking": (lost,)}))
+
+
+def test_what_ended_on_a_bound_can_be_used_as_well() -> None:
+    """A sensor that shows nothing beyond its top has a share of 1, and a ground that only gives way creeps by 0: no fit
+    begins on a bound, so the command leaves that start to `identify`, which takes it."""
+    sizes = {"sensor_saturation.top_share.2": 1.0, "sensor_saturation.top_m": 0.1683}
+    clipped = {"effect": "sensor_saturation", "size": sizes, "on_bound": ("sensor_saturation.top_share.2",)}
+    row = report().ranking[0].model_copy(update=clipped)
+    made = report().model_copy(update={"effects": ("sensor_saturation",), "ranking": (row,)})
+    assert use(made) == ("r2s2r identify --with-effect sensor_saturation:2 --free +sensor_saturation.top_share.2 "
+                         "--free +sensor_saturation.top_m=0.1683")  # fmt: skip
+
+
+def test_identify_takes_every_effect_with_numbers_on_a_bound() -> None:
+    """Of all elements together, and of the last one alone: every number is free, none begins on a bound."""
+    robot = known("threebar", "surface")
+    made = candidates(Model(nominal(robot), asked=[effect.name for effect in FURTHER]))
+    some = {(one.effect, one.names[0].count(".")): one for one in made}
+    assert {name for name, _ in some} > {effect.name for effect in FURTHER}
+    for one in some.values():
+        size = dict(zip(one.names, one.upper.tolist(), strict=True))
+        row = report().ranking[0].model_copy(update={"effect": one.effect, "size": size, "on_bound": one.names})
+        words = use(report().model_copy(update={"effects": (one.effect,), "ranking": (row,)})).split()
+        typed = {flag: [b for a, b in pairwise(words) if a == flag] for flag in ("--with-effect", "--free")}
+        asked = effects_asked(typed["--with-effect"], robot)
+        request = Request(
+            (Selection("a", (1,)),), free=tuple(typed["--free"]), effects=asked.ids, of_effects=asked.specs
+        )
+        frees = select(specs_asked(request, IdentifySettings(), ("friction",)), robot, asked.ids)
+        assert {*one.names} <= {free.name for free in frees}, one.label
+        assert all(free.lower < free.start < free.upper for free in frees), one.label
 
 
 @pytest.mark.parametrize(

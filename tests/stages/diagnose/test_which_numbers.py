@@ -106,6 +106,14 @@ def test_a_grain_is_tried_along_and_across_both_axes_and_diagonals() -> None:
     assert grain.share(grain.tries[-1], 0.5)[1] == grain.tries[-1, 1]
 
 
+def test_over_which_length_a_friction_builds_up_is_no_size() -> None:
+    """Without a friction it changes nothing: every try of the tendons has some, and half of it builds up as fast."""
+    (one,) = candidates(Model(nominal(robot()), ("tendon_hysteresis",)))
+    assert one.shape.tolist() == [False, True]
+    assert np.all(one.tries[:, 0] > 0) and len(set(one.tries[:, 1])) > 1
+    assert one.share(one.tries[-1], 0.5).tolist() == [0.5 * one.tries[-1, 0], one.tries[-1, 1]]
+
+
 def test_what_is_a_nuisance_too_is_tried_from_where_the_refit_has_it(model: Model) -> None:
     """The camera of another engine is 20 ms early: tries lie about that, and what parity measured is added to it."""
     values = model.values0.copy()

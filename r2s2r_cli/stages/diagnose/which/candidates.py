@@ -173,7 +173,7 @@ def _only_shape(key: str, keys: Sequence[str]) -> bool:
     """Numbers that say where or how something acts, and nothing while its size is off."""
     where = key.startswith(("anchor_", "patch_x", "patch_y", "patch_radius", "ridge_"))
     where = where or key in ("place_m", "top_m", "bottom_m")
-    return where or (key in ("tau_s", "angle_rad", "speed_m_per_s") and len(keys) > 1)
+    return where or (key in ("tau_s", "angle_rad", "speed_m_per_s", "length_m") and len(keys) > 1)
 
 
 def _has_place(keys: Sequence[str]) -> bool:

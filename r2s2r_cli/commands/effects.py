@@ -67,6 +67,7 @@ def _info(effect: Effect) -> EffectInfo:
 
 
 def _explain(effect: Effect, console: Console) -> None:
+    from r2s2r_cli.effects import FURTHER
     from r2s2r_cli.effects.words import bounds, sections
 
     console.data(f"{effect.name}: {effect.title} (channel {effect.channel})")
@@ -75,4 +76,6 @@ def _explain(effect: Effect, console: Console) -> None:
             console.data(f"{heading}: {text}")
     rows = [[f"{effect.name}.{own.name}", own.unit, own.per, f"{own.off:g}", bounds(own), f"{own.scale:g}", own.what]
             for own in effect.own]  # fmt: skip
+    if effect in FURTHER:
+        console.data(f"Looked for: only where it is named: r2s2r diagnose --effect catalogue --effect {effect.name}")
     console.table("numbers", ["number", "unit", "per", "off", "bounds", "prior sd", "what"], rows)

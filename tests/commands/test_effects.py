@@ -39,6 +39,13 @@ def test_one_is_explained() -> None:
     assert [words for words in expected if words not in text] == []
 
 
+def test_one_that_is_looked_for_where_it_is_named_says_so() -> None:
+    """With the command; one of the catalogue does not."""
+    text = " ".join(invoke("stribeck").split())
+    assert "where it is named: r2s2r diagnose --effect catalogue --effect stribeck" in text
+    assert "where it is named" not in invoke("payload")
+
+
 def test_the_document_says_the_same() -> None:
     """With --json: schema, and every number of every effect."""
     document = json.loads(invoke("--json"))

@@ -8,6 +8,7 @@ _READ = {
     "1": ("", 1.0, ""), "m": ("mm", 1e3, "_m"), "m/s": ("mm/s", 1e3, "_m_per_s"), "m/N": ("mm/N", 1e3, "_m_per_n"),
     "m/(N s)": ("mm/(N s)", 1e3, "_m_per_ns"), "rad": ("deg", math.degrees(1.0), "_rad"), "s": ("s", 1.0, "_s"),
     "kg": ("kg", 1.0, "_kg"), "N": ("N", 1.0, "_n"), "1/s": ("1/s", 1.0, "_per_s"), "1/m": ("1/m", 1.0, "_per_m"),
+    "s/m": ("s/m", 1.0, "_s_per_m"), "N s/m": ("N s/m", 1.0, "_n_s_per_m"),
 }  # fmt: skip
 """By SI unit: the unit that people read, what SI is multiplied by, how names of numbers in it end."""
 

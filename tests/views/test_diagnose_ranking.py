@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
+from r2s2r_cli.effects import CATALOGUE, FURTHER
 from r2s2r_cli.views.diagnose_gains import drawn_rows, ranking_picture
 from r2s2r_cli.views.diagnose_page import diagnose_tables
 from r2s2r_cli.views.diagnose_ranking import ranking_table
@@ -137,7 +140,11 @@ def test_people_read_millimetres_and_degrees(value: float, unit: str, words: str
 
 
 def test_a_name_loses_the_unit_that_stands_behind_its_number() -> None:
-    """And nothing else."""
+    """And nothing else; so does every number of an effect whose name says a unit of several."""
+    numbers = [own for effect in (*CATALOGUE, *FURTHER) for own in effect.own if " " in own.unit or "/" in own.unit]
+    shown = {plain_name(own.name, own.unit) for own in numbers}
+    assert not [name for name in shown if re.search("_(n|m|s)_|_per_(m|n|s)", name)]
+    assert {"drag", "speed", "creep"} <= shown
     assert plain_name("compliance_m_per_n", "m/N") == "compliance" and plain_name("factor", "1") == "factor"
     assert plain_name("per_newton", "1/N") == "per_newton" and rounded(0.0371, 2) == "0.037"
 

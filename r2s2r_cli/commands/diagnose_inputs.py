@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -133,9 +133,8 @@ class Asked:
         if not diagnosed and healthy:
             raise self._nothing_else(healthy)
         fit, judge = fit_and_judge(diagnosed, found, self.train, self.test, healthy=self.healthy, say=say)
-        made = Evidence(
-            robot, model, diagnosed, fit, judge, self._floor(), healthy, _unsaid(model, self.identification)
-        )
+        told = (*_unsaid(model, self.identification), *there_already(model, self.named, self.identification))
+        made = Evidence(robot, model, diagnosed, fit, judge, self._floor(), healthy, told)
         require_enough(made)
         return made
 
@@ -203,3 +202,14 @@ def _unsaid(model: Identified, path: Path) -> tuple[str, ...]:
     if not names:
         return ()
     return (f"uncertainty of {', '.join(names)}: {path.name} has none, so the refit takes its usual priors",)
+
+
+def there_already(model: Identified, named: Collection[str], path: Path) -> tuple[str, ...]:
+    """Effects that were named and that the identification has, in words: a diagnosis looks for what it lacks."""
+    theta = model.theta
+    return tuple(
+        f"{effect.name}: {path.name} has it already, so it is not looked for"
+        for effect in model.structure.effects
+        if effect.name in named
+        and any(bool((theta.of(effect.name)[key] != off).any()) for key, off in effect.off(model.structure).items())
+    )

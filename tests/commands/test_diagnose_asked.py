@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
-from r2s2r_cli.commands.diagnose_inputs import Asked
+from r2s2r_cli.commands.diagnose_inputs import Asked, there_already
 from r2s2r_cli.effects import CATALOGUE
 from r2s2r_cli.effects.known import looked_for
+from r2s2r_cli.stages.diagnose.which.candidates import candidates
+from r2s2r_cli.stages.diagnose.which.numbers import Model
+from r2s2r_cli.stages.identified import Identified
+from r2s2r_cli.stages.identify.free import Mapping, select
+from tests.support.builders import robot
 
 IDS = tuple(effect.name for effect in CATALOGUE)
 NOWHERE = cast(Any, None)
@@ -44,3 +51,15 @@ def test_a_further_effect_is_at_hand_where_it_is_named() -> None:
     """The catalogue without a name; with one it comes at its place, and no other with it."""
     assert tuple(effect.name for effect in looked_for()) == IDS
     assert tuple(effect.name for effect in looked_for(("stribeck", "payload"))) == (*IDS, "stribeck")
+
+
+def test_what_the_identification_has_already_is_said_to_be_left_out() -> None:
+    """Where it was named; one that is there and off is looked for, and so is one that is not there."""
+    frees = select(("stribeck.static_factor", "air_drag.drag_n_s_per_m"), robot(), ("stribeck", "air_drag"))
+    mapping = Mapping(robot(), frees, ("stribeck", "air_drag"))
+    model = Identified("30-identify.h5", robot(), mapping, np.array([1.3, 0.0]), np.eye(2))
+    said = there_already(model, ("stribeck", "air_drag", "obstacle"), Path("a/30-identify.h5"))
+    assert said == ("stribeck: 30-identify.h5 has it already, so it is not looked for",)
+    assert there_already(model, (), Path("a/30-identify.h5")) == ()
+    made = {one.effect for one in candidates(Model(model, asked=("stribeck", "air_drag", "obstacle")))}
+    assert made & {"stribeck", "air_drag", "obstacle"} == {"air_drag", "obstacle"}

@@ -70,6 +70,7 @@ def look(sets: Path, part: list[str]) -> None:
     from r2s2r_cli.blind.catalogue import diagnosed
     from r2s2r_cli.blind.sets import read_set
     from r2s2r_cli.effects import known_effects
+    from r2s2r_cli.errors import R2S2RError
 
     asked = tuple(effect.name for effect in known_effects())
     for name in part:
@@ -78,7 +79,10 @@ def look(sets: Path, part: list[str]) -> None:
             continue
         begun = time.monotonic()
         settings = {"effects": asked, "cache": str(sets / "cache"), "threads": 1}
-        found = diagnosed(read_set(sets / "sets" / name), settings)
+        try:
+            found = diagnosed(read_set(sets / "sets" / name), settings)
+        except R2S2RError as error:  # data that are refused have no verdict, which is a miss
+            found = {"verdict": "refused", "effects": [], "ranking": [], "sentence": error.what}
         out.parent.mkdir(parents=True, exist_ok=True)
         out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
         print(f"{name}: {found['sentence']} ({time.monotonic() - begun:.0f} s)", flush=True)

@@ -32,7 +32,7 @@ def test_what_diagnoses_knows_neither_maker_nor_truth() -> None:
     """It imports nothing that makes or opens a label, and names no folder but those of logs and verdicts."""
     tree = ast.parse(inspect.getsource(example.look))
     modules = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-    assert modules == {"r2s2r_cli.blind.catalogue", "r2s2r_cli.blind.sets", "r2s2r_cli.effects"}
+    assert modules == {"r2s2r_cli.blind.catalogue", "r2s2r_cli.blind.sets", "r2s2r_cli.effects", "r2s2r_cli.errors"}
     words = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
     assert "truth" not in words and {"sets", "verdicts"} <= words
 

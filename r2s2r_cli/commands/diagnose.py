@@ -56,7 +56,8 @@ def diagnose(
         typer.Option(
             "--effect",
             metavar="ID",
-            help="Consider only this effect; repeatable. catalogue: beside the catalogue, which is the default.",
+            help="Consider only this effect; repeatable. The word catalogue: all that are looked for by default, "
+            "beside those that are named.",
         ),
     ] = None,
     model: Annotated[
@@ -145,10 +146,14 @@ def diagnose(
 def _require_effects(names: tuple[str, ...]) -> None:
     """Raises UsageError for an effect that is not known, or with an element: here they are found, not chosen."""
     if names:
+        from r2s2r_cli.commands.diagnose_inputs import CATALOGUE
         from r2s2r_cli.stages.effects import effect_of
 
         for name in names:
             known, colon, _ = name.partition(":")
+            if known == CATALOGUE:
+                raise UsageError("the catalogue is named as a whole", where="--effect", expected=known, received=name,
+                                 hint=f"r2s2r diagnose --effect {known}")  # fmt: skip
             try:
                 effect_of(known, where="--effect", command="r2s2r diagnose --effect")
             except UsageError as error:

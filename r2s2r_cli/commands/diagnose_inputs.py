@@ -61,6 +61,18 @@ class Asked:
             return self.effects or None
         return tuple(effect.name for effect in effects_looked_for(self.named)) if self.named else None
 
+    def not_weighed(self) -> tuple[str, ...]:
+        """What the named effects were not held against, in words: all others, and sets that calibrate what is said."""
+        from r2s2r_cli.effects import FURTHER
+
+        found = []
+        if self.named and CATALOGUE not in self.effects:
+            only = ", ".join(self.named)
+            found.append(f"all other effects: --effect has only {only}; --effect {CATALOGUE} adds the rest")
+        if beyond := [effect.name for effect in FURTHER if effect.name in self.named]:
+            found.append(f"calibration of {', '.join(beyond)}: probabilities were learned from sets without")
+        return tuple(found)
+
     @property
     def identification(self) -> Path:
         """The nominal simulator."""
@@ -133,7 +145,8 @@ class Asked:
         if not diagnosed and healthy:
             raise self._nothing_else(healthy)
         fit, judge = fit_and_judge(diagnosed, found, self.train, self.test, healthy=self.healthy, say=say)
-        told = (*_unsaid(model, self.identification), *there_already(model, self.named, self.identification))
+        told = (*_unsaid(model, self.identification), *there_already(model, self.named, self.identification),
+                *self.not_weighed())  # fmt: skip
         made = Evidence(robot, model, diagnosed, fit, judge, self._floor(), healthy, told)
         require_enough(made)
         return made

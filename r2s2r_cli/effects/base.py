@@ -33,6 +33,9 @@ class EffectParameter:
     """robot | rod | cap | cable | actuated | sensor (that of each cable): how many there are."""
     fitted: bool = True
     """Whether a trajectory tells it; what only counts frames (dropout) is measured without a simulator."""
+    start: float | None = None
+    """Where a fit begins that is told no value: beside off, where other numbers do nothing while this one is off. None:
+    at off, or as near as bounds let it."""
     tried: tuple[float, ...] = ()
     """Values beside off and scale where it is looked for: those of what happens all at once."""
 

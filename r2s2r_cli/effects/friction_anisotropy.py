@@ -34,7 +34,8 @@ class FrictionAnisotropy(Effect):
     channel = Channel.CONTACT
     title = "friction that depends on the direction of slip"
     own = (
-        EffectParameter("ratio", "1", 0.5, 2.0, off=1.0, scale=0.3, what="grip along the axis over grip across it"),
+        EffectParameter("ratio", "1", 0.5, 2.0, off=1.0, scale=0.3, start=1.15,
+                        what="grip along the axis over grip across it"),
         EffectParameter("angle_rad", "rad", -1.6, 1.6, off=0.0, scale=math.pi / 4,
                         what="of the axis, from the world's x towards its y"),
     )  # fmt: skip

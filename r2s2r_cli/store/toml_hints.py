@@ -13,6 +13,8 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
+SHORT = 5
+"""Letters of a key from which on it stands in few other lines."""
 Loc = tuple[int | str, ...]
 Mend = Callable[[Loc, str], str]
 """Of the place of a wrong key or value, and the key that was meant (empty: another fault), the hint."""
@@ -50,7 +52,10 @@ def shown(path: str, key: str) -> str:
     """The lines of a file that name a key, with their numbers; the whole file where none does."""
     lines = _lines(path)
     if key and any(key in line for line in lines):
-        return f"grep -n {shlex.quote(key)} {shlex.quote(path)}"
+        # A key of one letter stands in every other line.
+        whole = f"^ *{re.escape(key)} *="
+        exact = any(re.match(whole, line) for line in lines)
+        return f"grep -n {shlex.quote(whole if exact and len(key) < SHORT else key)} {shlex.quote(path)}"
     return f"cat -n {shlex.quote(path)}"
 
 

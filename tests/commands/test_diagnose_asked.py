@@ -8,9 +8,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from r2s2r_cli.commands.diagnose import _require_effects
 from r2s2r_cli.commands.diagnose_inputs import Asked, there_already
 from r2s2r_cli.effects import CATALOGUE
 from r2s2r_cli.effects.known import looked_for
+from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.diagnose.which.candidates import candidates
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.identified import Identified
@@ -51,6 +53,32 @@ def test_a_further_effect_is_at_hand_where_it_is_named() -> None:
     """The catalogue without a name; with one it comes at its place, and no other with it."""
     assert tuple(effect.name for effect in looked_for()) == IDS
     assert tuple(effect.name for effect in looked_for(("stribeck", "payload"))) == (*IDS, "stribeck")
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [
+        ((), []),
+        (("catalogue", "payload"), []),
+        (("payload",), ["all other effects: --effect has only payload; --effect catalogue adds the rest"]),
+        (("catalogue", "stribeck"), ["calibration of stribeck: probabilities were learned from sets without"]),
+        (("stribeck", "air_drag"), [
+            "all other effects: --effect has only stribeck, air_drag; --effect catalogue adds the rest",
+            "calibration of stribeck, air_drag: probabilities were learned from sets without",
+        ]),
+    ],
+)  # fmt: skip
+def test_what_was_not_weighed_is_said(typed: tuple[str, ...], said: list[str]) -> None:
+    """Where only some effects were considered, and where one is that no calibration set has."""
+    assert list(asked(*typed).not_weighed()) == said
+
+
+def test_the_catalogue_has_no_elements() -> None:
+    """The word alone is right; with an element the hint is the word, and not that there is no such effect."""
+    _require_effects(asked("catalogue", "stribeck").named)
+    with pytest.raises(UsageError) as caught:
+        _require_effects(("catalogue:1",))
+    assert caught.value.hint == "r2s2r diagnose --effect catalogue"
 
 
 def test_what_the_identification_has_already_is_said_to_be_left_out() -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import shlex
+import subprocess
+from pathlib import Path
 
 import pytest
 
 from r2s2r_cli.options import parse_override
-from r2s2r_cli.store.toml_hints import override, override_text
+from r2s2r_cli.store.toml_hints import override, override_text, shown
 
 
 def _pasted(option: str) -> object:
@@ -35,3 +37,13 @@ def test_what_was_typed_is_pasted_as_typed() -> None:
     """A wrong key keeps its text: it was TOML already."""
     assert override_text("stage.key", "0.5") == "--set stage.key=0.5"
     assert _pasted(override_text("stage.key", '"0.5"')) == "0.5"
+
+
+@pytest.mark.parametrize(("key", "lines"), [("p", ["3"]), ("rate_hz", ["4"]), ("gone", ["1", "2", "3", "4"])])
+def test_the_line_of_a_key_is_shown(tmp_path: Path, key: str, lines: list[str]) -> None:
+    """A key of one letter is shown where it is set, not in every line that has the letter; of one that is not there the
+    whole file."""
+    path = tmp_path / "robot's.toml"
+    path.write_text("# pid: p is a gain\n[pid]\np = 65535\nrate_hz = 50  # per second\n")
+    printed = subprocess.run(shown(str(path), key), shell=True, capture_output=True, text=True, check=True).stdout
+    assert [line.replace(":", " ").split()[0] for line in printed.splitlines()] == lines

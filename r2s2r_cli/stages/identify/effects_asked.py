@@ -51,6 +51,9 @@ def effects_asked(words: Sequence[str], robot: Robot) -> EffectsAsked:
             fitted = dict.fromkeys(one.effect for one in entries(robot).values() if one.effect)
             raise UsageError(f"{name} has no number that a fit can find", where="--with-effect", received=word,
                              expected=", ".join(fitted), hint="r2s2r identify")  # fmt: skip
+        if colon and all(one.element is None for one in own):
+            raise UsageError(f"{name} has no elements", where="--with-effect", expected=name, received=word,
+                             hint=f"r2s2r identify --with-effect {name}")  # fmt: skip
         families = dict.fromkeys(one.family for one in own)
         for family in families:
             elements = [one.element for one in own if one.family == family and one.element is not None]

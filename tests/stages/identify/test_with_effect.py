@@ -64,6 +64,7 @@ def test_an_effect_frees_its_numbers() -> None:
         (["payloda"], "unknown effect", "--with-effect payload"),
         (["nonsense"], "unknown effect", "r2s2r effects"),
         (["payload:7"], "no element '7'", "--with-effect payload:0"),
+        (["stribeck:1"], "stribeck has no elements", "--with-effect stribeck"),
         (["none", "payload"], "none and an effect", "--with-effect none"),
         (["payload", "dropout"], "dropout has no number", "r2s2r identify"),
     ],

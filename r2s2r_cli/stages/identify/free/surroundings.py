@@ -94,7 +94,8 @@ def effect_entries(robot: Robot) -> list[Entry]:
     for effect in all_effects():
         for own in (one for one in effect.own if one.fitted):
             family, count = f"{effect.name}.{own.name}", own.count(structure)
-            start = inside(own.off, own.lower, own.upper, own.scale)
+            begun = own.off if own.start is None else own.start
+            start = inside(begun, own.lower, own.upper, own.scale)
             parts = list(robot.actuated) if own.per == "actuated" else list(range(count))
             elements: list[tuple[int | None, tuple[Place, ...]]] = [(None, tuple((family, i) for i in range(count)))]
             if own.per != "robot":

@@ -60,10 +60,12 @@ def test_there_is_what_the_issue_asks_for() -> None:
 
 @pytest.mark.parametrize("entry", ENTRIES.values(), ids=lambda entry: entry.free.name)
 def test_a_fit_can_start(entry: Entry) -> None:
-    """Strictly inside the bounds, at the value of robot.toml where that is inside, with a prior and a sentence."""
+    """Strictly inside the bounds, at the value of robot.toml where that is inside, with a prior and a sentence; only a
+    ratio beside an angle begins elsewhere."""
     free = entry.free
     assert free.lower < free.start < free.upper
-    assert free.start == entry.nominal or entry.nominal <= free.lower or entry.nominal >= free.upper
+    inside = free.lower < entry.nominal < free.upper
+    assert (free.start == entry.nominal) == (inside and free.name != "friction_anisotropy.ratio")
     assert free.prior_sd > 0
     assert free.what.endswith(".")
     assert math.isfinite(free.to_z(free.start))
@@ -127,6 +129,15 @@ def test_a_number_on_its_bound_starts_inside() -> None:
     assert catalogue(threebar())["restitution"].start == pytest.approx(0.03)
     assert catalogue(threebar())["motor_lag"].start == pytest.approx(0.005)
     assert catalogue(threebar())["motor_lag.tau_s"].start == pytest.approx(0.005)
+
+
+def test_a_fit_of_a_grain_begins_with_one() -> None:
+    """While the ratio is 1 its angle does nothing, and a number that does nothing is refused. Without a fit the effect
+    is off."""
+    made = entries(varied())
+    assert made["friction_anisotropy.ratio"].free.start == 1.15
+    assert made["friction_anisotropy.ratio"].nominal == 1.0
+    assert made["friction_field.patch_factor"].free.start == 1.0
 
 
 def test_unknown_effects_are_refused() -> None:

@@ -17,10 +17,10 @@ standard deviation of its prior) inside."""
 
 @dataclass(frozen=True)
 class Entry:
-    """A number that can be free. nominal: its value in robot.toml, which free.start is too unless that lies on a bound, or
-    other numbers of its effect do nothing there. family, element: `motor_speed` and 2 of `motor_speed.2`; element None:
-    of all. law: of Structure that it needs (`lag`, `droop`) or "". effect: the effect that it belongs to, or "". alike: what another number sets and this one
-    adds to, so that no data tell the two apart."""
+    """A number that can be free. nominal: its value in robot.toml, which free.start is too unless that lies on a
+    bound, or other numbers of its effect do nothing there. family, element: `motor_speed` and 2 of `motor_speed.2`;
+    element None: of all. law: of Structure that it needs (`lag`, `droop`) or "". effect: the effect that it belongs
+    to, or "". alike: what another number sets and this one adds to, so that no data tell the two apart."""
 
     free: Free
     action: Action

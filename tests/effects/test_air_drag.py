@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import pytest
-import torch
 
-from r2s2r_cli.effects import with_off_values
 from r2s2r_cli.effects.air_drag import AirDrag
 from r2s2r_cli.engine import Parameters, Structure
-from tests.support.engine import MASS, G, free_rods, parameters, roll, state, vector
+from tests.support.engine import MASS, G, roll, state, vector
+from tests.support.lone_rod import lone_rod
 
 H, DRAG = 1e-3, 0.4
 
 
 def rod(drag: float, **numbers: float) -> tuple[Structure, Parameters]:
     """One free rod in air of this drag."""
-    structure = free_rods(1, rod_contact=False).with_effects(AirDrag())
-    theta = with_off_values(structure, parameters(free_rods(1, rod_contact=False), **numbers))
-    return structure, theta.with_values({"air_drag.drag_n_s_per_m": torch.full((1, 1), drag, dtype=torch.float64)})
+    return lone_rod(AirDrag(), {"drag_n_s_per_m": drag}, **numbers)
 
 
 def test_flight_dies_away() -> None:

@@ -10,7 +10,6 @@ import roma
 import torch
 from torch import Tensor
 
-from r2s2r_cli.effects import with_off_values
 from r2s2r_cli.effects.friction_anisotropy import CREEP, FrictionAnisotropy
 from r2s2r_cli.engine import Parameters, Structure, energy
 from r2s2r_cli.engine.hooks import ContactTerms
@@ -18,28 +17,21 @@ from tests.support.engine import (
     RADIUS,
     G,
     after,
-    free_rods,
     lying,
-    parameters,
     pointing,
     simulate,
     slope,
     state,
     vector,
 )
+from tests.support.lone_rod import ROUNDING, lone_rod
 
 H, FRICTION = 1e-3, 0.4
-ROUNDING = 1e-6
-"""[J] that a step may add to a rod which rolls without slip, by the order of the scheme, with no effect at all; a slip
-loses a hundred times that."""
 
 
 def rod(ratio: float, angle: float) -> tuple[Structure, Parameters]:
     """One free rod on a floor with this grain."""
-    structure = free_rods(1, rod_contact=False).with_effects(FrictionAnisotropy())
-    theta = with_off_values(structure, parameters(free_rods(1, rod_contact=False), friction=FRICTION))
-    values = {"friction_anisotropy.ratio": ratio, "friction_anisotropy.angle_rad": angle}
-    return structure, theta.with_values({k: torch.full((1, 1), x, dtype=torch.float64) for k, x in values.items()})
+    return lone_rod(FrictionAnisotropy(), {"ratio": ratio, "angle_rad": angle}, friction=FRICTION)
 
 
 def heading(angle: Tensor) -> Tensor:

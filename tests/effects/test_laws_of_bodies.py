@@ -11,7 +11,6 @@ import roma
 import torch
 from torch import Tensor
 
-from r2s2r_cli.effects import Effect, with_off_values
 from r2s2r_cli.effects.cap_friction import CapFriction
 from r2s2r_cli.effects.cap_radius import CapRadius
 from r2s2r_cli.effects.com_offset import ComOffset
@@ -21,7 +20,7 @@ from r2s2r_cli.effects.payload import Payload
 from r2s2r_cli.effects.rolling_resistance import RollingResistance
 from r2s2r_cli.effects.soft_ground import SoftGround
 from r2s2r_cli.effects.tether_drag import TetherDrag
-from r2s2r_cli.engine import Parameters, State, Structure, end_caps, energy, read, tilted
+from r2s2r_cli.engine import State, end_caps, energy, read, tilted
 from r2s2r_cli.engine.centred import weighed
 from tests.support.engine import (
     AXIAL,
@@ -39,22 +38,15 @@ from tests.support.engine import (
     track,
     vector,
 )
+from tests.support.lone_rod import lone_rod
 
 H = 1e-3
-
-
-def rod(effect: Effect, values: dict[str, float], **numbers: float) -> tuple[Structure, Parameters]:
-    """One free rod with an effect at these values (all elements alike)."""
-    structure = free_rods(1, rod_contact=False).with_effects(effect)
-    theta = with_off_values(structure, parameters(free_rods(1, rod_contact=False), **numbers))
-    made = {f"{effect.name}.{k}": torch.full_like(theta.extra[f"{effect.name}.{k}"], x) for k, x in values.items()}
-    return structure, theta.with_values(made)
 
 
 def test_com_offset_is_another_body_frame() -> None:
     """A thrown, tumbling rod with its centre of mass 2 cm off is the rod whose caps lie 2 cm the other way in the frame
     of its centre of mass, started from the same motion: same caps, and the true centre flies a parabola."""
-    structure, theta = rod(ComOffset(), {"axial_m": 0.02})
+    structure, theta = lone_rod(ComOffset(), {"axial_m": 0.02})
     plain = free_rods(1, rod_contact=False)
     shift = vector(0.0, 0.0, 0.02)
     other = replace(parameters(plain), p_BE=parameters(plain).p_BE - shift)
@@ -75,7 +67,7 @@ def test_com_offset_is_another_body_frame() -> None:
 
 def test_payload_by_parallel_axes() -> None:
     """Mass, centre and inertia of rod and payload: both bodies about their common centre (Steiner)."""
-    structure, theta = rod(Payload(), {"mass_kg": 0.05, "place_m": 0.11})
+    structure, theta = lone_rod(Payload(), {"mass_kg": 0.05, "place_m": 0.11})
     found, centre = weighed(structure, theta)
     c = 0.05 * 0.11 / (MASS + 0.05)
     assert float(found.mass) == pytest.approx(MASS + 0.05, rel=1e-14)
@@ -87,7 +79,7 @@ def test_payload_by_parallel_axes() -> None:
 
 def test_payload_keeps_energy_in_flight() -> None:
     """A tumbling rod with a payload keeps its energy: the kinetic one is counted about the true centre."""
-    structure, theta = rod(Payload(), {"mass_kg": 0.05, "place_m": 0.11})
+    structure, theta = lone_rod(Payload(), {"mass_kg": 0.05, "place_m": 0.11})
     start = state(structure, vector(0.0, 0.0, 1.0)[None], w=vector(4.0, 1.0, 2.0).expand(1, 1, 3))
     states = roll(structure, theta, start, 40, H, every=40)
     before, after = (float(energy(structure, theta, one)) for one in states)
@@ -97,7 +89,7 @@ def test_payload_keeps_energy_in_flight() -> None:
 
 def test_payload_carries_its_weight() -> None:
     """At rest on both caps, the ground bears rod and payload, and more of it at the nearer cap (the lever)."""
-    structure, theta = rod(Payload(), {"mass_kg": 0.05, "place_m": 0.08})
+    structure, theta = lone_rod(Payload(), {"mass_kg": 0.05, "place_m": 0.08})
     force = read(structure, theta, lying(structure)).ground[0, :, 2]
     right = (MASS * HALF + 0.05 * (HALF + 0.08)) * G / (2 * HALF)
     assert force.numpy() == pytest.approx([(MASS + 0.05) * G - right, right], rel=1e-6)
@@ -107,7 +99,7 @@ def test_friction_field() -> None:
     """A rod slides with mu(x) g where it is, on the gradient and half way out of the patch; far away as without."""
     x = {"gradient_x_per_m": 0.5, "gradient_y_per_m": -0.2, "patch_factor": 0.4, "patch_x_m": 3.0, "patch_y_m": 0.0,
          "patch_radius_m": 0.2}  # fmt: skip
-    structure, theta = rod(FrictionField(), x, friction=0.3)
+    structure, theta = lone_rod(FrictionField(), x, friction=0.3)
     places = vector(0.0, 1.0, 3.2, -1.0)
     p = torch.stack([places, torch.zeros(4).double(), torch.full((4,), RADIUS).double()], dim=-1)[:, None]
     v = vector(1.0, 0.0, 0.0).expand(4, 1, 3)
@@ -122,7 +114,7 @@ def test_friction_field() -> None:
 
 def test_cap_friction() -> None:
     """A sliding rod is braked by the mean of its two caps' friction."""
-    structure, theta = rod(CapFriction(), {}, friction=0.5)
+    structure, theta = lone_rod(CapFriction(), {}, friction=0.5)
     theta = theta.with_values({"cap_friction.factor": torch.tensor([[0.4, 1.0]], dtype=torch.float64)})
     after = roll(
         structure, theta, lying(structure, axis=vector(0.0, 1.0, 0.0), v=vector(1.0, 0.0, 0.0).expand(1, 1, 3)), 1, H
@@ -135,7 +127,7 @@ def test_rolling_resistance(name: str, axis: int, inertia: float) -> None:
     """Without friction a rod that rolls, or turns on the spot, loses rho m g / I of its speed a second, until it
     stands."""
     rho = 0.001
-    structure, theta = rod(RollingResistance(), {name: rho}, friction=0.0)
+    structure, theta = lone_rod(RollingResistance(), {name: rho}, friction=0.0)
     spin = 2.0
     w = torch.zeros(1, 1, 3, dtype=torch.float64)
     start = lying(structure)
@@ -158,7 +150,7 @@ def test_soft_ground_is_a_kelvin_voigt_foundation() -> None:
     """A rod put on to soft ground sinks to compliance times its load, with the time constant; lifted off, the ground
     comes back with it."""
     s, tau = 1e-4, 0.05
-    structure, theta = rod(SoftGround(), {"compliance_m_per_n": s, "tau_s": tau})
+    structure, theta = lone_rod(SoftGround(), {"compliance_m_per_n": s, "tau_s": tau})
     start = lying(structure)
     states = roll(structure, theta, start, 80, H)
     load = MASS * G / 2
@@ -176,7 +168,7 @@ def test_soft_ground_creeps_sideways() -> None:
     """A rod that friction would hold on a slope along its axis moves down it at creep times what each cap holds, once
     that stops it; beyond the cone it slides as ever."""
     creep, slope = 0.01, 0.2
-    structure, theta = rod(SoftGround(), {"creep_m_per_ns": creep})
+    structure, theta = lone_rod(SoftGround(), {"creep_m_per_ns": creep})
     along = vector(G * math.sin(slope), 0.0, -G * math.cos(slope)).expand(1, 3)
     states = roll(structure, replace(theta, gravity=along), lying(structure), 100, H)
     held = MASS * G * math.sin(slope) / 2
@@ -185,7 +177,7 @@ def test_soft_ground_creeps_sideways() -> None:
     expected = creep * held * (1 - (1 + 2 * H / (creep * MASS)) ** -number)  # implicit in the step
     assert torch.allclose(speed, expected, rtol=1e-3, atol=0)  # caps of unequal loads share a little unequally
     steep = vector(G * math.sin(1.3), 0.0, -G * math.cos(1.3)).expand(1, 3)
-    plain, _ = rod(SoftGround(), {})
+    plain, _ = lone_rod(SoftGround(), {})
     slid, free = (
         roll(plain, replace(one, gravity=steep), lying(plain), 20, H)[-1].v_WB
         for one in (theta, theta.with_values({"soft_ground.creep_m_per_ns": torch.zeros_like(along[:, :1])}))
@@ -196,7 +188,7 @@ def test_soft_ground_creeps_sideways() -> None:
 @pytest.mark.slow
 def test_soft_ground_is_stable_when_very_soft() -> None:
     """A dropped rod on ground that gives 4 mm a newton with hardly any time constant comes to rest at its depth."""
-    structure, theta = rod(SoftGround(), {"compliance_m_per_n": 0.004, "tau_s": 0.02})
+    structure, theta = lone_rod(SoftGround(), {"compliance_m_per_n": 0.004, "tau_s": 0.02})
     start = lying(structure, v=vector(0.0, 0.0, -0.5).expand(1, 1, 3))
     states = roll(structure, theta, start, 1500, H, every=100)
     assert float(states[-1].p_WB[0, 0, 2]) == pytest.approx(RADIUS - 0.004 * MASS * G / 2, abs=1e-4)
@@ -210,7 +202,7 @@ def track_extra(states: list[State], name: str) -> Tensor:
 
 def test_cap_radius() -> None:
     """A rod with caps 2 mm smaller comes to lie 2 mm lower."""
-    structure, theta = rod(CapRadius(), {"change_m": -0.002})
+    structure, theta = lone_rod(CapRadius(), {"change_m": -0.002})
     states = roll(structure, theta, lying(structure), 60, H, every=60)
     assert float(states[-1].p_WB[0, 0, 2]) == pytest.approx(RADIUS - 0.002, abs=1e-9)
 
@@ -231,7 +223,7 @@ def test_slope_agrees_with_a_tilted_ground() -> None:
 def test_tether() -> None:
     """A free rod falls, and is drawn to the anchor with F / m."""
     anchor = {"anchor_x_m": 0.3, "anchor_y_m": -0.4, "anchor_z_m": 1.0}
-    structure, theta = rod(TetherDrag(), {"force_n": 0.26, **anchor})
+    structure, theta = lone_rod(TetherDrag(), {"force_n": 0.26, **anchor})
     start = state(structure, vector(0.0, 0.0, 1.0)[None])
     after = roll(structure, theta, start, 1, H)[-1]
     # 0.5 m away, of which the 2 cm near the anchor take a part.

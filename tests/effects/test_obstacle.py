@@ -11,7 +11,6 @@ import roma
 import torch
 from torch import Tensor
 
-from r2s2r_cli.effects import with_off_values
 from r2s2r_cli.effects.obstacle import Obstacle
 from r2s2r_cli.engine import Parameters, State, Structure, energy
 from tests.support.engine import (
@@ -20,15 +19,14 @@ from tests.support.engine import (
     MASS,
     RADIUS,
     G,
-    free_rods,
     lying,
-    parameters,
     pointing,
     roll,
     simulate,
     state,
     vector,
 )
+from tests.support.lone_rod import lone_rod
 
 H, HEIGHT, WIDTH = 1e-3, 0.005, 0.03
 ACROSS, ALONG = vector(0.0, 1.0, 0.0), vector(1.0, 0.0, 0.0)
@@ -40,11 +38,7 @@ FIELDS = ("p_WB", "q_WR", "v_WB", "w_R", "rest", "winding")
 
 def rod(*, friction: float = 0.0, **values: float) -> tuple[Structure, Parameters]:
     """One free rod on a floor with a ridge along y: through the origin unless the values say otherwise."""
-    structure = free_rods(1, rod_contact=False).with_effects(Obstacle())
-    theta = with_off_values(structure, parameters(free_rods(1, rod_contact=False), friction=friction))
-    given = {"height_m": HEIGHT, "ridge_width_m": WIDTH, **values}
-    made = {f"obstacle.{k}": torch.full((1, 1), x, dtype=torch.float64) for k, x in given.items()}
-    return structure, theta.with_values(made)
+    return lone_rod(Obstacle(), {"height_m": HEIGHT, "ridge_width_m": WIDTH, **values}, friction=friction)
 
 
 def coming(structure: Structure, speed: float, *, at: float = -0.15, spin: float = 0.0) -> State:

@@ -9,7 +9,6 @@ import pytest
 import torch
 from torch import Tensor
 
-from r2s2r_cli.effects import with_off_values
 from r2s2r_cli.effects.stribeck import Stribeck
 from r2s2r_cli.engine import Parameters, Structure, energy
 from r2s2r_cli.engine.hooks import ContactTerms
@@ -17,28 +16,21 @@ from tests.support.engine import (
     RADIUS,
     G,
     after,
-    free_rods,
     lying,
-    parameters,
     pointing,
     simulate,
     slope,
     state,
     vector,
 )
+from tests.support.lone_rod import ROUNDING, lone_rod
 
 H, FRICTION = 1e-3, 0.4
-ROUNDING = 1e-6
-"""[J] that a step may add to a rod which rolls without slip, by the order of the scheme, with no effect at all; a slip
-loses a hundred times that."""
 
 
 def rod(static: float, speed: float) -> tuple[Structure, Parameters]:
     """One free rod that holds with `static` times its kinetic friction."""
-    structure = free_rods(1, rod_contact=False).with_effects(Stribeck())
-    theta = with_off_values(structure, parameters(free_rods(1, rod_contact=False), friction=FRICTION))
-    values = {"stribeck.static_factor": static, "stribeck.speed_m_per_s": speed}
-    return structure, theta.with_values({k: torch.full((1, 1), x, dtype=torch.float64) for k, x in values.items()})
+    return lone_rod(Stribeck(), {"static_factor": static, "speed_m_per_s": speed}, friction=FRICTION)
 
 
 def coefficients(v: Tensor, static: Tensor, speed: Tensor) -> Tensor:

@@ -9,7 +9,6 @@ import pytest
 import torch
 from torch import Tensor
 
-from r2s2r_cli.effects import with_off_values
 from r2s2r_cli.effects.viscous_contact import SLOW, ViscousContact
 from r2s2r_cli.engine import Parameters, Structure, energy
 from r2s2r_cli.engine.hooks import ContactTerms
@@ -17,27 +16,21 @@ from tests.support.engine import (
     RADIUS,
     G,
     after,
-    free_rods,
     lying,
-    parameters,
     pointing,
     simulate,
     slope,
     state,
     vector,
 )
+from tests.support.lone_rod import ROUNDING, lone_rod
 
 H, FRICTION = 1e-3, 0.2
-ROUNDING = 1e-6
-"""[J] that a step may add to a rod which rolls without slip, by the order of the scheme, with no effect at all; a slip
-loses a hundred times that."""
 
 
 def rod(drag: float) -> tuple[Structure, Parameters]:
     """One free rod on a floor of this drag."""
-    structure = free_rods(1, rod_contact=False).with_effects(ViscousContact())
-    theta = with_off_values(structure, parameters(free_rods(1, rod_contact=False), friction=FRICTION))
-    return structure, theta.with_values({"viscous_contact.drag_s_per_m": torch.full((1, 1), drag, dtype=torch.float64)})
+    return lone_rod(ViscousContact(), {"drag_s_per_m": drag}, friction=FRICTION)
 
 
 def coefficients(v: Tensor, drag: Tensor) -> Tensor:

@@ -13,10 +13,11 @@ import argparse
 import json
 import shutil
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-FURTHER = {
+FURTHER: dict[str, tuple[str, dict[str, Any]]] = {
     "tendon_hysteresis": ("cable", {"force_n": 0.8}),
     "capstan_friction": ("cable", {"wrap": 0.3}),
     "attachment_offset": ("cable", {"moved": [{"cable": 6, "end": 0, "by_m": [0.0, 0.0, 0.02]}]}),
@@ -54,8 +55,6 @@ def make(sets: Path, part: list[str]) -> None:
         world = hidden(Bank.REGRESSION, seed, Kind.NONE, gaits=GAITS, noise_m=NOISE_M)
         if effect != "none":
             channel, table = FURTHER[effect]
-            from dataclasses import replace
-
             world = replace(world, planted=(Planted(effect, table, channel, {}),), factor=1.0)
         shutil.rmtree(sets / "sets" / name, ignore_errors=True)
         label = make_set(world, sets / "sets" / name)

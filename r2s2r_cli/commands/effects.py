@@ -40,8 +40,7 @@ def effects(
         for one in chosen:
             _explain(one, console)
         return
-    named = {one.name for one in FURTHER}
-    rows = [[one.name + "*" * (one.name in named), str(one.channel), one.signature()] for one in chosen]
+    rows = [[one.name + "*" * (one in FURTHER), str(one.channel), one.signature()] for one in chosen]
     console.table("effects", ["id", "channel", "what it looks like in data"], rows)
     console.say("* only where it is named: r2s2r diagnose --effect catalogue --effect ID")
     console.say("r2s2r effects ID explains one of them")

@@ -109,6 +109,9 @@ def test_a_world_whose_robot_is_stopped_is_drawn_anew(tmp_path: Path, monkeypatc
     codes = [4]
     with pytest.raises(subprocess.CalledProcessError):
         run.went_through(tmp_path, 4, run.Profile(), said.append)
+    shutil.rmtree(tmp_path / "seed-4")
+    run.went_through(tmp_path, 4, run.Profile(worlds={4: 9}), said.append)
+    assert asked[-1] == 9  # those before are known to be none
 
 
 def report(refined: float, gap: float, floor: float | None = 0.01) -> dict[str, Any]:

@@ -27,6 +27,8 @@ unexport PYTHONDONTWRITEBYTECODE
 # In the order of the names: xdist would leave files of one long test for the end, when the other worker has nothing to do.
 PYTEST_FLAGS ?= -n auto --dist loadfile --no-loadscope-reorder
 DEMO   ?= demo
+# Its projects share what is compiled for the robot that they share.
+demo: export R2S2R_CACHE ?= $(abspath $(DEMO))/cache
 PROJECT ?= .
 ITER   ?= 001
 SOURCE ?=

@@ -13,6 +13,8 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
+from r2s2r_cli.store.project import SHARED_CACHE
+
 # One worker a core: threads of a linear algebra would only wait for each other. Before anything imports numpy or torch.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -51,19 +53,20 @@ def real_dir() -> Path:
 
 @pytest.fixture(scope="session", autouse=True)
 def kernels(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """A simulator that keeps its machine code nowhere finds and leaves it in a folder of this session, for all workers:
-    the same kernel is compiled once, not in every file."""
-    rollout = sys.modules.get("r2s2r_cli.engine.rollout")  # where no test needs the engine, torch is not loaded
-    if rollout is None:
-        yield
-        return
+    """All projects of this session, and simulators that keep their machine code nowhere, find and leave it in one folder,
+    for all workers and for the commands that tests start: the same kernel is compiled once, not in every project. CI
+    names one for all its steps."""
     base = tmp_path_factory.getbasetemp()
     folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "kernels"
-    init = rollout.Simulator.__init__
-
-    def shared(self: Any, structure: Any, *, cache_dir: Path | None = None, **how: Any) -> None:
-        init(self, structure, cache_dir=cache_dir or folder, **how)
-
+    folder = Path(os.environ.get(SHARED_CACHE) or folder)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rollout.Simulator, "__init__", shared)
+        patch.setenv(SHARED_CACHE, str(folder))
+        rollout = sys.modules.get("r2s2r_cli.engine.rollout")  # where no test needs the engine, torch is not loaded
+        if rollout is not None:
+            init = rollout.Simulator.__init__
+
+            def shared(self: Any, structure: Any, *, cache_dir: Path | None = None, **how: Any) -> None:
+                init(self, structure, cache_dir=cache_dir or folder, **how)
+
+            patch.setattr(rollout.Simulator, "__init__", shared)
         yield

@@ -21,6 +21,8 @@ PROJECT_FILE = "project.toml"
 CONFIG_FILE = "config.toml"
 STATE_DIR = ".r2s2r"
 """What r2s2r keeps for itself: the write lock, compiled code. May be deleted while nothing runs."""
+SHARED_CACHE = "R2S2R_CACHE"
+"""Environment variable: where compiled code is kept instead, for all projects."""
 MAX_ITERATION = 9999
 """The largest number that an iteration has."""
 ITERATIONS = "iterations"
@@ -88,8 +90,11 @@ class Project:
 
     @property
     def cache(self) -> Path:
-        """Compiled steps of the engine, kept between commands; made again where they are missing."""
-        return self.root / STATE_DIR / "cache"
+        """Compiled steps of the engine, kept between commands; made again where they are missing. Many projects of one
+        machine need not compile the same each for itself: the environment variable R2S2R_CACHE names a folder of all.
+        """
+        shared = os.environ.get(SHARED_CACHE)
+        return Path(shared).expanduser().absolute() if shared else self.root / STATE_DIR / "cache"
 
     def iterations(self) -> list[Iteration]:
         """All iterations, in order."""

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from r2s2r_cli.errors import ArtifactError
-from r2s2r_cli.store.project import PROJECT_FILE, Project, iteration_number
+from r2s2r_cli.store.project import PROJECT_FILE, SHARED_CACHE, Project, iteration_number
 
 NEW = "r2s2r init myrobot && cd myrobot"
 
@@ -47,3 +47,20 @@ def test_a_project_that_was_named_is_not_looked_for_elsewhere(tmp_path: Path) ->
 def test_a_folder_has_the_number_that_it_is_called_by(name: str, number: int | None) -> None:
     """Digits that are no number, as Python has some, are none."""
     assert iteration_number(Path(name)) == number
+
+
+def test_projects_share_the_folder_of_compiled_code_that_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """R2S2R_CACHE is one folder for all of them, wherever a command is run; without it each keeps its own."""
+    roots = [tmp_path / "one", tmp_path / "two"]
+    for root in roots:
+        root.mkdir()
+        (root / PROJECT_FILE).write_text('schema_version = 1\nname = "threebar"\n')
+    monkeypatch.delenv(SHARED_CACHE, raising=False)
+    own = [Project.find(root).cache for root in roots]
+    assert all(cache.is_relative_to(root) for cache, root in zip(own, roots, strict=True))
+    monkeypatch.setenv(SHARED_CACHE, str(tmp_path / "all"))
+    assert [Project.find(root).cache for root in roots] == [tmp_path / "all"] * 2
+    monkeypatch.setenv(SHARED_CACHE, "")
+    assert [Project.find(root).cache for root in roots] == own

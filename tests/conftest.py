@@ -53,9 +53,9 @@ def real_dir() -> Path:
 
 @pytest.fixture(scope="session", autouse=True)
 def kernels(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """All projects of this session, and simulators that keep their machine code nowhere, find and leave it in one folder,
-    for all workers and for the commands that tests start: the same kernel is compiled once, not in every project. CI
-    names one for all its steps."""
+    """All projects of this session, and simulators that keep their machine code nowhere, find and leave it in one
+    folder, for all workers and for the commands that tests start: the same kernel is compiled once, not in every
+    project. CI names one for all its steps."""
     base = tmp_path_factory.getbasetemp()
     folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "kernels"
     folder = Path(os.environ.get(SHARED_CACHE) or folder)

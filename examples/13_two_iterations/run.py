@@ -48,8 +48,8 @@ MANY_DRAWS = {**SHORT, "plan": {**SHORT["plan"], "draws": 16}}
 class Profile:
     """How much is done. targets: of the random policy of iteration 1; policies: executed in iteration 1, and those of
     iteration 2, which are others so that nothing learned from them; repeats: of every policy, they make the floor;
-    settings: of project.toml, by stage; draw: pictures and pages of every stage; worlds: of a seed, the number from which
-    worlds are drawn, where those before it are known to be none."""
+    settings: of project.toml, by stage; draw: pictures and pages of every stage; worlds: the first number of a world of
+    a seed, where those before it are known to be none."""
 
     targets: int = 14
     policies: tuple[tuple[str, ...], tuple[str, ...]] = (

@@ -36,6 +36,9 @@ class EffectParameter:
     start: float | None = None
     """Where a fit begins that is told no value: beside off, where other numbers do nothing while this one is off. None:
     at off, or as near as bounds let it."""
+    only_shape: bool = False
+    """Whether it says only where or how (a place, a width, a time constant beside a strength), and nothing while the
+    others are off: it is looked for together with them, and the effect is off whatever it is."""
     tried: tuple[float, ...] = ()
     """Values beside off and scale where it is looked for: those of what happens all at once."""
 

@@ -36,7 +36,7 @@ class FrictionAnisotropy(Effect):
     own = (
         EffectParameter("ratio", "1", 0.5, 2.0, off=1.0, scale=0.3, start=1.15,
                         what="grip along the axis over grip across it"),
-        EffectParameter("angle_rad", "rad", -1.6, 1.6, off=0.0, scale=math.pi / 4,
+        EffectParameter("angle_rad", "rad", -1.6, 1.6, off=0.0, scale=math.pi / 4, only_shape=True,
                         what="of the axis, from the world's x towards its y"),
     )  # fmt: skip
     look_alikes = ("ground_slope", "friction_field")

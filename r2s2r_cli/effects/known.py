@@ -46,6 +46,9 @@ def loaded(entry: EntryPoint) -> Effect:
         raise _bad(entry, "not an effect", "a subclass of r2s2r_cli.effects.Effect", type(effect).__name__)
     if effect.name != entry.name:
         raise _bad(entry, "the effect has another id than its entry point", entry.name, effect.name)
+    if effect.own and all(one.only_shape for one in effect.own):
+        raise _bad(entry, "every number of the effect is only_shape", "a number that does something by itself",
+                   ", ".join(one.name for one in effect.own))  # fmt: skip
     return effect
 
 

@@ -33,9 +33,12 @@ class Obstacle(Effect):
     title = "a ridge in the floor"
     own = (
         EffectParameter("height_m", "m", 0.0, 0.02, off=0.0, scale=0.004, what="of the ridge"),
-        EffectParameter("ridge_distance_m", "m", -2.0, 2.0, off=0.0, scale=0.3, what="of its line from the origin"),
-        EffectParameter("ridge_angle_rad", "rad", -3.2, 3.2, off=0.0, scale=0.8, what="of the line's normal from x"),
-        EffectParameter("ridge_width_m", "m", 0.01, 0.1, off=0.03, scale=0.02, what="from its line to its steepest"),
+        EffectParameter("ridge_distance_m", "m", -2.0, 2.0, off=0.0, scale=0.3, only_shape=True,
+                        what="of its line from the origin"),
+        EffectParameter("ridge_angle_rad", "rad", -3.2, 3.2, off=0.0, scale=0.8, only_shape=True,
+                        what="of the line's normal from x"),
+        EffectParameter("ridge_width_m", "m", 0.01, 0.1, off=0.03, scale=0.02, only_shape=True,
+                        what="from its line to its steepest"),
     )  # fmt: skip
     look_alikes = ("friction_field", "ground_slope")
 

@@ -24,7 +24,7 @@ class Payload(Effect):
     title = "payload on a rod"
     own = (
         EffectParameter("mass_kg", "kg", 0.0, 0.08, off=0.0, scale=0.03, what="of the payload", per="rod"),
-        EffectParameter("place_m", "m", -0.16, 0.16, off=0.0, scale=0.08,
+        EffectParameter("place_m", "m", -0.16, 0.16, off=0.0, scale=0.08, only_shape=True,
                         what="along the rod from its centre of mass", per="rod"),
     )  # fmt: skip
     look_alikes = ("com_offset", "cap_friction")

@@ -30,8 +30,10 @@ class SensorSaturation(Effect):
                         per="sensor"),
         EffectParameter("bottom_share", "1", 0.0, 1.0, off=0.0, scale=0.5, what="not shown, of what is below",
                         per="sensor"),
-        EffectParameter("top_m", "m", 0.1, 0.5, off=0.17, scale=0.02, what="length at the top of the range"),
-        EffectParameter("bottom_m", "m", 0.02, 0.3, off=0.13, scale=0.02, what="length at the bottom of the range"),
+        EffectParameter("top_m", "m", 0.1, 0.5, off=0.17, scale=0.02, only_shape=True,
+                        what="length at the top of the range"),
+        EffectParameter("bottom_m", "m", 0.02, 0.3, off=0.13, scale=0.02, only_shape=True,
+                        what="length at the bottom of the range"),
     )  # fmt: skip
     look_alikes = ("sensor_gain", "sensor_bias", "motor_dead_zone")
 

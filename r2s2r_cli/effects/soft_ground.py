@@ -31,7 +31,9 @@ class SoftGround(Effect):
     title = "soft ground"
     own = (
         EffectParameter("compliance_m_per_n", "m/N", 0.0, 0.004, off=0.0, scale=0.001, what="depth per force"),
-        EffectParameter("tau_s", "s", 0.0, 0.2, off=0.02, scale=0.03, what="time constant of giving way"),
+        EffectParameter(
+            "tau_s", "s", 0.0, 0.2, off=0.02, scale=0.03, only_shape=True, what="time constant of giving way"
+        ),
         EffectParameter(
             "creep_m_per_ns",
             "m/(N s)",

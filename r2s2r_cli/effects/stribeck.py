@@ -26,13 +26,11 @@ class Stribeck(Effect):
     channel = Channel.CONTACT
     title = "static and kinetic friction"
     own = (
-        EffectParameter(
-            "static_factor", "1", 1.0, 1.6, off=1.0, scale=0.2, what="friction at rest over that of a slip"
-        ),
-        EffectParameter(
-            "speed_m_per_s", "m/s", 0.002, 0.2, off=0.02, scale=0.02, what="of slip, where 1/e of the excess is left"
-        ),
-    )
+        EffectParameter("static_factor", "1", 1.0, 1.6, off=1.0, scale=0.2,
+                        what="friction at rest over that of a slip"),
+        EffectParameter("speed_m_per_s", "m/s", 0.002, 0.2, off=0.02, scale=0.02, only_shape=True,
+                        what="of slip, where 1/e of the excess is left"),
+    )  # fmt: skip
     look_alikes = ("friction_field", "viscous_contact", "air_drag")
 
     @classmethod

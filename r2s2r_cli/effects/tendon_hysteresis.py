@@ -32,8 +32,9 @@ class TendonHysteresis(Effect):
     title = "inner friction of the tendons"
     own = (
         EffectParameter("force_n", "N", 0.0, 3.0, off=0.0, scale=0.5, what="largest friction of a tendon"),
-        EffectParameter("length_m", "m", 0.001, 0.03, off=0.004, scale=0.003, what="over which the friction builds up"),
-    )
+        EffectParameter("length_m", "m", 0.001, 0.03, off=0.004, scale=0.003, only_shape=True,
+                        what="over which the friction builds up"),
+    )  # fmt: skip
     look_alikes = ("tendon_relaxation", "backlash", "capstan_friction")
 
     @classmethod

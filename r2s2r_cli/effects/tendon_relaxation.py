@@ -30,7 +30,9 @@ class TendonRelaxation(Effect):
     title = "viscoelastic relaxation of the tendons"
     own = (
         EffectParameter("share", "1", 0.0, 1.0, off=0.0, scale=0.15, what="of the stiffness, which relaxes"),
-        EffectParameter("tau_s", "s", 0.1, 30.0, off=3.0, scale=3.0, what="time constant of the relaxation"),
+        EffectParameter(
+            "tau_s", "s", 0.1, 30.0, off=3.0, scale=3.0, only_shape=True, what="time constant of the relaxation"
+        ),
     )
     look_alikes = ("tendon_stiffness", "battery_sag")
 

@@ -29,9 +29,9 @@ class TetherDrag(Effect):
     title = "drag of a tether"
     own = (
         EffectParameter("force_n", "N", 0.0, 0.5, off=0.0, scale=0.15, what="of the tether", per="rod"),
-        EffectParameter("anchor_x_m", "m", -3.0, 3.0, off=1.0, scale=1.0, what="of the anchor"),
-        EffectParameter("anchor_y_m", "m", -3.0, 3.0, off=0.0, scale=1.0, what="of the anchor"),
-        EffectParameter("anchor_z_m", "m", 0.0, 3.0, off=0.5, scale=0.5, what="of the anchor"),
+        EffectParameter("anchor_x_m", "m", -3.0, 3.0, off=1.0, scale=1.0, only_shape=True, what="of the anchor"),
+        EffectParameter("anchor_y_m", "m", -3.0, 3.0, off=0.0, scale=1.0, only_shape=True, what="of the anchor"),
+        EffectParameter("anchor_z_m", "m", 0.0, 3.0, off=0.5, scale=0.5, only_shape=True, what="of the anchor"),
     )
     look_alikes = ("ground_slope",)
 

@@ -239,6 +239,7 @@ def test_it_says_what_it_is(effect: Effect) -> None:
     assert effect.signature()
     assert effect.name
     assert set(effect.look_alikes) < {*DESIGN, *SECOND} - {effect.name}
+    assert not all(parameter.only_shape for parameter in effect.own)
     for parameter in effect.own:
         assert parameter.lower <= parameter.off <= parameter.upper
         assert all(float(f"{bound:.4g}") == bound for bound in (parameter.lower, parameter.upper))  # as they are typed

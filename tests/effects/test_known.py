@@ -8,6 +8,7 @@ from dataclasses import replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
@@ -17,6 +18,7 @@ from r2s2r_cli.effects.words import page
 from r2s2r_cli.engine.errors import EngineInputError
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.installed import GROUP
+from r2s2r_cli.stages.diagnose.which.candidates import candidates
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.effects import all_effects
 from r2s2r_cli.stages.identified import nominal
@@ -80,6 +82,29 @@ def test_the_guides_example_is_an_effect_like_any_other(install: Install) -> Non
     assert torch.equal(plain.v_WB[0], after)
 
 
+@pytest.mark.parametrize("flag", [", only_shape=True", ""])
+def test_a_number_that_only_says_how_is_tried_with_a_size(install: Install, flag: str) -> None:
+    """Whatever it is called: as it says of itself. A direction that does nothing without a force is never tried without
+    one, goes to both sides beside it, and stays where half the force is taken; one that does is tried by itself."""
+    made = turned_wind(f', what="from x"{flag}')
+    install(made, f"side_wind = wind_with_{'shape' if flag else 'sizes'}:SideWind")
+    (one,) = candidates(Model(nominal(threebar()), ("side_wind",)))
+    force, angle = one.tries.T
+    assert one.shape.tolist() == [False, bool(flag)]
+    assert np.all(force != 0) == bool(flag)
+    assert {-0.5, 0.0, 0.5} == set(angle[force > 0])
+    assert one.share(np.array([0.2, 0.4]), 0.5).tolist() == [0.1, 0.4 if flag else 0.2]
+
+
+def turned_wind(rest: str) -> str:
+    """The guide's wind with a second number, its direction."""
+    own = 'what="of the wind, on the whole robot"),'
+    assert own in example()
+    return example().replace(
+        own, f'{own} EffectParameter("angle_rad", "rad", -1.6, 1.6, off=0.0, scale=0.5{rest}),'
+    ).replace("[pull, 0.0 * pull,", '[pull * torch.cos(x["angle_rad"]), pull * torch.sin(x["angle_rad"]),')  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("source", "entry", "what"),
     [
@@ -87,6 +112,7 @@ def test_the_guides_example_is_an_effect_like_any_other(install: Install) -> Non
         ("SideWind = 3", "side_wind = bad_two:SideWind", "not an effect"),
         (None, "storm = bad_three:SideWind", "another id"),
         (None, "payload = bad_four:SideWind", "there already"),
+        (None, "side_wind = bad_five:SideWind", "only_shape"),
     ],
 )
 def test_a_wrong_package_is_named(install: Install, source: str | None, entry: str, what: str) -> None:
@@ -94,6 +120,8 @@ def test_a_wrong_package_is_named(install: Install, source: str | None, entry: s
     text = example() if source is None else source
     if entry.startswith("payload"):
         text = text.replace('name = "side_wind"', 'name = "payload"')
+    if what == "only_shape":
+        text = text.replace("scale=0.1,", "scale=0.1, only_shape=True,")
     install(text, entry)
     with pytest.raises(InputError, match=what) as caught:
         all_effects()

@@ -25,6 +25,10 @@ SAME_AS_NUISANCE = ("motor_speed_mismatch", "cap_friction", "tendon_stiffness", 
 """Effects that are a nuisance where all elements have them alike."""
 PASSIVE_ONLY = ("tendon_set",)
 """Effects that a winch makes up for: nobody sees what the rest length of a winched cable is off by."""
+PATCH = {"patch_x_m", "patch_y_m"}
+LINE = {"ridge_distance_m", "ridge_angle_rad"}
+ANCHOR = {"anchor_x_m", "anchor_y_m"}
+"""Numbers that together say where on the floor an effect sits."""
 PARTS = {
     "friction_field": (("gradient_x_per_m", "gradient_y_per_m"),
                        ("patch_factor", "patch_x_m", "patch_y_m", "patch_radius_m")),
@@ -133,7 +137,8 @@ def _candidate(
         np.array([getattr(n, key) for n in numbers]) for key in ("off", "lower", "upper", "scale")
     )
     origin = off if values is None else values[[places[0] for places in spread]]
-    tries = _tries(keys, origin, scale, touched)
+    shape = np.array([n.only_shape for n in numbers])
+    tries = _tries(keys, shape, origin, scale, touched)
     for k, number in enumerate(numbers):
         tries += [np.where(np.arange(len(origin)) == k, value, origin) for value in number.tried]
     known = {name.split(".", 1)[1]: k for k, name in enumerate(names)}
@@ -146,16 +151,15 @@ def _candidate(
     return Candidate(
         effect=effect.name, channel=str(effect.channel), element=element, spread=spread, names=names,  # type: ignore[attr-defined]
         units=tuple(n.unit for n in numbers), off=off, lower=lower, upper=upper, scale=scale,
-        tries=_distinct(tries, [k for k, key in enumerate(keys) if not _only_shape(key, keys)], origin, lower, upper,
-                        scale),
-        shape=np.array([_only_shape(key, keys) for key in keys]), origin=origin,
+        tries=_distinct(tries, ~shape, origin, lower, upper, scale), shape=shape, origin=origin,
     )  # fmt: skip
 
 
-def _tries(keys: Sequence[str], origin: np.ndarray, scale: np.ndarray, touched: np.ndarray) -> list[np.ndarray]:
+def _tries(
+    keys: Sequence[str], only_shape: np.ndarray, origin: np.ndarray, scale: np.ndarray, touched: np.ndarray
+) -> list[np.ndarray]:
     """Sizes: the numbers that do something alone, to both sides; with them, those that only say where or how."""
-    shape = [k for k, key in enumerate(keys) if _only_shape(key, keys)]
-    sizes = [k for k in range(len(keys)) if k not in shape]
+    shape, sizes = np.flatnonzero(only_shape), np.flatnonzero(~only_shape)
     axes = np.eye(len(origin))
     rows = [origin + sign * STEP * scale * axes[k] for k in sizes for sign in (1.0, -1.0)]
     if 1 < len(sizes) <= 3:
@@ -164,41 +168,35 @@ def _tries(keys: Sequence[str], origin: np.ndarray, scale: np.ndarray, touched: 
             row[sizes] += np.array(signs) * scale[sizes]
             rows.append(row)
     placed: list[np.ndarray] = []
-    for row in rows if shape else ():
+    for row in rows if len(shape) else ():
         placed += _shaped(row, keys, shape, origin, scale, touched)
     return [*(() if _has_place(keys) else rows), *placed]
 
 
-def _only_shape(key: str, keys: Sequence[str]) -> bool:
-    """Numbers that say where or how something acts, and nothing while its size is off."""
-    where = key.startswith(("anchor_", "patch_x", "patch_y", "patch_radius", "ridge_"))
-    where = where or key in ("place_m", "top_m", "bottom_m")
-    return where or (key in ("tau_s", "angle_rad", "speed_m_per_s", "length_m") and len(keys) > 1)
-
-
 def _has_place(keys: Sequence[str]) -> bool:
-    return any(key.startswith(("anchor_x", "patch_x", "ridge_distance")) for key in keys)
+    """Whether it sits somewhere on the floor: tried where the robot was, and nowhere else."""
+    return any(keys_of <= set(keys) for keys_of in (PATCH, LINE, ANCHOR))
 
 
 def _shaped(
-    row: np.ndarray, keys: Sequence[str], shape: Sequence[int], off: np.ndarray, scale: np.ndarray, touched: np.ndarray
+    row: np.ndarray, keys: Sequence[str], shape: np.ndarray, off: np.ndarray, scale: np.ndarray, touched: np.ndarray
 ) -> list[np.ndarray]:
     """The size `row` at several places."""
     at = {key: k for k, key in enumerate(keys)}
     found = []
-    if "patch_x_m" in at:
+    if at.keys() >= PATCH:
         for x, y in touched:
             one = row.copy()
             one[at["patch_x_m"]], one[at["patch_y_m"]] = x, y
             found.append(one)
-    elif "ridge_distance_m" in at:
+    elif at.keys() >= LINE:
         for x, y in touched:
             for angle in np.pi * np.arange(LINES) / LINES:
                 one = row.copy()
                 one[at["ridge_distance_m"]] = x * np.cos(angle) + y * np.sin(angle)
                 one[at["ridge_angle_rad"]] = angle
                 found.append(one)
-    elif "anchor_x_m" in at:
+    elif at.keys() >= ANCHOR:
         middle = touched.mean(axis=0)
         for angle in 2 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS:
             one = row.copy()
@@ -215,7 +213,7 @@ def _shaped(
 
 
 def _distinct(
-    rows: Sequence[np.ndarray], sizes: Sequence[int], off: np.ndarray, lower: np.ndarray, upper: np.ndarray,
+    rows: Sequence[np.ndarray], sizes: np.ndarray, off: np.ndarray, lower: np.ndarray, upper: np.ndarray,
     scale: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """Within the bounds, without what is off (in all its sizes) or there already, (t, k)."""

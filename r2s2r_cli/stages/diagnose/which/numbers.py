@@ -46,7 +46,8 @@ class Number:
     """One number. kind: `factor`, the field times exp(x), `shift`, the field plus x within 0..1, `own`, of an effect,
     or `reading`, of what reads the simulated robot, which the engine does not know. field: of Parameters; index: which
     of its numbers, () for all. off: where it changes nothing. sd: of its prior as a nuisance, from what the nominal
-    model has; scale: of an effect's number, how far from off it usually is; tried: other values of it to look at."""
+    model has; scale: of an effect's number, how far from off it usually is; tried: other values of it to look at;
+    only_shape: whether it only says where or how, and nothing while others of its effect are off."""
 
     name: str
     unit: str
@@ -60,6 +61,7 @@ class Number:
     scale: float
     what: str
     tried: tuple[float, ...] = ()
+    only_shape: bool = False
 
     @property
     def within(self) -> tuple[float, float]:
@@ -110,7 +112,7 @@ class Model:
                     numerics = NUMERICS.get(effect.name, 0.0) * one.scale
                     numbers.append(
                         Number(f"{effect.name}.{one.name}{label}", one.unit, "own", f"{effect.name}.{one.name}", (i,),
-                               one.off, one.lower, one.upper, numerics, one.scale, one.what, one.tried)
+                               one.off, one.lower, one.upper, numerics, one.scale, one.what, one.tried, one.only_shape)
                     )  # fmt: skip
         self.numbers = tuple(numbers)
         self.names = tuple(number.name for number in numbers)

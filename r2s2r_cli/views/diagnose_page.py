@@ -13,6 +13,7 @@ from r2s2r_cli.views.diagnose_words import (
     HELD_OUT,
     LEFT_OUT,
     NATS,
+    NOT_OURS,
     TWO_ERRORS,
     WHY_NONE,
     loud_words,
@@ -189,7 +190,7 @@ def _how(report: DiagnoseReport, *, brief: bool) -> Iterator[list[str]]:
     yield [f"{LEFT_OUT} of the refit", f"{1e3 * report.refit_rmse_m:.1f} mm{upper}{floor}{part}"]
     yield [
         "floor",
-        f"{1e3 * report.floor_m:.1f} mm: {report.floor_from}" + ("" if report.floor_given else " (estimated)"),
+        f"{1e3 * report.floor_m:.1f} mm: {report.floor_from}{'' if report.floor_given else ' (estimated)'}; {NOT_OURS}",
     ]
     yield ["left out", report.left_out]
     yield [

@@ -39,7 +39,8 @@ def ranking_table(report: DiagnoseReport, *, brief: bool = False, asked: Sequenc
         told = f"not fitted: they promised too little{beside}; all with --json"
         rows.append([f"{len(others)} others", "", "", "-", "", f"<= {most:.2f} each", "", "", told])
     error = f"{LEFT_OUT} [mm], floor {1e3 * report.floor_m:.1f}"
-    return PageTable("what explains the gap", [*COLUMNS, error, "remarks"], rows)
+    title = f"what explains the gap, beside a floor of {1e3 * report.floor_m:.1f} mm ({report.floor_from})"
+    return PageTable(title, [*COLUMNS, error, "remarks"], rows)
 
 
 def element_words(element: ElementFound | None) -> str:

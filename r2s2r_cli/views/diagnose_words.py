@@ -36,6 +36,8 @@ TWO_ERRORS = (
     "were used for nothing before. They are of other intervals, each beside its own floor, so one may be at the floor "
     "and the other not"
 )
+NOT_OURS = "that of identify is another: repeats among its own segments"
+"""Of the floor, of which people see two for the same runs."""
 NATS = "the unit of evidence: what gains 1 nat makes the runs e = 2.7 times as likely, what gains 3 nats 20 times"
 WHY_NONE = (
     "a gain is what these runs say, before what is known beforehand. none gains nothing by definition: sets of known "

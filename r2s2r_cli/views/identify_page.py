@@ -21,6 +21,8 @@ _ALONE = "identified"
 """The simulator with the numbers found, nothing added."""
 _STRONG = 0.9
 """Parameters correlated by more cannot be told apart."""
+FLOOR_FROM = "repeats among these segments"
+"""What the floor was taken from: that of `diagnose` may be of other intervals, or of healthy runs."""
 
 
 def verdict(report: IdentifyReport) -> str:
@@ -38,7 +40,7 @@ def verdict(report: IdentifyReport) -> str:
     known = {name: b.keyframe_cap_rmse_m for name, b in held.baselines.items() if b.keyframe_cap_rmse_m is not None}
     rivals = ", ".join(f"{name} {millimetres(error)}{_of_them(name, report)}" for name, error in known.items())
     count = sum(segment.role == "test" for segment in report.segments)
-    floor = "not known" if held.floor_m is None else f"{millimetres(held.floor_m)} mm"
+    floor = "not known" if held.floor_m is None else f"{millimetres(held.floor_m)} mm ({FLOOR_FROM})"
     by = "" if held.predictor == "identified" else f" by '{held.predictor}'"
     error = f"{millimetres(held.keyframe_cap_rmse_m)} mm{spread(held.intervals.keyframe_cap_rmse_m)}"
     found = f"{error} at the key frames of {counted(count, 'segment')}{by}, floor {floor}"
@@ -122,7 +124,7 @@ def _errors(report: IdentifyReport) -> PageTable:
             key, *free = _three(one)
             free = [free[0], closed] if name == _ALONE else free
             rows.append([f"{name}, held out{_of_them(name, report)}", key, _against(name, one, report), *free])
-        rows.append(["floor", millimetres(held.floor_m), "-", "-", "-"])
+        rows.append([f"floor: {FLOOR_FROM}", millimetres(held.floor_m), "-", "-", "-"])
     return PageTable("errors of the end caps (95 % interval by bootstrap over segments)", columns, rows)
 
 

@@ -65,8 +65,10 @@ def test_a_fit_that_never_left_its_start_has_no_size() -> None:
 
 
 def test_every_error_stands_beside_its_floor() -> None:
-    """In the column's name; that of `none`, where it is of the best intervals alone, has that floor in its cell."""
+    """In the column's name, and the title says what it was taken from; that of `none`, where it is of the best
+    intervals alone, has that floor in its cell."""
     table = ranking_table(ranked(NONE, SLOW))
+    assert table.title == "what explains the gap, beside a floor of 5.0 mm (repeats)"
     assert table.columns[7] == "left-out error [mm], floor 5.0" and table.rows[0][7] == "13.2"
     part = ranked(NONE, SLOW).model_copy(update={"refit_kept": 0.75, "refit_floor_m": 0.004})
     assert [row[7] for row in ranking_table(part).rows] == ["13.2 (best 75 % of intervals, floor 4.0)", "13.4"]
@@ -114,6 +116,7 @@ def test_the_two_errors_have_two_names_and_none_is_explained() -> None:
         shrinks.columns[1].startswith("held-out error") and ["floor of held-out intervals", "5.0", ""] in shrinks.rows
     )
     assert "left-out error of the refit | 12.0 mm" in text
+    assert "floor | 5.0 mm: repeats; that of identify is another: repeats among its own segments" in text
     assert "two errors | left-out error: of fitted intervals" in text
     assert "none and unknown | a gain is what these runs say, before what is known beforehand" in text
 

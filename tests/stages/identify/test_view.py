@@ -121,7 +121,8 @@ def test_errors_stand_beside_floor_and_baselines() -> None:
     table = next(table for table in report_tables(said) if table.title.startswith("errors"))
     assert [row[0] for row in table.rows] == [
         "identified, train", "identified, held out", "nothing moves, held out", "repeat the same phase, held out",
-        "nominal, held out", "refit of two parameters, held out", "floor",
+        "nominal, held out", "refit of two parameters, held out",
+        "floor: repeats among these segments",
     ]  # fmt: skip
     assert table.rows[1][1:4] == ["8.0 (6.4 .. 10.4)", "-", "11.0"]
     assert table.rows[2][1:4] == ["48.0", "-60.0 .. -20.0, better in 1 of 1", "50.0"]
@@ -133,7 +134,11 @@ def test_the_verdict_is_about_what_was_not_fitted() -> None:
     said = report(builders.identification(repeating=True))
     text = verdict(said)
     assert "determine 2 of 4 free parameters (1 weak, 1 not identifiable)" in text
-    assert "8.0 mm (6.4 .. 10.4)" in text and "floor 5.0 mm" in text and "nothing moves 48.0" in text
+    assert (
+        "8.0 mm (6.4 .. 10.4)" in text
+        and "floor 5.0 mm (repeats among these segments)" in text
+        and "nothing moves 48.0" in text
+    )
     assert "Nothing was held out" in verdict(said.model_copy(update={"heldout": None}))
 
 

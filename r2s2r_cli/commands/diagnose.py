@@ -135,12 +135,12 @@ def diagnose(
         with resumable(checkpoint, here.relative(unfinished), again, done="simulated"):
             result, report = run.run(
                 lambda: _compute(asked, settings, checkpoint, console, draw),
-                partial(pictures, asked=asked.named, link=here.file.link) if draw else None,
+                partial(pictures, asked=asked.named, only=asked.only, link=here.file.link) if draw else None,
                 lambda said: checkpoint.clear(),
             )  # fmt: skip
     show_outcome(answer(result, report), console)
     if report is not None:
-        show(report, console, asked.named, link=here.file.link)
+        show(report, console, asked.named, only=asked.only, link=here.file.link)
 
 
 def _require_effects(names: tuple[str, ...]) -> None:

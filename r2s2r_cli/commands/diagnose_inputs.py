@@ -53,6 +53,11 @@ class Asked:
         """Effects that were named, without the word for the rest."""
         return tuple(name for name in self.effects if name != CATALOGUE)
 
+    @property
+    def only(self) -> bool:
+        """Whether no others than the named effects are looked for."""
+        return bool(self.named) and CATALOGUE not in self.effects
+
     def considered(self) -> tuple[str, ...] | None:
         """Ids of the effects to choose from; None: the catalogue. Raises InputError as `all_effects`."""
         from r2s2r_cli.stages.effects import effects_looked_for
@@ -66,7 +71,7 @@ class Asked:
         from r2s2r_cli.effects import FURTHER
 
         found = []
-        if self.named and CATALOGUE not in self.effects:
+        if self.only:
             only = ", ".join(self.named)
             found.append(f"all other effects: --effect has only {only}; --effect {CATALOGUE} adds the rest")
         if beyond := [effect.name for effect in FURTHER if effect.name in self.named]:

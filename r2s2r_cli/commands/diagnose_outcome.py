@@ -30,10 +30,15 @@ def answer(result: Any, report: DiagnoseReport | None) -> DiagnoseResult:
 
 
 def pictures(
-    data: ArtifactData, report: DiagnoseReport, asked: Sequence[str] = (), *, link: LinkSettings | None = None
+    data: ArtifactData,
+    report: DiagnoseReport,
+    asked: Sequence[str] = (),
+    *,
+    only: bool = False,
+    link: LinkSettings | None = None,
 ) -> Iterator[tuple[str, bytes]]:
-    """What lies beside the artifact: the policy to run next, pictures and the page. asked: of `--effect`. link: of the
-    project."""
+    """What lies beside the artifact: the policy to run next, pictures and the page. asked: of `--effect`; only: no
+    others were looked for. link: of the project."""
     from r2s2r_cli.views.diagnose import draw_diagnosis
     from r2s2r_cli.views.diagnose_page import diagnose_page
 
@@ -43,7 +48,7 @@ def pictures(
     for name, title, png in draw_diagnosis(data, report, asked):
         yield f"-{name}.png", png
         drawn.append((title, png))
-    yield ".html", diagnose_page(report, drawn, reached(link))
+    yield ".html", diagnose_page(report, drawn, reached(link), only=only)
 
 
 def _policy(report: DiagnoseReport) -> bytes:
@@ -65,16 +70,18 @@ def _policy(report: DiagnoseReport) -> bytes:
 
 
 def show(
-    report: DiagnoseReport, console: Console, asked: Sequence[str] = (), *, link: LinkSettings | None = None
-) -> None:
-    """The tables, the verdict, what to type next and what is warned of. asked: of `--effect`. link: of the project."""
+    report: DiagnoseReport, console: Console, asked: Sequence[str] = (), *, only: bool = False,
+    link: LinkSettings | None = None,
+) -> None:  # fmt: skip
+    """The tables, the verdict, what to type next and what is warned of. asked: of `--effect`; only: no others were
+    looked for. link: of the project."""
     from r2s2r_cli.views.diagnose_commands import diagnose_commands
     from r2s2r_cli.views.diagnose_page import diagnose_tables
     from r2s2r_cli.views.diagnose_words import loud_words, verdict_words
 
-    for table in diagnose_tables(report, brief=True, asked=asked):
+    for table in diagnose_tables(report, brief=True, asked=asked, only=only):
         console.table(table.title, table.columns, table.rows)
-    console.data(f"verdict {verdict_words(report)}")
+    console.data(f"verdict {verdict_words(report, only=only)}")
     console.data(report.sentence)
     if loud := loud_words(report):
         console.data(loud)

@@ -42,7 +42,7 @@ def effects(
         return
     rows = [[one.name + "*" * (one in FURTHER), str(one.channel), one.signature()] for one in chosen]
     console.table("effects", ["id", "channel", "what it looks like in data"], rows)
-    console.say("* only where it is named: r2s2r diagnose --effect catalogue --effect ID")
+    console.data("* looked for only where it is named: r2s2r diagnose --effect catalogue --effect ID")
     console.say("r2s2r effects ID explains one of them")
 
 

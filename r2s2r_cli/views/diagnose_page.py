@@ -15,10 +15,11 @@ from r2s2r_cli.views.diagnose_words import (
     NATS,
     NOT_OURS,
     TWO_ERRORS,
-    WHY_NONE,
     loud_words,
+    pool,
     undecided,
     verdict_words,
+    why_none,
 )
 from r2s2r_cli.views.page import Page, PageTable, Picture, counted, render
 from schemas.people import plain_name, quantity
@@ -34,10 +35,12 @@ NO_BETTER = 1.1
 """A gait that is worth less than a tenth more than the runs so far is no better than they are."""
 
 
-def diagnose_tables(report: DiagnoseReport, *, brief: bool = False, asked: Sequence[str] = ()) -> Iterator[PageTable]:
+def diagnose_tables(
+    report: DiagnoseReport, *, brief: bool = False, asked: Sequence[str] = (), only: bool = False
+) -> Iterator[PageTable]:
     """What people read first comes first. brief: for a terminal, without effects of which nothing is said and without
-    the refitted numbers. asked: effects that stand in it all the same."""
-    yield ranking_table(report, brief=brief, asked=asked)
+    the refitted numbers. asked: effects that stand in it all the same; only: no others were looked for."""
+    yield ranking_table(report, brief=brief, asked=asked, only=only)
     if report.pairs:
         alone = {one.effect: one for one in report.ranking}
         yield PageTable(
@@ -56,11 +59,14 @@ def diagnose_tables(report: DiagnoseReport, *, brief: bool = False, asked: Seque
              for a, b, nats in report.confusable],
         )  # fmt: skip
     yield PageTable("what cannot be told, and what to run next", ["what", "found"], list(_limits(report)))
-    yield PageTable("how", ["what", "found"], list(_how(report, brief=brief)))
+    yield PageTable("how", ["what", "found"], list(_how(report, brief=brief, only=only)))
 
 
-def diagnose_page(report: DiagnoseReport, pictures: Sequence[tuple[str, bytes]], robot: str = ROBOT) -> bytes:
-    """The page, self-contained. robot: how the robot is reached, in commands that are shown."""
+def diagnose_page(
+    report: DiagnoseReport, pictures: Sequence[tuple[str, bytes]], robot: str = ROBOT, *, only: bool = False
+) -> bytes:
+    """The page, self-contained. robot: how the robot is reached, in commands that are shown. only: no other effects
+    than those asked for were looked for."""
     labels = list(report.warnings)
     if report.calibrated.startswith("uncalibrated"):
         labels.insert(0, f"probabilities are {report.calibrated}")
@@ -71,8 +77,8 @@ def diagnose_page(report: DiagnoseReport, pictures: Sequence[tuple[str, bytes]],
     return render(
         Page(
             title=f"Diagnosis of {report.robot}: {report.verdict}", sentence=report.sentence,
-            notes=[*filter(None, [loud_words(report)]), f"Verdict {verdict_words(report)}"], labels=labels,
-            tables=list(diagnose_tables(report)), commands=diagnose_commands(report, robot),
+            notes=[*filter(None, [loud_words(report)]), f"Verdict {verdict_words(report, only=only)}"], labels=labels,
+            tables=list(diagnose_tables(report, only=only)), commands=diagnose_commands(report, robot),
             pictures=[Picture(title, png) for title, png in pictures],
         )
     )  # fmt: skip
@@ -183,7 +189,7 @@ def _next(one: NextGaitFound, probability: Mapping[str, float]) -> str:
     return f"{one.name}: likeliest to decide between {whom}, worth {one.nats:.1f} nats{enough}{beside}{how}"
 
 
-def _how(report: DiagnoseReport, *, brief: bool) -> Iterator[list[str]]:
+def _how(report: DiagnoseReport, *, brief: bool, only: bool) -> Iterator[list[str]]:
     upper = "" if report.refit_upper_m is None else f", upper 90 % bound {1e3 * report.refit_upper_m:.1f} mm"
     floor = "" if report.refit_floor_m is None else f"; floor {1e3 * report.refit_floor_m:.1f} mm"
     part = "" if report.refit_kept == 1.0 else f", all of the best {100 * report.refit_kept:.0f} % of the intervals"
@@ -195,11 +201,11 @@ def _how(report: DiagnoseReport, *, brief: bool) -> Iterator[list[str]]:
     yield ["left out", report.left_out]
     yield [
         "chance",
-        f"the best of the catalogue gains {report.chance_nats:.1f} nats left out by chance in one case of 20",
+        f"the best of {pool(only=only)} gains {report.chance_nats:.1f} nats left out by chance in one case of 20",
     ]
     yield ["probabilities", report.calibrated]
     yield ["nats", NATS]
-    yield ["none and unknown", WHY_NONE]
+    yield ["none and unknown", why_none(only=only)]
     yield ["two errors", TWO_ERRORS]
     if brief and report.refit:
         yield ["refit", f"{len(report.refit)} numbers: all with --json"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from r2s2r_cli.views.diagnose_words import LEFT_OUT, RIVALS
+from r2s2r_cli.views.diagnose_words import LEFT_OUT, RIVALS, pool
 from r2s2r_cli.views.page import PageTable
 from schemas.people import plain_name, read_in, rounded
 from schemas.results_diagnose import BY_CHANCE
@@ -17,7 +17,7 @@ NOWHERE = -1e8
 """[nats] Below which a gain stands for one that was not asked for, or broke off."""
 _REMARKS = {
     "none": "nothing is wrong: the refit nominal model; weighs the same in every diagnosis",
-    "unknown": "a cause that the catalogue lacks; the gain is of errors larger than the floor, its probability is not"
+    "unknown": "a cause that is none of {pool}; the gain is of errors larger than the floor, its probability is not"
     " from it (none and unknown, below)",
 }
 _NO_REPLAY = "not fitted: it changes nothing that is simulated, so the logs alone speak"
@@ -27,10 +27,13 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def ranking_table(report: DiagnoseReport, *, brief: bool = False, asked: Sequence[str] = ()) -> PageTable:
-    """Every name, most probable first. brief: those that are worth a row; the others in one."""
+def ranking_table(
+    report: DiagnoseReport, *, brief: bool = False, asked: Sequence[str] = (), only: bool = False
+) -> PageTable:
+    """Every name, most probable first. brief: those that are worth a row; the others in one. only: no others than
+    those asked for were looked for."""
     shown = worth_a_row(report, asked) if brief else list(report.ranking)
-    rows = [_ranked(one, report) for one in shown]
+    rows = [_ranked(one, report, pool(only=only)) for one in shown]
     others = [one for one in report.ranking if one not in shown]
     if others:
         most = max(one.probability for one in others)
@@ -88,8 +91,8 @@ def _own(name: str, one: RankedName) -> str:
     return plain_name(name.split(".")[1], one.units.get(name, "1"))
 
 
-def _ranked(one: RankedName, report: DiagnoseReport) -> list[str]:
-    remarks = [_REMARKS[one.effect]] if one.effect in RIVALS else []
+def _ranked(one: RankedName, report: DiagnoseReport, pool: str) -> list[str]:
+    remarks = [_REMARKS[one.effect].format(pool=pool)] if one.effect in RIVALS else []
     if not one.fitted:
         remarks.append("not fitted: it promised too little" if replayed(one) else _NO_REPLAY)
     remarks += [] if one.moved else ["never left its start, so no size"]

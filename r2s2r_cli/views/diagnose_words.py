@@ -16,14 +16,14 @@ RIVALS = ("none", "unknown")
 GUIDE = "docs/guides/diagnose.md"
 """Where verdicts are explained."""
 _MEANS = {
-    "effect": ("one effect of the catalogue is the cause", "Use what was found"),
-    "pair": ("two effects of the catalogue are the cause", "Use what was found"),
+    "effect": ("one effect of {pool} is the cause", "Use what was found"),
+    "pair": ("two effects of {pool} are the cause", "Use what was found"),
     "ambiguous": (
         "no effect is likely enough to be named, nor is it shown that there is no gap",
         "What to do after `ambiguous`",
     ),
     "no_gap": ("the refit simulator is at the floor; what is smaller may still be there", "Verdicts"),
-    "unknown": ("something is wrong that no effect of the catalogue explains", "Verdicts"),
+    "unknown": ("something is wrong that no effect of {pool} explains", "Verdicts"),
 }
 LOUD_SD = 4.0
 """Beyond which a finding of the logs is said beside a verdict that does not name it."""
@@ -39,19 +39,31 @@ TWO_ERRORS = (
 NOT_OURS = "that of identify is another: repeats among its own segments"
 """Of the floor, of which people see two for the same runs."""
 NATS = "the unit of evidence: what gains 1 nat makes the runs e = 2.7 times as likely, what gains 3 nats 20 times"
-WHY_NONE = (
+_WHY_NONE = (
     "a gain is what these runs say, before what is known beforehand. none gains nothing by definition: sets of known "
     "truth taught how much an effect must gain to be likelier. unknown has the share of causes that the catalogue "
     "lacks, whatever it gains: in calibration sets that gain did not tell such causes from others. It has more only "
     "where the best effect leaves far more than healthy runs do, or sensors are off as in no effect. So none may be "
     "likelier than unknown, which gains more"
 )
+_TOO_FEW = ". Beside the few effects that were asked for, that share of unknown is too little: they lack more causes"
 
 
-def verdict_words(report: DiagnoseReport) -> str:
-    """`ambiguous: no name is likely enough to be given (...)`: the word, its meaning, where to read on."""
+def pool(*, only: bool) -> str:
+    """What was chosen from. only: some effects that were asked for, and no others."""
+    return "those asked for" if only else "the catalogue"
+
+
+def why_none(*, only: bool) -> str:
+    """Why probabilities of `none` and `unknown` do not follow their gains. only: as in `pool`."""
+    return _WHY_NONE + (_TOO_FEW if only else "")
+
+
+def verdict_words(report: DiagnoseReport, *, only: bool = False) -> str:
+    """`ambiguous: no name is likely enough to be given (...)`: the word, its meaning, where to read on. only: as in
+    `pool`."""
     means, chapter = _MEANS[report.verdict]
-    return f"{report.verdict}: {means} ({GUIDE}, chapter {chapter})"
+    return f"{report.verdict}: {means.format(pool=pool(only=only))} ({GUIDE}, chapter {chapter})"
 
 
 def loud_words(report: DiagnoseReport) -> str:

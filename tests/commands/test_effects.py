@@ -22,8 +22,9 @@ def invoke(*words: str) -> str:
 
 
 def test_the_list_has_all() -> None:
-    """Every id, with its channel and signature, in the catalogue's order."""
+    """Every id, with its channel and signature, in the catalogue's order; what a mark means stands beneath."""
     text = invoke()
+    assert "* looked for only where it is named: r2s2r diagnose --effect catalogue --effect ID" in text
     places = [text.index(f" {effect.name}{'*' * (effect in FURTHER)} ") for effect in ALL]
     assert places == sorted(places)
     assert all(effect.signature()[:30] in text for effect in ALL)

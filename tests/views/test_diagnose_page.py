@@ -19,6 +19,21 @@ def test_the_page_says_what_was_found_and_what_it_is_worth() -> None:
     assert "http://" not in page and "https://" not in page
 
 
+def test_a_page_of_effects_that_were_asked_for_speaks_of_them() -> None:
+    """Not of a catalogue that nobody looked at, but for what is known of it: that `unknown` is told by it. With the
+    catalogue the same places say so."""
+    unknown = report().ranking[1].model_copy(update={"effect": "unknown"})
+    made = report().model_copy(update={"ranking": (*report().ranking, unknown)})
+    pages = {only: diagnose_page(made, [], only=only).decode() for only in (True, False)}
+    asked = ("Verdict effect: one effect of those asked for is the cause", "a cause that is none of those asked for",
+             "the best of those asked for gains 4.0 nats")  # fmt: skip
+    for words in asked:
+        assert words in pages[True] and words not in pages[False]
+        assert words.replace("those asked for", "the catalogue") in pages[False]
+    assert pages[True].count("catalogue") == 1 and "that share of unknown is too little" in pages[True]
+    assert "too little: they" not in pages[False]
+
+
 def test_tables_hold_the_share_beside_its_prediction_and_its_doubts() -> None:
     """Both shares, the size with its unit and interval, the bound it ended on, and who cannot be told apart."""
     text = "\n".join(" | ".join(row) for table in diagnose_tables(report()) for row in table.rows)

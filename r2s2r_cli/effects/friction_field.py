@@ -28,7 +28,9 @@ class FrictionField(Effect):
     own = (
         EffectParameter("gradient_x_per_m", "1/m", -2.0, 2.0, off=0.0, scale=0.5, what="relative, along the world's x"),
         EffectParameter("gradient_y_per_m", "1/m", -2.0, 2.0, off=0.0, scale=0.5, what="relative, along the world's y"),
-        EffectParameter("patch_factor", "1", 0.1, 2.0, off=1.0, scale=0.4, what="of the friction on the patch"),
+        EffectParameter(
+            "patch_factor", "1", 0.1, 2.0, off=1.0, scale=0.4, start=0.8, what="of the friction on the patch"
+        ),
         EffectParameter("patch_x_m", "m", -2.0, 2.0, off=0.0, scale=0.3, only_shape=True, what="centre of the patch"),
         EffectParameter("patch_y_m", "m", -2.0, 2.0, off=0.0, scale=0.3, only_shape=True, what="centre of the patch"),
         EffectParameter(

@@ -51,7 +51,8 @@ _EFFECTS = """\
 Every number of every effect in `r2s2r_cli/effects` as well: `EFFECT.PARAMETER` (`motor_lag.tau_s`), and one number an
 element where it has elements (`cap_friction.factor.3` for cap 3; `cap_friction.factor` is one number for all caps).
 Bounds and the prior's scale are those of the effect, the coordinate is linear, and the fit starts at the effect's off
-value. A free number of an effect puts the effect into the simulator.
+value; beside it where that is a bound, or other numbers would do nothing there (`friction_anisotropy.ratio`,
+`friction_field.patch_factor`). A free number of an effect puts the effect into the simulator.
 """
 _TITLES = {"robot": "Robot and ground", "log": "Log", "controller": "Controller"}
 

@@ -19,6 +19,8 @@ from r2s2r_cli.stages.model import parameters_of
 from tests.support.engine import threebar
 from tests.support.varied import varied
 
+BESIDE = {"friction_anisotropy.ratio": 1.15, "friction_field.patch_factor": 0.8}
+"""Numbers that begin beside their off values, which are no bounds."""
 ENTRIES = {
     name: entry for name, entry in entries(varied()).items() if not entry.effect or entry.element in (None, 2)
 }  # of effects one element stands for all: their numbers are made in one loop
@@ -60,12 +62,12 @@ def test_there_is_what_the_issue_asks_for() -> None:
 
 @pytest.mark.parametrize("entry", ENTRIES.values(), ids=lambda entry: entry.free.name)
 def test_a_fit_can_start(entry: Entry) -> None:
-    """Strictly inside the bounds, at the value of robot.toml where that is inside, with a prior and a sentence; only a
-    ratio beside an angle begins elsewhere."""
+    """Strictly inside the bounds, at the value of robot.toml where that is inside, with a prior and a sentence; only
+    what gives other numbers something to do begins elsewhere."""
     free = entry.free
     assert free.lower < free.start < free.upper
     inside = free.lower < entry.nominal < free.upper
-    assert (free.start == entry.nominal) == (inside and free.name != "friction_anisotropy.ratio")
+    assert (free.start == entry.nominal) == (inside and free.name not in BESIDE)
     assert free.prior_sd > 0
     assert free.what.endswith(".")
     assert math.isfinite(free.to_z(free.start))
@@ -131,13 +133,13 @@ def test_a_number_on_its_bound_starts_inside() -> None:
     assert catalogue(threebar())["motor_lag.tau_s"].start == pytest.approx(0.005)
 
 
-def test_a_fit_of_a_grain_begins_with_one() -> None:
-    """While the ratio is 1 its angle does nothing, and a number that does nothing is refused. Without a fit the effect
-    is off."""
+def test_a_fit_of_a_grain_or_a_patch_begins_with_one() -> None:
+    """While its ratio is 1 an angle, or a place, does nothing, and a number that does nothing is not found. Without a
+    fit the effect is off."""
     made = entries(varied())
-    assert made["friction_anisotropy.ratio"].free.start == 1.15
-    assert made["friction_anisotropy.ratio"].nominal == 1.0
-    assert made["friction_field.patch_factor"].free.start == 1.0
+    for name, start in BESIDE.items():
+        assert made[name].free.start == start
+        assert made[name].nominal == 1.0
 
 
 def test_unknown_effects_are_refused() -> None:

@@ -60,7 +60,7 @@ def test_every_number_does_something_where_its_fit_begins(effect: Effect, off: V
     caps = torch.cat([run.observed() for run in runs], dim=1)
     ends = tuple((cable.caps[0], cable.caps[1]) for cable in threebar().cables)
     # Lengths to both sides of any end of a sensor's range, whatever this gait reaches.
-    length = 0.7 * cap_lengths(ends, caps.detach())[:, -1], 1.2 * cap_lengths(ends, caps.detach())[:, -1]
+    length = 0.5 * cap_lengths(ends, caps.detach())[:, -1], 1.3 * cap_lengths(ends, caps.detach())[:, -1]
     read = torch.cat([sense(off.structure, theta, one, 1.0) for one in length], dim=1)
     seen = torch.cat([caps.flatten(1), read], dim=1)
     late = [mapping.observation(row) for row in rows]

@@ -24,9 +24,6 @@ from r2s2r_cli.options import (
 from r2s2r_cli.store.project import Project
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from r2s2r_cli.artifact import ArtifactData
     from r2s2r_cli.commands.identify_inputs import Asked
     from schemas.results import StageResult
     from schemas.results_identify import IdentifyReport, IdentifyResult
@@ -179,6 +176,7 @@ def _plant(asked: Asked, overrides: dict[str, Any], console: Console, dry_run: b
 
 
 def _fit(asked: Asked, overrides: dict[str, Any], console: Console, how: _Ways) -> None:
+    from r2s2r_cli.commands.identify_outcome import Outcome
     from r2s2r_cli.commands.identify_run import compute
     from r2s2r_cli.commands.outcome import show_outcome
     from r2s2r_cli.commands.stage import StageRun
@@ -202,16 +200,17 @@ def _fit(asked: Asked, overrides: dict[str, Any], console: Console, how: _Ways) 
     digests = [ref.sha256 for ref in run.inputs]
     key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
     again = ["identify", *asked.typed]
+    outcome = Outcome(place.number, asked.typed)
     checkpoint = CheckpointFile(unfinished, key, resume, again)
     with resumable(checkpoint, here.relative(unfinished), again):
         result, report = run.run(
             lambda: compute(asked, settings, checkpoint, console),
-            _draw if how.draw else None,
+            outcome.pictures if how.draw else None,
             lambda said: checkpoint.clear(),
         )
     show_outcome(_answer(result, report), console)
     if report is not None:
-        _show(report, console)
+        outcome.show(report, console)
 
 
 def _answer(result: StageResult, report: IdentifyReport | None) -> IdentifyResult:
@@ -225,26 +224,3 @@ def _answer(result: StageResult, report: IdentifyReport | None) -> IdentifyResul
         **shared, parameters=report.parameters, train=report.train, heldout=report.heldout, wall_s=report.wall_s,
         rollouts=report.rollouts,
     )  # fmt: skip
-
-
-def _draw(data: ArtifactData, report: IdentifyReport) -> Iterator[tuple[str, bytes]]:
-    from r2s2r_cli.views.identify import draw_identification
-    from r2s2r_cli.views.identify_page import identify_page
-
-    pictures = []
-    for name, title, png in draw_identification(data):
-        yield f"-{name}.png", png
-        pictures.append((title, png))
-    yield ".html", identify_page(report, data, pictures)
-
-
-def _show(report: IdentifyReport, console: Console) -> None:
-    from r2s2r_cli.views.identify_page import report_tables, verdict
-
-    for table in report_tables(report):
-        console.table(table.title, table.columns, table.rows)
-    console.data(verdict(report))
-    for text in report.warnings:
-        console.warn(text)
-    if report.computed_by == "torch":
-        console.warn("computed in plain torch, some hundred times slower: `r2s2r doctor` says what is missing")

@@ -79,15 +79,17 @@ def report_tables(report: IdentifyReport) -> Iterator[PageTable]:
     yield PageTable("how", ["what", "found"], list(_how(report)))
 
 
-def identify_page(report: IdentifyReport, data: ArtifactData, pictures: Sequence[tuple[str, bytes]]) -> bytes:
-    """The HTML page: verdict, warnings, tables and pictures; `pictures` are (title, PNG)."""
+def identify_page(
+    report: IdentifyReport, data: ArtifactData, pictures: Sequence[tuple[str, bytes]], remarks: Sequence[str] = ()
+) -> bytes:
+    """The HTML page: verdict, warnings, tables and pictures; `pictures` are (title, PNG). remarks: after warnings."""
     natures = {run: str(data.groups[f"runs/{run}"].attributes.get("nature", "")) for run in data.runs()}
     labels = [f"{run}: {nature}, not a measurement" for run, nature in natures.items() if nature in _MADE]
     return render(
         Page(
             title=f"Identification of {data.groups['fit'].attributes['robot']}",
             sentence=verdict(report),
-            labels=[*labels, *report.warnings],
+            labels=[*labels, *report.warnings, *remarks],
             tables=list(report_tables(report)),
             pictures=[Picture(title, png) for title, png in pictures],
         )

@@ -30,8 +30,7 @@ class Outcome:
         for name, title, png in draw_identification(data):
             yield f"-{name}.png", png
             drawn.append((title, png))
-        asked = self._whether_there(report)
-        yield ".html", identify_page(report, data, drawn, [] if asked is None else [": ".join(asked)])
+        yield ".html", identify_page(report, data, drawn, self._whether_there(report))
 
     def show(self, report: IdentifyReport, console: Console) -> None:
         """Tables, verdict and doubts."""

@@ -80,17 +80,22 @@ def report_tables(report: IdentifyReport) -> Iterator[PageTable]:
 
 
 def identify_page(
-    report: IdentifyReport, data: ArtifactData, pictures: Sequence[tuple[str, bytes]], remarks: Sequence[str] = ()
+    report: IdentifyReport,
+    data: ArtifactData,
+    pictures: Sequence[tuple[str, bytes]],
+    asked: tuple[str, str] | None = None,
 ) -> bytes:
-    """The HTML page: verdict, warnings, tables and pictures; `pictures` are (title, PNG). remarks: after warnings."""
+    """The HTML page: verdict, warnings, tables and pictures; `pictures` are (title, PNG). asked: a doubt that is no
+    warning of the fit, and the command that answers it."""
     natures = {run: str(data.groups[f"runs/{run}"].attributes.get("nature", "")) for run in data.runs()}
     labels = [f"{run}: {nature}, not a measurement" for run, nature in natures.items() if nature in _MADE]
     return render(
         Page(
             title=f"Identification of {data.groups['fit'].attributes['robot']}",
             sentence=verdict(report),
-            labels=[*labels, *report.warnings, *remarks],
+            labels=[*labels, *report.warnings, *([asked[0]] if asked else [])],
             tables=list(report_tables(report)),
+            commands=[("is the effect there", asked[1])] if asked else [],
             pictures=[Picture(title, png) for title, png in pictures],
         )
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -30,7 +32,6 @@ if TYPE_CHECKING:
     from r2s2r_cli.commands.simulate_inputs import Asked
     from schemas.config import SimulateSettings
     from schemas.results_simulate import SimulateReport
-    from schemas.robot import Robot
 
 
 def simulate(
@@ -107,11 +108,11 @@ def simulate(
     settings = here.config(place, overrides).simulate
     result, report = run.run(
         lambda: _compute(asked, settings, console),
-        (lambda data, said: _draw(data, here.robot(), said)) if draw else None,
+        (lambda data, said: _draw(data, asked, said)) if draw else None,
     )
     show_outcome(result, console)
     if report is not None:
-        _show(report, console)
+        _show(report, asked, console)
     if result.state == "done" and draw:
         console.say(f"open {here.relative(_page(here, place))} in a browser to look at it in three dimensions")
 
@@ -139,22 +140,41 @@ def _compute(asked: Asked, settings: SimulateSettings, console: Console) -> tupl
     return data, report
 
 
-def _draw(data: ArtifactData, robot: Robot, report: SimulateReport) -> Iterator[tuple[str, bytes]]:
+def _draw(data: ArtifactData, asked: Asked, report: SimulateReport) -> Iterator[tuple[str, bytes]]:
     from r2s2r_cli.views.simulation import draw_simulation
     from r2s2r_cli.views.simulation_page import simulation_page
 
+    robot = asked.project.robot()
     for run, png in draw_simulation(data, robot):
         yield f"-{run}.png", png
-    yield ".html", simulation_page(report, data, robot)
+    yield ".html", simulation_page(report, data, robot, asked.numbers, _unused(asked))
 
 
-def _show(report: SimulateReport, console: Console) -> None:
-    from r2s2r_cli.views.simulation_page import report_tables
+def _show(report: SimulateReport, asked: Asked, console: Console) -> None:
+    from r2s2r_cli.views.simulation_page import report_tables, said_of_numbers
 
     for table in report_tables(report):
         console.table(table.title, table.columns, table.rows)
+    console.data(said_of_numbers(asked.numbers))
     for run in report.runs:
         for text in run.warnings:
             console.warn(f"{run.run}: {text}")
     if report.computed_by == "torch":
         console.warn("computed in plain torch, some hundred times slower: `r2s2r doctor` says what is missing")
+    unused = _unused(asked)
+    if unused:
+        sentence, command = unused
+        console.data(f"{sentence}.")
+        console.hint(command)
+
+
+def _unused(asked: Asked) -> tuple[str, str] | None:
+    """That an identification was not used, and the same command with it."""
+    from r2s2r_cli.commands.typed import typed_words
+    from r2s2r_cli.views.simulation_page import said_of_unused
+
+    path = asked.unused
+    if path is None:
+        return None
+    command = shlex.join(["r2s2r", *typed_words("simulate"), "--model", os.path.relpath(path)])
+    return said_of_unused(asked.project.relative(path)), command

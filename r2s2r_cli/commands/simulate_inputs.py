@@ -103,6 +103,19 @@ class Asked:
         found = read_numbers(self.project, self.model)
         return identified(found, self.project.robot(), words=self.project.relative(self.model))
 
+    @property
+    def numbers(self) -> str:
+        """Where the numbers of the simulator come from."""
+        return "robot.toml" if self.model is None else self.project.relative(self.model)
+
+    @property
+    def unused(self) -> Path | None:
+        """The identification of the iteration, or else of the last one before it, where none was asked for; None: there
+        is none."""
+        places = [one for one in self.project.iterations() if one.number <= self.iteration.number]
+        found = (one.artifact("identification") for one in reversed(places))
+        return next((path for path in found if path.exists()), None) if self.model is None else None
+
     def requests(self) -> list[Request]:
         """The runs to simulate, in the order of the command line. Raises InputError, UsageError."""
         from r2s2r_cli.stages.simulate import Request

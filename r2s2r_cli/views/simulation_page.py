@@ -27,14 +27,30 @@ def report_tables(report: SimulateReport) -> Iterator[PageTable]:
                     [[run.run, _slack(run)] for run in report.runs])  # fmt: skip
 
 
-def simulation_page(report: SimulateReport, data: ArtifactData, robot: Robot) -> bytes:
-    """The HTML page of a simulation: the player, the tables, the warnings."""
+def said_of_numbers(numbers: str) -> str:
+    """Whose numbers the simulator has. numbers: `robot.toml`, or the path of an identification."""
+    return f"Simulated with the numbers of {numbers}."
+
+
+def said_of_unused(identification: str) -> str:
+    """That there is an identification, whose numbers are not those that were simulated."""
+    return f"{identification} is there and was not used: without --model nothing that was identified counts"
+
+
+def simulation_page(
+    report: SimulateReport, data: ArtifactData, robot: Robot, numbers: str, unused: tuple[str, str] | None = None
+) -> bytes:
+    """The HTML page of a simulation: the player, the tables, the warnings. numbers: as `said_of_numbers`. unused: that
+    an identification was not used, and the command that uses it."""
     seconds = sum(run.duration_s for run in report.runs)
+    what = f"{counted(len(report.runs), 'run')}, {seconds:.1f} s of the robot, simulated: not a measurement."
+    warnings = [f"{run.run}: {text}" for run in report.runs for text in run.warnings]
     page = Page(
         title=f"Simulation of {robot.title}",
-        sentence=f"{counted(len(report.runs), 'run')}, {seconds:.1f} s of the robot, simulated: not a measurement.",
-        labels=[f"{run.run}: {text}" for run in report.runs for text in run.warnings],
+        sentence=f"{what} {said_of_numbers(numbers)}",
+        labels=[*([unused[0]] if unused else []), *warnings],
         tables=list(report_tables(report)),
+        commands=[("with what was identified", unused[1])] if unused else [],
     )
     return playback_page(page, data, robot)
 

@@ -9,14 +9,17 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 
+from r2s2r_cli.commands.simulate_inputs import Asked
 from r2s2r_cli.store.header import read_header
-from r2s2r_cli.store.project import SHARED_CACHE
+from r2s2r_cli.store.project import SHARED_CACHE, Project
 from r2s2r_cli.store.read import read_artifact
+from schemas.config import ProjectFile
 from tests.commands.conftest import document, invoke
 
 SIMULATION = "iterations/001/simulation.h5"
@@ -126,6 +129,37 @@ def test_several_runs_in_one_call(simulated: Path) -> None:
     assert invoke("validate", SIMULATION).exit_code == 0
     again = json.loads(invoke("status", "--json").stdout)["artifacts"][-1]
     assert again["state"] == "fresh"
+
+
+def test_whose_numbers_were_simulated_is_said(simulated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Terminal and page; of an identification that is there and was not used both say so, with the command that uses
+    it."""
+    typed = ["simulate", "policies/bend.toml", "--force"]
+    monkeypatch.setattr(sys, "argv", ["r2s2r", *typed])
+    alone = invoke(*typed)
+    assert "Simulated with the numbers of robot.toml." in alone.stdout and "was not used" not in alone.stdout
+    (simulated / "iterations/001/30-identify.h5").write_bytes(b"whatever it holds")
+    beside = invoke(*typed)
+    assert "iterations/001/30-identify.h5 is there and was not used" in beside.stdout
+    command = f"r2s2r {' '.join(typed)} --model iterations/001/30-identify.h5"
+    assert f"hint: {command}" in beside.stderr
+    page = (simulated / SIMULATION).with_suffix(".html").read_text()
+    assert "numbers of robot.toml" in page and "was not used" in page and command in page
+
+
+def test_the_numbers_of_an_identification_are_named_by_its_path(tmp_path: Path) -> None:
+    """From wherever it was named; of the last iteration that has one where this one has none; nothing is unused
+    then."""
+    place = Project(tmp_path, ProjectFile(schema_version=1, name="p", robot="robot.toml"))
+    for number in (1, 2, 3):
+        (tmp_path / "iterations" / f"{number:03d}").mkdir(parents=True)
+    path = tmp_path / "iterations" / "001" / "30-identify.h5"
+    path.touch()
+    (tmp_path / "iterations" / "003" / "30-identify.h5").touch()
+    asked = Asked(place, place.iteration(2), (), 1, 0, (), None)
+    assert (asked.numbers, asked.unused) == ("robot.toml", path)
+    named = replace(asked, model=path)
+    assert (named.numbers, named.unused) == ("iterations/001/30-identify.h5", None)
 
 
 def test_a_policy_may_start_where_a_run_started(simulated: Path) -> None:

@@ -28,8 +28,8 @@ from r2s2r_cli.checks.base import Check
 CHECKS: tuple[Check, ...] = (
     files.file_opens, files.values_allowed, files.version_known, files.content_intact, files.bytes_intact,
     schema.layout_matches, schema.values_finite, schema.codes_known, schema.text_readable, schema.images_begin_right,
-    links.head_matches_body, links.inputs_match, links.source_unchanged, links.robot_is_the_projects,
-    links.stage_not_newer, links.name_fits_kind, links.recordings_sealed,
+    links.head_matches_body, links.inputs_match, links.plan_is_the_executed, links.source_unchanged,
+    links.robot_is_the_projects, links.stage_not_newer, links.name_fits_kind, links.recordings_sealed,
     stamps.time_increases, stamps.kept_frames_apart, stamps.samples_ordered, stamps.source_frames_increase,
     geometry.counts_match_robot, geometry.kept_frames_observed, geometry.rod_length_is_the_robots,
     geometry.rods_keep_their_length, geometry.cable_lengths_in_limits, geometry.caps_above_ground,

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from r2s2r_cli.checks.base import Found, check
 from r2s2r_cli.checks.subjects import Journals, Links
 from r2s2r_cli.errors import UPDATE_CLONE, quoted
+from r2s2r_cli.measured import CONTENT, MEASURED, changed
 from schemas.versions import KINDS
 
 _IN_BODY = {"kind", "schema_version", "title", "created_by", "content_sha256", "seal_sha256"}
@@ -43,7 +44,8 @@ def head_matches_body(links: Links) -> Iterator[Found]:
     fix="r2s2r status",
 )
 def inputs_match(links: Links) -> Iterator[Found]:
-    """Input artifacts that are gone or hold something else."""
+    """Input artifacts that are gone, or hold something else than what was computed from them."""
+    made = links.header.provenance.stage
     for state in links.inputs:
         ref = state.ref
         if ref.kind not in KINDS:
@@ -52,9 +54,26 @@ def inputs_match(links: Links) -> Iterator[Found]:
             yield Found(
                 "provenance/inputs", "an artifact that it was made from cannot be read", ref.path, state.problem
             )
-        elif state.sha256 != ref.sha256:
-            yield Found("provenance/inputs", f"{ref.path} has another content than when this was made from it",
-                        ref.sha256[:16], state.sha256[:16])  # fmt: skip
+        elif state.sha256 != ref.sha256 and made not in MEASURED:
+            yield Found("provenance/inputs", changed(ref.path, made, CONTENT), f"sha256 {ref.sha256[:16]}, as it was",
+                        f"sha256 {state.sha256[:16]}")  # fmt: skip
+
+
+@check(
+    "warning",
+    Links,
+    what="what a robot executed is of the plan that is there now",
+    why="the runs are what the robot did, and stay so; but they are not runs of the present plan",
+    fix="r2s2r status",
+)
+def plan_is_the_executed(links: Links) -> Iterator[Found]:
+    """Measurements whose plan, or what it was made from, was made anew since."""
+    made = links.header.provenance.stage
+    for state in links.inputs if made in MEASURED else ():
+        ref = state.ref
+        if ref.kind in KINDS and state.sha256 is not None and state.sha256 != ref.sha256:
+            yield Found("provenance/inputs", changed(ref.path, made, CONTENT), f"sha256 {ref.sha256[:16]}, as it was",
+                        f"sha256 {state.sha256[:16]}")  # fmt: skip
 
 
 @check(

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from r2s2r_cli.errors import R2S2RError
-from r2s2r_cli.store.again import BARE, MEASURED, command_again
+from r2s2r_cli.measured import MEASURED
+from r2s2r_cli.store.again import BARE, command_again
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.staleness import input_reasons

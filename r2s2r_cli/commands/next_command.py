@@ -55,7 +55,7 @@ def explained(project: Project) -> str:
 
 def _moved_by_us(project: Project) -> bool:
     """Whether any run of the project was recorded here: a robot can be asked for more, a log cannot."""
-    from r2s2r_cli.commands.wanted import MEASURED
+    from r2s2r_cli.measured import MEASURED
 
     places = project.iterations()
     found = [place.artifact("recording", executed=executed) for place in places for executed in (False, True)]

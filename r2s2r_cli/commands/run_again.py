@@ -9,7 +9,8 @@ from pathlib import Path
 
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import R2S2RError, quoted
-from r2s2r_cli.store.again import MEASURED, command_again
+from r2s2r_cli.measured import MEASURED
+from r2s2r_cli.store.again import command_again
 from r2s2r_cli.store.from_here import project_option
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project

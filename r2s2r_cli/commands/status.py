@@ -16,6 +16,7 @@ from r2s2r_cli.commands.next_command import explained, forward
 from r2s2r_cli.commands.unfinished import UNDER_WAY, Kept, checkpoints, interrupted, unsealed
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError, GateError
+from r2s2r_cli.measured import MEASURED, itself_stale
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from r2s2r_cli.store.again import stage_at
 from r2s2r_cli.store.brief import brief
@@ -163,8 +164,9 @@ def _state(
         state, why, mend = "damaged", [error.what], Mending(_mends(error, path, name))
     else:
         own, upstream = _reasons(project, iteration, header, stale)
-        # Stale through an input alone: made from the same input again it would be the same.
-        mend = mending(project, header, path, own) if own else Mending()
+        # Stale through an input alone: made from the same input again it would be the same. And of a measurement under
+        # an older plan nothing is to be mended.
+        mend = mending(project, header, path, own) if own and header.provenance.stage not in MEASURED else Mending()
         why = own + ([mend.why_not] if mend.why_not else []) + upstream
         state = "stale" if why else "fresh"
     if state != "fresh":
@@ -219,7 +221,7 @@ def _reasons(
     from r2s2r_cli.commands.freshness import own_reasons
 
     upstream = [ref.path for ref in header.provenance.inputs if ref.path in stale]
-    return own_reasons(project, iteration, header), [f"input {path} is stale itself" for path in upstream]
+    return own_reasons(project, iteration, header), [itself_stale(path, header.provenance.stage) for path in upstream]
 
 
 def _remarks(state: ArtifactState) -> str:
@@ -229,8 +231,6 @@ def _remarks(state: ArtifactState) -> str:
 
 def _notes(made: Provenance | None) -> tuple[str, ...]:
     """Runs of a recording that ended before their last target. They are measurements: nothing is stale by it."""
-    from r2s2r_cli.commands.wanted import MEASURED
-
     runs = made.report.get("runs", ()) if made is not None and made.stage in MEASURED else ()
     return tuple(
         f"{run['run']} ended at target {run['targets_done'] + 1} of {run['targets']}: {run['ended']}"

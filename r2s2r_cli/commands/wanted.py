@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.installed import installed_words
-from r2s2r_cli.store.again import MEASURED
+from r2s2r_cli.measured import MEASURED
 from r2s2r_cli.store.project import Iteration, Project
 from r2s2r_cli.store.staleness import BORROWED, Wanted
 from schemas.header import Provenance

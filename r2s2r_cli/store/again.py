@@ -44,9 +44,6 @@ GIVEN = "given"
 """Name of a flag: which of those were typed. The others are selected anew; all count as typed where an artifact is from
 before this was noted."""
 
-MEASURED = ("record", "execute")
-"""Stages whose artifacts are measurements: to make one again a robot must move."""
-
 BARE = {"estimate": "estimate", "identification": "identify", "plan": "plan", "comparison": "compare",
         "diagnosis": "diagnose", "floor": "floor"}  # fmt: skip
 """Stages that need no argument, by what they make: theirs is made by their name alone."""

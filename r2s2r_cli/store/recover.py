@@ -12,7 +12,8 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from r2s2r_cli.errors import ArtifactError, quoted
-from r2s2r_cli.store.again import MEASURED, command_again, command_at
+from r2s2r_cli.measured import MEASURED
+from r2s2r_cli.store.again import command_again, command_at
 from r2s2r_cli.store.atomic import keep_beside, replacing
 from r2s2r_cli.store.header import NotAnArtifact, block, body_sha256, read_header, sealed_header, unreadable
 from r2s2r_cli.store.imported import look_at

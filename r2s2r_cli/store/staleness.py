@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from r2s2r_cli.errors import InputError, R2S2RError
+from r2s2r_cli.measured import BYTES, CONTENT, changed
 from r2s2r_cli.store.canonical import source_sha256
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
@@ -45,12 +46,12 @@ def reasons(project: Project, header: Header, wanted: Wanted) -> list[str]:
     found += [f"setting {made.stage}.{text}" for text in differences(made.settings, settings)]
     found += [f"robot.toml: {text}" for text in differences(made.robot, wanted.robot)]
     for ref in made.inputs:
-        found += input_reasons(project, ref)
+        found += input_reasons(project, ref, made.stage)
     return found
 
 
-def input_reasons(project: Project, ref: InputRef) -> list[str]:
-    """Why one recorded input no longer matches.
+def input_reasons(project: Project, ref: InputRef, stage: str = "") -> list[str]:
+    """Why one recorded input no longer matches. stage: that made the artifact.
 
     A migration of an input changes its form, not what it says. A source file may be gone: what was made of it stays.
     """
@@ -61,12 +62,12 @@ def input_reasons(project: Project, ref: InputRef) -> list[str]:
         except R2S2RError as error:
             return [f"input {ref.path}: {error.what}"]
         forms = {header.content_sha256, *(note.content_sha256 for note in header.provenance.migrations)}
-        return [] if ref.sha256 in forms else [f"input {ref.path} changed: its content hash is another"]
+        return [] if ref.sha256 in forms else [changed(ref.path, stage, CONTENT)]
     try:
-        changed = path.exists() and source_sha256(path) != ref.sha256
+        other = path.exists() and source_sha256(path) != ref.sha256
     except OSError as error:
         return [f"input {ref.path} cannot be read: {error.strerror}"]
-    return [f"input {ref.path} changed: its bytes are others"] if changed else []
+    return [changed(ref.path, stage, BYTES)] if other else []
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any], prefix: str = "") -> list[str]:

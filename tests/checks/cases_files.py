@@ -16,6 +16,7 @@ from tests.support.check_subjects import SHA, content, edited_content, header, l
 OTHER = "b" * 64
 SOURCE = InputRef(path="crawl.csv", kind="file", sha256=SHA)
 ARTIFACT = InputRef(path="iterations/001/10-record.h5", kind="recording", schema_version=1, sha256=SHA)
+PLAN = InputRef(path="iterations/001/40-plan.h5", kind="plan", schema_version=1, sha256=SHA)
 MISSING = ArtifactError("there is no such file", where="a.h5", expected="an artifact", received="", hint="ls -la '.'")
 NEWER = ArtifactError("this version cannot be read", where="a.h5", expected="version 1", received="7", hint="pip")
 LIBRARY = ArtifactError("the file's structure is damaged", where="a.h5", expected="an intact artifact",
@@ -135,9 +136,9 @@ FAILS: tuple[Case, ...] = (
         (
             (
                 "provenance/inputs",
-                "iterations/001/10-record.h5 has another content than when this was made from it",
-                "aaaaaaaaaaaaaaaa",
-                "bbbbbbbbbbbbbbbb",
+                "input iterations/001/10-record.h5 changed: its content hash is another",
+                "sha256 aaaaaaaaaaaaaaaa, as it was",
+                "sha256 bbbbbbbbbbbbbbbb",
             ),
         ),
     ),
@@ -150,6 +151,18 @@ FAILS: tuple[Case, ...] = (
                 "an artifact that it was made from cannot be read",
                 "iterations/001/10-record.h5",
                 "there is no such file",
+            ),
+        ),
+    ),
+    Case(
+        "plan_is_the_executed",
+        lambda: dataclasses.replace(_made(stage="execute"), inputs=(InputState(PLAN, OTHER),)),
+        (
+            (
+                "provenance/inputs",
+                "recorded under an older iterations/001/40-plan.h5: what the robot did stays what it did",
+                "sha256 aaaaaaaaaaaaaaaa, as it was",
+                "sha256 bbbbbbbbbbbbbbbb",
             ),
         ),
     ),
@@ -200,6 +213,17 @@ EDGES: tuple[Edge, ...] = (
         "values_finite", "NaN has a meaning here", lambda: edited_content(content(), "runs/a/caps/p_WE", put(0, np.nan))
     ),
     Edge("inputs_match", "a source is no artifact", lambda: links(inputs=(InputState(SOURCE, OTHER),))),
+    Edge(
+        "inputs_match",
+        "what was measured is right under any plan",
+        lambda: dataclasses.replace(_made(stage="execute"), inputs=(InputState(PLAN, OTHER),)),
+    ),
+    Edge(
+        "plan_is_the_executed",
+        "it is the plan that was executed",
+        lambda: dataclasses.replace(_made(stage="execute"), inputs=(InputState(PLAN, SHA),)),
+    ),
+    Edge("plan_is_the_executed", "what was computed is of no plan", lambda: links(inputs=(InputState(PLAN, OTHER),))),
     Edge("source_unchanged", "a source may be gone", lambda: links(inputs=(InputState(SOURCE, None, "it is gone"),))),
     Edge("source_unchanged", "an artifact is no source", lambda: links(inputs=(InputState(ARTIFACT, OTHER),))),
     Edge("robot_is_the_projects", "there is no project", lambda: links(robots={"runs/a": "x"}, project_robot=None)),

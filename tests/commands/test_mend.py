@@ -117,8 +117,8 @@ def test_no_robot_is_asked_to_move_for_a_newer_version_of_a_stage(project: Path,
 
 
 @pytest.mark.parametrize("kept", [True, False])
-def test_runs_that_are_stale_are_shown_where_their_plan_is_kept(project: Path, kept: bool) -> None:
-    """A plan was made again since: what is proposed is the plan as it is, and no command that would be refused."""
+def test_no_robot_is_asked_to_move_because_a_plan_was_made_again(project: Path, kept: bool) -> None:
+    """What it did stays what it did, and it is said under which plan; one that is gone is made again."""
     without_pictures(project, "execute")
     put(project, "10-record.h5", builders.recording(), "record")
     put(project, "20-estimate.h5", builders.estimate(), "estimate")
@@ -131,8 +131,9 @@ def test_runs_that_are_stale_are_shown_where_their_plan_is_kept(project: Path, k
     put(project, "60-compare.h5", builders.comparison(), "compare")
     if not kept:
         (project / "iterations/001/40-plan.h5").unlink()
-    wanted = f"r2s2r execute --iteration 1 --force --dry-run   # {MOVES}" if kept else "r2s2r plan --iteration 1"
-    assert "input iterations/001/40-plan.h5" in said("50-execute.h5")
+    wanted = "r2s2r diagnose --iteration 1" if kept else "r2s2r plan --iteration 1"
+    words = "recorded under an older iterations/001/40-plan.h5: what the robot did" if kept else "40-plan.h5"
+    assert words in said("50-execute.h5")
     assert document("status")["next"] == wanted
 
 

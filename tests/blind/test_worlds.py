@@ -16,6 +16,7 @@ from r2s2r_cli.blind.make.worlds import STRANGE_WITHOUT_RIG, WITHOUT_RIG, Hidden
 from r2s2r_cli.blind.make.write import robot_text
 from r2s2r_cli.blind.split import Bank, Kind, judged
 from schemas.robot import Robot
+from tests.support.soak import drawn
 
 SEED = 150_321
 
@@ -38,7 +39,7 @@ def test_without_an_effect_there_is_nothing_to_tell(tier: Literal["A", "B"]) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("tier", ["A", "B"])
+@pytest.mark.parametrize("tier", drawn(("B",), ("A", "B")))
 def test_what_is_wrong_grows_with_its_size(tier: Literal["A", "B"]) -> None:
     """A sensor's bias moves no cap but shows in its length: d follows the bias until one interval counts no more."""
     d = []

@@ -226,7 +226,7 @@ def test_odd_surroundings_never_end_in_a_traceback(tmp_path: Path, name: str) ->
     """What a shell can do to a program: the documented exit code, no traceback, no hanging."""
     line, code = SHELL_CASES[name]
     command = line.format(r2s2r=f"'{sys.executable}' -m r2s2r_cli")
-    shell = subprocess.run(["bash", "-c", command], capture_output=True, text=True, cwd=tmp_path, timeout=60)
+    shell = subprocess.run(["bash", "-c", command], capture_output=True, text=True, cwd=tmp_path, timeout=180)
     assert "Traceback" not in shell.stderr
     assert shell.returncode == code, shell.stderr
 

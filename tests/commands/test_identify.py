@@ -132,11 +132,11 @@ def test_an_interrupt_leaves_a_checkpoint_and_resume_ends_the_same(identified: P
     child = subprocess.Popen([sys.executable, "-c", code], cwd=identified, stdout=subprocess.DEVNULL,
                              stderr=subprocess.PIPE, text=True, env={**os.environ})  # fmt: skip
     checkpoint = identified / "iterations/001/30-identify.partial"
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 300
     while not checkpoint.exists() and child.poll() is None and time.monotonic() < deadline:
         time.sleep(0.02)
     child.send_signal(number)
-    _, stderr = child.communicate(timeout=120)
+    _, stderr = child.communicate(timeout=300)
     assert child.returncode == 130, stderr
     assert "--resume" in stderr and "Traceback" not in stderr
     assert read_header(identified / IDENTIFY).content_sha256 == before

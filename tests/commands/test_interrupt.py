@@ -49,7 +49,7 @@ def interrupted(project: Path, delay_s: float, *words: str) -> tuple[int, str]:
     child.stderr.readline()
     time.sleep(delay_s)
     child.send_signal(signal.SIGINT)
-    _, stderr = child.communicate(timeout=60)
+    _, stderr = child.communicate(timeout=180)
     return child.returncode, stderr
 
 
@@ -144,5 +144,5 @@ try:
 except KeyboardInterrupt:
     print("came again")
 """
-    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=180, check=True)
     assert (found.stdout, found.stderr) == ("came again\n", "")

@@ -86,7 +86,7 @@ def forked(robot: Robot) -> Iterator[tuple[str, Any]]:
     child = multiprocessing.get_context("fork").Process(target=serve, args=(robot, theirs), daemon=True)
     child.start()
     try:
-        assert ours.poll(30), "the rig did not start"
+        assert ours.poll(120), "the rig did not start"
         yield ours.recv(), child
     finally:
         child.kill()
@@ -211,10 +211,10 @@ def test_a_camera_that_goes_stops_the_robot(root: Path, fault: str) -> None:
     machine may pause the host itself: the time is that of the best of three runs."""
     late: list[float] = []
     while len(late) < 3 and min(late, default=np.inf) > LIMIT_S + 2 * TICK_S:
-        with desk(root, "--link", "tcp", "--camera-port", "0", world=f"[camera.faults]\n{fault} = 5.0\n") as rig:
+        with desk(root, "--link", "tcp", "--camera-port", "0", world=f"[camera.faults]\n{fault} = 10.0\n") as rig:
             assert rig.camera is not None
             result = record(root, rig.address, "--camera", rig.camera)
-            late.append(stopped_after(rig, 5.0, f"camera {fault}"))
+            late.append(stopped_after(rig, 10.0, f"camera {fault}"))
         assert result.exit_code == 5, result.stderr
         assert "camera" in result.stderr and "hint: " in result.stderr
         run, _ = sealed(root)
@@ -232,7 +232,7 @@ def test_a_host_that_ends_leaves_a_robot_at_rest(root: Path, number: int, code: 
         with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as host:
             wait_until(lambda: rig.truth.exists() and int(read_truth(rig.truth).duty.any(axis=1).sum()) > 50, 20.0)
             host.send_signal(number)
-            _, said = host.communicate(timeout=90)
+            _, said = host.communicate(timeout=300)
         gone_s = read_truth(rig.truth).t[-1]
         wait_until(lambda: read_truth(rig.truth).t[-1] > gone_s + 1.0)
         assert stopped_after(rig, gone_s, f"host {number.name}") <= LIMIT_S + 2 * TICK_S

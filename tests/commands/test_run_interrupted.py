@@ -28,7 +28,7 @@ STAGES = ("identify", "plan")
 """Those that keep checkpoints; an estimate is interrupted in test_interrupt.py."""
 ARTIFACTS = ("30-identify.h5", "40-plan.h5")
 COMMAND = [sys.executable, "-m", "r2s2r_cli", "run", "--until", "plan", "--no-draw"]
-LIMIT_S = 120.0
+LIMIT_S = 400.0
 ROWS = 60
 """Of the log: three target intervals."""
 

@@ -247,7 +247,7 @@ def test_ctrl_c_leaves_no_half_file(simulated: Path) -> None:
         child.stderr.readline()
         time.sleep(delay)
         child.send_signal(signal.SIGINT)
-        _, stderr = child.communicate(timeout=60)
+        _, stderr = child.communicate(timeout=180)
         assert child.returncode == 130, stderr
         assert "Traceback" not in stderr
         assert (simulated / SIMULATION).read_bytes() == before

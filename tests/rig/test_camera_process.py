@@ -18,7 +18,7 @@ from r2s2r_cli.rig.camera.settings import CameraSettings
 from r2s2r_cli.rig.camera_process import CameraProcess
 from tests.support.rig_robots import known
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 def test_it_shows_the_robot_where_it_was_said_to_be() -> None:

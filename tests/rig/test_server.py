@@ -195,7 +195,7 @@ def test_a_torn_link_comes_back_when_it_is_mended(link: str, tmp_path: Path) -> 
                 host.read(0.05)
         assert not machine.duty.any()
         host.close()
-        end = time.monotonic() + 5.0
+        end = time.monotonic() + 30.0
         while True:
             try:
                 host.open()
@@ -225,7 +225,7 @@ def test_a_stalled_link_says_nothing_and_goes_on() -> None:
 
 def wait_still(machine: Machine) -> None:
     """Until no motor has a duty."""
-    end = time.monotonic() + 5.0
+    end = time.monotonic() + 30.0
     while machine.duty.any() and time.monotonic() < end:
         time.sleep(0.001)
     assert not machine.duty.any()

@@ -74,7 +74,7 @@ def desk(root: Path, *options: str, world: str = "", seconds: float = 240.0) -> 
             if process.poll() is None:
                 process.send_signal(signal.SIGTERM)
                 with contextlib.suppress(subprocess.TimeoutExpired):
-                    process.communicate(timeout=10)
+                    process.communicate(timeout=60)
             process.kill()
 
 
@@ -145,7 +145,7 @@ def aligned_error(t: np.ndarray, length: np.ndarray, truth: Truth) -> np.ndarray
     return error(min(best + np.arange(-0.02, 0.021, 0.002), key=spread))
 
 
-def wait_until(happened: object, seconds: float = 10.0) -> None:
+def wait_until(happened: object, seconds: float = 60.0) -> None:
     """Poll a condition; AssertionError where it does not come about."""
     end = time.monotonic() + seconds
     while not happened():  # type: ignore[operator]

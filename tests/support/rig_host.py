@@ -11,7 +11,7 @@ import tty
 from types import TracebackType
 from typing import Self
 
-PATIENCE_S = 10.0
+PATIENCE_S = 60.0
 
 
 def line(body: str) -> bytes:

@@ -47,7 +47,7 @@ class Counting:
         """Nothing to close."""
 
 
-def until(true: Callable[[], bool], *, seconds: float = 5.0) -> bool:
+def until(true: Callable[[], bool], *, seconds: float = 30.0) -> bool:
     """Whether a condition came true in time."""
     end = time.monotonic() + seconds
     while not true() and time.monotonic() < end:

@@ -103,7 +103,7 @@ def test_moving_robot_is_seen_where_it_was_at_the_exposure() -> None:
 
 
 def _watched(service: CameraService) -> None:
-    deadline = time.monotonic() + 5.0
+    deadline = time.monotonic() + 30.0
     while not service.watched and time.monotonic() < deadline:
         time.sleep(0.002)
     assert service.watched
@@ -191,7 +191,7 @@ def test_unplugged_camera_is_one_clear_error() -> None:
     with CameraService(THREE, small(gone_at_s=1.0)) as service, running(service):
         with RigCamera(*service.address) as camera, Feed(camera) as feed:
             frames: list[Frame] = []
-            deadline = time.monotonic() + 10.0
+            deadline = time.monotonic() + 30.0
             with pytest.raises(CameraError) as caught:
                 while time.monotonic() < deadline:
                     frames += feed.frames()

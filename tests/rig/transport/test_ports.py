@@ -19,7 +19,7 @@ from r2s2r_cli.rig.transport.pty import PtyTransport
 from r2s2r_cli.rig.transport.tcp import TcpTransport
 from r2s2r_cli.rig.transport.udp import UdpTransport
 
-PATIENCE_S = 5.0
+PATIENCE_S = 30.0
 
 
 def wait(transport: Transport, kind: str) -> Event:

@@ -43,7 +43,7 @@ def refused(path: Path) -> InputError:
 
 def pasted(command: str) -> None:
     """Run a hint as a user would."""
-    subprocess.run(["bash", "-c", command], check=True, timeout=60)
+    subprocess.run(["bash", "-c", command], check=True, timeout=180)
 
 
 def stamped(ticks: float, *, start: float = 0.0, gap: float = 0.1) -> str:

@@ -64,7 +64,7 @@ def written(feed: Still, rows: Rows, *, until: int = 10**9) -> Pictures:
     with Writer(rows) as writer:
         pictures = Pictures(feed, writer, "camera", RecordSettings(), lambda one: one.t_host)
         with pictures:
-            end = time.monotonic() + 5.0
+            end = time.monotonic() + 30.0
             while (feed.left or not feed.begun) and pictures.written < until and time.monotonic() < end:
                 time.sleep(0.001)
     return pictures
@@ -113,7 +113,7 @@ def test_what_may_show_the_time_before_the_run_is_not_of_it() -> None:
     link, rows = FakeLink(robot), Rows()
     begun = link.now()
     feed = Still([frame(i, begun + 0.02 * i) for i in range(12)])
-    read, end = link.read, time.monotonic() + 5.0
+    read, end = link.read, time.monotonic() + 30.0
 
     def after_the_pictures(timeout: float) -> Sample | None:
         while feed.left and time.monotonic() < end:

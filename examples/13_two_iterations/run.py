@@ -62,7 +62,7 @@ class Profile:
     worlds: Mapping[int, int] = field(default_factory=dict)
 
 
-DEMO = Profile(policies=(("straight",), ("turn-clockwise",)), settings=SHORT, draw=True, worlds={2: 7})
+DEMO = Profile(policies=(("straight",), ("turn-clockwise",)), repeats=2, settings=SHORT, draw=True, worlds={2: 7})
 """Minutes instead of a quarter of an hour: `make demo`. World 7 is the first of seed 2 that is far enough: all others
 look at those before it first, each as long as a look at this one."""
 

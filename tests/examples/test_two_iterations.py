@@ -187,10 +187,11 @@ def test_the_limit_has_the_true_numbers_and_the_calibrated_sensors(tmp_path: Pat
 
 
 def test_nothing_learns_from_the_new_policies() -> None:
-    """Iteration 2 executes none of those that it learned from; repeats make a floor where one begins elsewhere."""
+    """Iteration 2 executes none of those that it learned from; repeats make a floor, of which the demo has the fewest
+    that can, and the published table one that holds where one of them begins elsewhere."""
     run = loaded("run")
-    for profile in (run.Profile(), run.DEMO):
+    for profile, fewest in ((run.Profile(), 3), (run.DEMO, 2)):
         first, second = profile.policies
-        assert first and second and not set(first) & set(second) and profile.repeats >= 3
+        assert first and second and not set(first) & set(second) and profile.repeats >= fewest
     assert run.DEMO.draw and not run.Profile().draw
     assert run.SHORT["identify"]["max_iterations"] < run.PAPER_STEPS

@@ -39,10 +39,15 @@ help:  ## this list
 	@printf 'usage: make TARGET\n\n'
 	@sed -n 's/^\([a-z -]*\):.*##  *\(.*\)/  \1\t\2/p' Makefile | expand -t 14
 
+# The first project and the diagnosis need minutes of one core beside the loop: they are told at the end.
 demo: $(VENV)/.demo-stamp  ## a sample project, a diagnosis, then two iterations of the loop on the virtual robot (in ./demo)
-	@PATH="$(ROOT)/$(VENV)/bin:$$PATH" bash examples/01_first_project/run.sh "$(DEMO)"
-	@PATH="$(ROOT)/$(VENV)/bin:$$PATH" bash examples/14_diagnose/run.sh --out "$(DEMO)/diagnosis"
-	@PATH="$(ROOT)/$(VENV)/bin:$$PATH" bash examples/13_two_iterations/run.sh "$(DEMO)/two-iterations"
+	@mkdir -p "$(DEMO)"; export PATH="$(ROOT)/$(VENV)/bin:$$PATH"; \
+	echo "beside the two iterations: a first project and a diagnosis, whose words go to $(DEMO)/beside.txt"; \
+	{ bash examples/01_first_project/run.sh "$(DEMO)" && \
+	  bash examples/14_diagnose/run.sh --out "$(DEMO)/diagnosis"; } > "$(DEMO)/beside.txt" 2>&1 & beside=$$!; \
+	trap 'kill $$beside 2> /dev/null || true' EXIT; \
+	bash examples/13_two_iterations/run.sh "$(DEMO)/two-iterations"; \
+	code=0; wait $$beside || code=$$?; cat "$(DEMO)/beside.txt"; exit $$code
 
 test: $(VENV)/.dev-stamp  ## the test suite, without the slow tests
 	@$(PY) -m pytest $(PYTEST_FLAGS)

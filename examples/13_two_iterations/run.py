@@ -98,7 +98,8 @@ def compared(project: Path, models: Mapping[str, Path], *, draw: bool) -> None:
     """The executed runs of both iterations beside these simulators and that of robot.toml; none named: those of both
     iterations. Kept as comparison.json."""
     words = [word for name, path in models.items() for word in ("--model", f"{name}={path}")]
-    command = [*COMMAND, "compare", "--iteration", "2", "--of", "execute", *words, "--json"]
+    # As `run` asked for it where no simulator is named: what it compared is fresh, and told again in a second.
+    command = [*COMMAND, "compare", "--iteration", "2", *words, "--json"]
     command += [] if draw else ["--no-draw"]
     done = subprocess.run(command, cwd=project, capture_output=True, text=True)
     if done.returncode:

@@ -39,15 +39,20 @@ help:  ## this list
 	@printf 'usage: make TARGET\n\n'
 	@sed -n 's/^\([a-z -]*\):.*##  *\(.*\)/  \1\t\2/p' Makefile | expand -t 14
 
-# The first project and the diagnosis need minutes of one core beside the loop: they are told at the end.
-demo: $(VENV)/.demo-stamp  ## a sample project, a diagnosis, then two iterations of the loop on the virtual robot (in ./demo)
-	@mkdir -p "$(DEMO)"; export PATH="$(ROOT)/$(VENV)/bin:$$PATH"; \
-	echo "beside the two iterations: a first project and a diagnosis, whose words go to $(DEMO)/beside.txt"; \
-	{ bash examples/01_first_project/run.sh "$(DEMO)" && \
-	  bash examples/14_diagnose/run.sh --out "$(DEMO)/diagnosis"; } > "$(DEMO)/beside.txt" 2>&1 & beside=$$!; \
-	trap 'kill $$beside 2> /dev/null || true' EXIT; \
-	bash examples/13_two_iterations/run.sh "$(DEMO)/two-iterations"; \
-	code=0; wait $$beside || code=$$?; cat "$(DEMO)/beside.txt"; exit $$code
+demo: $(VENV)/.demo-stamp  ## a sample project and a diagnosis, beside them two iterations of the loop on the virtual robot (in ./demo)
+	@mkdir -p "$(DEMO)"
+	@echo "beside the two iterations: a first project and a diagnosis, whose words go to $(DEMO)/beside.txt"
+	@$(MAKE) --no-print-directory -j2 demo-loop demo-beside
+	@cat "$(DEMO)/beside.txt"
+
+# Parts of `demo`, side by side: each needs little more than one core. make ends both at Ctrl-C.
+.PHONY: demo-loop demo-beside
+demo-loop demo-beside: export PATH := $(ROOT)/$(VENV)/bin:$(PATH)
+demo-loop:
+	@bash examples/13_two_iterations/run.sh "$(DEMO)/two-iterations"
+demo-beside:
+	@{ bash examples/01_first_project/run.sh "$(DEMO)" && bash examples/14_diagnose/run.sh --out "$(DEMO)/diagnosis"; } \
+	  > "$(DEMO)/beside.txt" 2>&1 || { cat "$(DEMO)/beside.txt"; exit 1; }
 
 test: $(VENV)/.dev-stamp  ## the test suite, without the slow tests
 	@$(PY) -m pytest $(PYTEST_FLAGS)

@@ -1,5 +1,7 @@
 """Run every stage of a project again and compare with what is stored: `python again.py PROJECT` (minutes).
 
+`--newest` makes of every stage only the last artifact again, not that of every iteration.
+
 For a lab's own CI as well: it needs nothing but r2s2r and the project's directory, of which it works on a copy. The
 robot is not moved: `record` (where the project has a virtual robot to look at: world.toml) and `execute` are run with
 --dry-run. Every stage gets the *stored* artifacts before it as its input, so
@@ -32,6 +34,7 @@ from r2s2r_cli.store.again import command_again
 from r2s2r_cli.store.header import read_header
 from r2s2r_cli.store.project import Project
 from r2s2r_cli.store.read import read_artifact
+from schemas.header import Provenance
 
 LENGTHS = 0.02
 """Part by which the number of frames of a simulated run may differ: a target may be reached a tick later."""
@@ -78,15 +81,16 @@ RULES = (
 """What is compared. Everything else must be there, in its type and with its dimensions."""
 
 
-def main(root: Path, say: Callable[[str], None] = print) -> list[str]:
-    """Every stage of the project again, in a copy. Returns what is not as it was, in words."""
+def main(root: Path, say: Callable[[str], None] = print, *, newest: bool = False) -> list[str]:
+    """Every stage of the project again, in a copy. newest: of each stage the last artifact only. Returns what is not as
+    it was, in words."""
     wrong: list[str] = []
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / root.resolve().name
         shutil.copytree(root, copy)
         project = Project.find(copy)
         wrong += [_must(["validate"], copy, say), _must(["status"], copy, say)]
-        for path in project.artifacts():
+        for path in _newest(project) if newest else project.artifacts():
             wrong += _again(project, path, say)
     return [text for text in wrong if text]
 
@@ -103,22 +107,41 @@ def differences(old: ArtifactData, new: ArtifactData, rules: Sequence[Rule] = RU
             yield f"{name}: {text}"
 
 
+def _newest(project: Project) -> list[Path]:
+    """Of every stage the last artifact that a command makes again, in the order in which they were made; and the last
+    recording, whose command is tried."""
+    last: dict[str, Path] = {}
+    for path in project.artifacts():
+        made = read_header(path).provenance
+        if made.stage == "record" or _why_not(project, made) is None:
+            last[made.stage] = path
+    return [path for path in project.artifacts() if path in last.values()]
+
+
+def _why_not(project: Project, made: Provenance) -> str | None:
+    """Why no command makes an artifact again, or None where one does."""
+    if made.stage in ("record", "execute"):
+        return "it was measured"  # the plan asks what would be executed
+    if made.stage == "collect":
+        return "it was collected by hand"
+    if made.stage == "import" and not all((project.root / ref.path).exists() for ref in made.inputs):
+        return "the files it was made from are not kept"
+    if made.stage == "estimate" and not _has_sightings(project, made.inputs[0].path):
+        return "the pictures it was made from are not kept"
+    return None
+
+
 def _again(project: Project, path: Path, say: Callable[[str], None]) -> Iterator[str]:
     """One artifact: its stage, the comparison; then what was stored is put back."""
     name, kept = project.relative(path), path.read_bytes()
     made = read_header(path).provenance
     number = path.parent.name
-    sources = [project.root / ref.path for ref in made.inputs]
     if made.stage == "record":
         yield _would_record(project.root, shlex.split(command_again(made, path, force=True))[1:], say)
-    if made.stage in ("record", "execute", "collect") or (
-        made.stage == "import" and not all(one.exists() for one in sources)
-    ):
-        return  # measured, or collected by hand: no command makes it again. The plan asks what would be executed, below
-    header, old = read_artifact(path)
-    if made.stage == "estimate" and not _has_sightings(project, made.inputs[0].path):
-        say(f"{name}: the pictures it was made from are not kept")
+    if (why := _why_not(project, made)) is not None:
+        say(f"{name}: {why}")
         return
+    header, old = read_artifact(path)
     words = [*shlex.split(command_again(made, path, force=True))[1:], "--no-draw"]
     failed = _must(words, project.root, say)
     if failed:
@@ -217,6 +240,8 @@ def _difference(old: np.ndarray, new: np.ndarray, rule: Rule | None) -> str | No
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("project", type=Path, nargs="?", default=Path(__file__).parent / "project")
-    found = main(parser.parse_args().project)
+    parser.add_argument("--newest", action="store_true", help="of every stage the last artifact only")
+    asked = parser.parse_args()
+    found = main(asked.project, newest=asked.newest)
     print("\n".join(found) if found else "every stage gave again what is stored")
     sys.exit(1 if found else 0)

@@ -26,6 +26,7 @@ from r2s2r_cli.engine import (
 from tests.support import parity
 from tests.support.engine import after, free_rods, lowest_gap, parameters, random_gait, state, vector
 from tests.support.phases import STEP, phases
+from tests.support.soak import drawn
 from tests.support.variants import SMALL, VARIANTS, Variant, robot, variant
 
 EXACT = 1e-10
@@ -35,7 +36,9 @@ BLOCK = 1e-6
 SINGLE = 2e-4
 """float32 has 6e-8, and the velocity of a resting robot is what is left of impulses a thousand times larger."""
 FAST = ("one crooked rod", "pair, no rod contact", "free rods")
-EVERY = [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in (*SMALL, *VARIANTS)]
+LARGE = drawn(("threebar", "crooked rods", "all effects on"), tuple(VARIANTS))
+"""A whole robot compiles for a quarter of a minute and more. Every law that the others have is in a small one as well."""
+EVERY = [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in (*SMALL, *LARGE)]
 
 
 @dataclass

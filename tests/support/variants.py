@@ -86,15 +86,13 @@ def bouncing() -> Variant:
     return replace(plain, theta=replace(plain.theta, restitution=torch.full_like(plain.theta.restitution, 0.5)))
 
 
-def on_a_slope() -> Variant:
+def on_a_slope(plain: Variant) -> Variant:
     """Gravity as a tilted ground's frame sees it."""
-    plain = robot()
     return replace(plain, theta=tilted(0.2, -0.15).parameters(plain.theta))
 
 
-def without_winches() -> Variant:
-    """The 3-bar robot with its motors taken out: all cables passive."""
-    plain = robot()
+def without_winches(plain: Variant) -> Variant:
+    """A robot with its motors taken out: all cables passive."""
     theta, old = plain.theta, plain.structure
     place = {k: plain.start.rest[:, i] for i, k in enumerate(old.actuated)}
     place |= {k: theta.rest[:, i] for i, k in enumerate(old.passive)}
@@ -183,6 +181,8 @@ SMALL: dict[str, Callable[[], Variant]] = {
     "free rods": free_rods,
     "one crooked rod": one_crooked_rod,
     "pair, no rod contact": lambda: pair(rod_contact=False, detach=Detach.GEOMETRY),
+    "pair, detach impulse": lambda: pair(detach=Detach.IMPULSE),
+    "pair on a slope, no winches": lambda: on_a_slope(without_winches(pair())),
 }
 """Small ones that show most: quick to compile."""
 
@@ -198,10 +198,10 @@ VARIANTS: dict[str, Callable[[], Variant]] = {
     "detach impulse": lambda: robot(detach=Detach.IMPULSE),
     "three sweeps": lambda: robot(sweeps=3),
     "restitution": bouncing,
-    "tilted ground": on_a_slope,
+    "tilted ground": lambda: on_a_slope(robot()),
     "rod ends": lambda: robot(attachment="rod_end"),
     "sixbar": lambda: robot("sixbar"),
-    "no winches": without_winches,
+    "no winches": lambda: without_winches(robot()),
     "all effects off": lambda: plugged(robot(), *CATALOGUE, *FURTHER, on=False),
     "all effects on": lambda: plugged(robot(), *CATALOGUE, *FURTHER, on=True),
 }

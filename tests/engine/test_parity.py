@@ -37,7 +37,7 @@ SINGLE = 2e-4
 """float32 has 6e-8, and the velocity of a resting robot is what is left of impulses a thousand times larger."""
 FAST = ("one crooked rod", "pair, no rod contact", "free rods")
 LARGE = drawn(("threebar", "crooked rods", "all effects on"), tuple(VARIANTS))
-"""A whole robot compiles for a quarter of a minute and more. Every law that the others have is in a small one as well."""
+"""A whole robot compiles for a quarter of a minute and more; every law of the others is in a small one as well."""
 EVERY = [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in (*SMALL, *LARGE)]
 
 

@@ -11,6 +11,7 @@ import torch
 
 from r2s2r_cli.stages.identify.paper import Loss, Settings, identify_paper
 from tests.examples.load import load
+from tests.support.soak import drawn
 
 task = load("08_paper_identification", "task")
 gradients = load("08_paper_identification", "gradients")
@@ -34,14 +35,14 @@ def test_fits_side_by_side_are_those_of_the_library() -> None:
 
 @pytest.mark.slow
 def test_the_key_frame_loss_converges_from_both_sides() -> None:
-    """Two policies of the page, motor speed from 0.8 and 0.3: over the last third of sixty iterations at least three of
-    the four fits lie within 10 % of 0.5 throughout. (Not all: where a robot nearly tips over, last bits decide.)"""
+    """A policy of the page (in a soak test two), motor speed from 0.8 and 0.3: over the last third of sixty iterations
+    three in four fits lie within 10 % of 0.5 throughout. (Not all: where a robot nearly tips over, last bits decide.)"""
     torch.set_num_threads(1)
-    made = task.engine()
-    fits = [task.descend(task.task(made, seed, 4), [Loss.KEY_FRAME] * 2, list(run.FIRSTS), 60) for seed in (0, 2)]
+    made, seeds = task.engine(), drawn((2,), (0, 2))
+    fits = [task.descend(task.task(made, seed, 4), [Loss.KEY_FRAME] * 2, list(run.FIRSTS), 60) for seed in seeds]
     speeds = np.concatenate([fit.speeds[-20:] for fit in fits], axis=1)
     away = np.abs(speeds - task.TRUTH).max(axis=0)
-    assert np.sort(away)[2] < run.NEAR
+    assert np.mean(away < run.NEAR) >= 0.75
 
 
 def test_tables_and_picture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

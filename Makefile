@@ -61,7 +61,7 @@ test-slow: $(VENV)/.dev-stamp  ## the slow tests: kills while writing, damaged f
 	@$(PY) -m pytest $(PYTEST_FLAGS) -m slow
 
 test-soak: $(VENV)/.dev-stamp  ## what is killed, damaged or hidden at random, in full numbers (an hour): before a release
-	@R2S2R_SOAK=1 $(PY) -m pytest $(PYTEST_FLAGS) -m slow -k "killed or mutants or mutated or damaged or flipped or plug or known_seeds or grows or every_stage_gives or test_parity or converges_from_both" tests/store tests/commands tests/hardware tests/blind tests/examples tests/engine
+	@R2S2R_SOAK=1 $(PY) -m pytest $(PYTEST_FLAGS) -m slow -k "killed or mutants or mutated or damaged or flipped or plug or known_seeds or grows or every_stage_gives or test_parity or converges_from_both or many_moments" tests/store tests/commands tests/hardware tests/blind tests/examples tests/engine
 
 lint: $(VENV)/.dev-stamp  ## style, types, import layers
 	@failed=; \

@@ -11,11 +11,13 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from r2s2r_cli.commands.interrupts import whole_items
 from r2s2r_cli.store.header import read_header
 from tests.commands.conftest import invoke
+from tests.support.soak import drawn
 
 ESTIMATE = "iterations/001/20-estimate.h5"
 START = """
@@ -92,8 +94,8 @@ def test_ctrl_c_leaves_everything_whole(estimated: Path) -> None:
 
 @pytest.mark.slow
 def test_ctrl_c_at_many_moments(estimated: Path) -> None:
-    """Forty moments over the whole command."""
-    check(estimated, [0.02 + 0.05 * i for i in range(40)])
+    """A dozen moments over the whole command, in a soak test forty."""
+    check(estimated, [0.02 + spread * 2.0 for spread in np.linspace(0.0, 1.0, drawn(12, 40))])
 
 
 @pytest.mark.slow

@@ -35,8 +35,8 @@ def test_fits_side_by_side_are_those_of_the_library() -> None:
 
 @pytest.mark.slow
 def test_the_key_frame_loss_converges_from_both_sides() -> None:
-    """A policy of the page (in a soak test two), motor speed from 0.8 and 0.3: over the last third of sixty iterations
-    three in four fits lie within 10 % of 0.5 throughout. (Not all: where a robot nearly tips over, last bits decide.)"""
+    """A policy of the page (two in a soak test), motor speed from 0.8 and 0.3: in the last third of sixty iterations
+    three in four fits stay within 10 % of 0.5. (Not all: where a robot nearly tips over, last bits decide.)"""
     torch.set_num_threads(1)
     made, seeds = task.engine(), drawn((2,), (0, 2))
     fits = [task.descend(task.task(made, seed, 4), [Loss.KEY_FRAME] * 2, list(run.FIRSTS), 60) for seed in seeds]

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from r2s2r_cli.commands.interrupts import resumable
+from r2s2r_cli.commands.typed import typed_words
 from r2s2r_cli.console import Console
 from r2s2r_cli.options import (
     DrawOption,
@@ -24,8 +26,12 @@ if TYPE_CHECKING:
 
     from r2s2r_cli.artifact import ArtifactData
     from r2s2r_cli.commands.compare_inputs import Asked
+    from r2s2r_cli.store.checkpoint_arrays import ArrayCheckpoint
     from schemas.results_compare import CompareReport
     from schemas.robot import Robot
+
+MOST_BYTES = 1_000_000_000
+"""Of a checkpoint. A minute of one simulated run takes less than half a million."""
 
 
 class Of(StrEnum):
@@ -50,6 +56,7 @@ def compare(
     own: Annotated[
         bool, typer.Option("--own", help="Without the executed runs of earlier iterations, which are compared as well.")
     ] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where the same command was interrupted.")] = False,
     project: ProjectOption = None,
     iteration: IterationOption = None,
     json: JsonOption = False,
@@ -69,25 +76,40 @@ def compare(
     from r2s2r_cli.commands.compare_inputs import Asked
     from r2s2r_cli.commands.outcome import show_outcome
     from r2s2r_cli.commands.stage import StageRun
+    from r2s2r_cli.installed import installed_words
+    from r2s2r_cli.store.checkpoint import checkpoint_key, checkpoint_of
+    from r2s2r_cli.store.checkpoint_arrays import ArrayCheckpoint
     from schemas.results_compare import CompareReport
 
     console = Console(json=json, quiet=quiet)
     here = Project.find(project)
     place = here.iteration(iteration)
     asked = Asked(here, place, tuple(model or ()), None if of is None else of.value, own)
+    unfinished = checkpoint_of(here.artifact("comparison", place))
+    if resume and not unfinished.exists():
+        console.say("nothing was interrupted: there is no checkpoint to go on from")
     run = StageRun(
         stage="compare", kind="comparison", project=here, iteration=place, find_inputs=asked.refs,
-        report_model=CompareReport, flags=asked.flags(), dry_run=dry_run, force=force,
+        report_model=CompareReport, flags=asked.flags(), dry_run=dry_run,
+        force=force or (resume and unfinished.exists()),
     )  # fmt: skip
-    result, report = run.run(
-        lambda: _compute(asked, console), (lambda data, said: _draw(data, said, here.robot())) if draw else None
-    )
+    wanted, digests = run.wanted, [ref.sha256 for ref in run.inputs]
+    # An effect of a package is another one in its next version.
+    key = checkpoint_key(wanted.stage_version, wanted.settings, wanted.robot, digests, installed_words())
+    again = [word for word in typed_words("compare") if word != "--resume"]
+    checkpoint = ArrayCheckpoint(unfinished, key, resume, most=MOST_BYTES, command=again)
+    with resumable(checkpoint, here.relative(unfinished), again, done="simulated"):
+        result, report = run.run(
+            lambda: _compute(asked, checkpoint, console),
+            (lambda data, said: _draw(data, said, here.robot())) if draw else None,
+            lambda said: checkpoint.clear(),
+        )
     show_outcome(result, console)
     if report is not None:
         _show(report, console)
 
 
-def _compute(asked: Asked, console: Console) -> tuple[ArtifactData, CompareReport]:
+def _compute(asked: Asked, checkpoint: ArrayCheckpoint, console: Console) -> tuple[ArtifactData, CompareReport]:
     from r2s2r_cli.commands.interrupts import loaded
 
     stage = loaded("r2s2r_cli.stages.compare")
@@ -96,7 +118,7 @@ def _compute(asked: Asked, console: Console) -> tuple[ArtifactData, CompareRepor
     with console.progress("compare, runs", len(runs) * len(models)) as advance:
         data, report = stage.compare(
             runs, models, settings, keyframe_floor_m=asked.keyframe_floor(), cache_dir=asked.project.cache,
-            done=lambda: advance(1),
+            checkpoint=checkpoint, done=lambda: advance(1),
         )  # fmt: skip
     return data, report.model_copy(update={"stale": stale, "warnings": (*left_out, *report.warnings)})
 

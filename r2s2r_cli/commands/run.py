@@ -217,6 +217,7 @@ def _kept(project: Project, place: Iteration, step: Step, steps: Sequence[Step])
 
 def _resumed(step: Step) -> tuple[str, ...]:
     """`--resume` where there is something to go on from."""
+    from r2s2r_cli.commands.unfinished import RESUMED
     from r2s2r_cli.store.checkpoint import checkpoint_of
 
-    return ("--resume",) if step.name in ("identify", "plan") and checkpoint_of(step.target).exists() else ()
+    return ("--resume",) if step.name in RESUMED.values() and checkpoint_of(step.target).exists() else ()

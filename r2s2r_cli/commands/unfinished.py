@@ -11,7 +11,7 @@ from r2s2r_cli.store.checkpoint import checkpoint_of, command_of
 from r2s2r_cli.store.project import Iteration, Project, journal_of
 from schemas.results import ArtifactState
 
-RESUMED = {"identification": "identify", "plan": "plan", "diagnosis": "diagnose"}
+RESUMED = {"identification": "identify", "plan": "plan", "comparison": "compare", "diagnosis": "diagnose"}
 """Stages that go on from a checkpoint, by what they make."""
 UNDER_WAY = ("interrupted", "running")
 """States of computations: no artifact is wrong or missing because of them."""

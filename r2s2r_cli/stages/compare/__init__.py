@@ -10,6 +10,7 @@ from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.compare.errors import run_errors
 from r2s2r_cli.stages.compare.groups import comparison_groups
 from r2s2r_cli.stages.compare.predicted import Model, PredictedRun, predicted
+from r2s2r_cli.stages.compare.remembered import Checkpoint
 from r2s2r_cli.stages.compare.report import Compared, report_of
 from r2s2r_cli.stages.compare.runs import RealRun, real_runs
 from schemas.config import SimulateSettings
@@ -25,12 +26,14 @@ def compare(
     *,
     keyframe_floor_m: float | None = None,
     cache_dir: Path | None = None,
+    checkpoint: Checkpoint | None = None,
     done: Callable[[], None] = lambda: None,
 ) -> tuple[ArtifactData, CompareReport]:
     """Every run under every simulator; the layout is that of `schemas/compare.py`.
 
-    keyframe_floor_m: of the caps, from floor.h5. done: called after each run of each simulator. Raises UsageError where
-    two simulators have one name, InputError for a robot that cannot be simulated.
+    keyframe_floor_m: of the caps, from floor.h5. checkpoint: what was simulated before is taken from there, what was
+    not is kept there. done: called after each run of each simulator. Raises UsageError where two simulators have one
+    name, InputError for a robot that cannot be simulated, and what the checkpoint raises.
     """
     names = [model.name for model in models]
     for name in names:
@@ -39,7 +42,8 @@ def compare(
                              received=name, hint="--model first=a.h5 --model second=b.h5")  # fmt: skip
     table: dict[str, Mapping[str, PredictedRun]] = {}
     for model in models:
-        table[model.name] = {one.run: one for one in predicted(model, runs, settings, cache_dir=cache_dir, done=done)}
+        found = predicted(model, runs, settings, cache_dir=cache_dir, checkpoint=checkpoint, done=done)
+        table[model.name] = {one.run: one for one in found}
     compared = [
         Compared(run, model, one := table[model.name][run.name],
                  None if one.walk is None or one.real is None else run_errors(one.real, one.walk))

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from r2s2r_cli.errors import NumericalError
+from r2s2r_cli.stages.compare.remembered import Checkpoint, question
 from r2s2r_cli.stages.compare.runs import RealRun
 from r2s2r_cli.stages.compare.walk import Walk, same_targets
 from r2s2r_cli.stages.identified import Identified
@@ -17,7 +19,7 @@ from r2s2r_cli.stages.identify.judged import replayed
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe
 from r2s2r_cli.stages.measures.keyframes import KeyframeErrors, keyframe_errors
-from r2s2r_cli.stages.segments import target_intervals
+from r2s2r_cli.stages.segments import Intervals, target_intervals
 from r2s2r_cli.stages.simulate.drive import Driver, Start
 from schemas.config import SimulateSettings
 
@@ -43,22 +45,58 @@ class PredictedRun:
     keyframes: KeyframeErrors | None
     warnings: tuple[str, ...] = ()
 
+    def to_arrays(self) -> list[np.ndarray]:
+        """All that was simulated, for a checkpoint."""
+        walk, key = self.walk, self.keyframes
+        moved = [] if walk is None else [walk.t, walk.p_WE, *vars(walk.intervals).values()]
+        errors = [] if key is None else [key.squared]
+        return [np.array([walk is not None, key is not None]), np.array(self.warnings, dtype=str), *moved, *errors]
+
+    @classmethod
+    def from_arrays(cls, run: RealRun, arrays: Sequence[np.ndarray]) -> PredictedRun:
+        """Of that run, from what `to_arrays` gave."""
+        there, warnings, *rest = arrays
+        walk = real = None
+        if there[0]:
+            t, p_WE, *intervals = rest[: 2 + len(Intervals.__dataclass_fields__)]
+            walk = Walk(t, p_WE, run.walk.share, Intervals(*intervals))
+            real = run.walk.first(len(walk.intervals))
+        keyframes = KeyframeErrors(rest[-1]) if there[1] else None
+        return cls(run.name, walk, real, keyframes, tuple(warnings.tolist()))
+
 
 def predicted(
     model: Model, runs: Sequence[RealRun], settings: SimulateSettings, *, cache_dir: Path | None,
-    done: Callable[[], None] = lambda: None,
+    checkpoint: Checkpoint | None = None, done: Callable[[], None] = lambda: None,
 ) -> tuple[PredictedRun, ...]:  # fmt: skip
-    """Every run by one simulator. done: called after each. Raises InputError for a robot that cannot be simulated."""
+    """Every run by one simulator. checkpoint: a run that it has is not simulated, every other one is kept there as soon
+    as it is. done: called after each. Raises InputError for a robot that cannot be simulated."""
     # What comes after the last target is in no real run; it would lengthen the last simulated interval.
     settings = settings.model_copy(update={"tail_s": 0.0})
-    driver = Driver(model.numbers.robot, settings, cache_dir, model.numbers)
+
+    @cache
+    def driver() -> Driver:
+        return Driver(model.numbers.robot, settings, cache_dir, model.numbers)
+
     found = []
     for run in runs:
-        walk, real, warnings = _closed_loop(driver, run)
-        key, more = _keyframes(driver, model, run, settings)
-        found.append(PredictedRun(run.name, walk, real, key, (*warnings, *more)))
+        asked = question(model.numbers, run, settings)
+        known = None if checkpoint is None else checkpoint.recall(asked)
+        if known is None:
+            one = _simulated(driver(), model, run, settings)
+            if checkpoint is not None:
+                checkpoint.keep(asked, one.to_arrays())
+        else:
+            one = PredictedRun.from_arrays(run, known)
+        found.append(one)
         done()
     return tuple(found)
+
+
+def _simulated(driver: Driver, model: Model, run: RealRun, settings: SimulateSettings) -> PredictedRun:
+    walk, real, warnings = _closed_loop(driver, run)
+    key, more = _keyframes(driver, model, run, settings)
+    return PredictedRun(run.name, walk, real, key, (*warnings, *more))
 
 
 def _closed_loop(driver: Driver, run: RealRun) -> tuple[Walk | None, Walk | None, list[str]]:

@@ -34,7 +34,6 @@ SAMPLE = Path(__file__).resolve().parents[2] / "examples" / "sample-project" / "
 STAGES = [
     (("estimate", "--iteration", "1"), ESTIMATE),
     (("simulate", "--random", "3", "--iteration", "1"), "iterations/001/simulation.h5"),
-    (("compare", "--iteration", "1", "--of", "execute"), "iterations/001/60-compare.h5"),
     (("floor",), "floor.h5"),
 ]
 """Computing stages that begin anew, and what they write; those that go on have tests of their own."""

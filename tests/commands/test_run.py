@@ -10,6 +10,9 @@ from typing import Any, ClassVar
 
 import pytest
 
+from r2s2r_cli.commands.unfinished import RESUMED
+from r2s2r_cli.store.checkpoint import checkpoint_of
+from r2s2r_cli.store.project import Project
 from tests.commands.conftest import invoke
 from tests.commands.test_mend import put, without_pictures
 from tests.support import builders
@@ -77,6 +80,15 @@ def test_a_log_needs_no_robot(project: Path, calls: Calls) -> None:
     result = invoke("run", "sample.csv", "--until", "identify")
     assert result.exit_code == 0, result.stderr
     assert stages(Child.calls) == ["import", "estimate", "identify"]
+
+
+@pytest.mark.parametrize("kind", ["identification", "plan", "comparison"])
+def test_a_stage_that_was_interrupted_goes_on(estimated: Path, calls: Calls, kind: str) -> None:
+    """The stage that left a checkpoint takes it up, no other one."""
+    kept = checkpoint_of(Project.find(estimated).iteration(1).artifact(kind))
+    kept.write_text("{}", "utf-8")
+    assert invoke("run").exit_code == 0
+    assert [words[0] for words in calls if "--resume" in words] == [RESUMED[kind]]
 
 
 def test_a_robot_that_has_moved_is_not_moved_again(estimated: Path, calls: Calls) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,33 +20,9 @@ from r2s2r_cli.stages.diagnose.which.stretches import Stretch
 from r2s2r_cli.stages.identified import nominal
 from r2s2r_cli.stages.model import rest_state
 from tests.support.builders import robot
+from tests.support.kept import Kept
 
 FRAMES, SENSORS = 5, 2
-
-
-@dataclass
-class Kept:
-    """A checkpoint in memory that forgets from the first question that differs, as the one on disk."""
-
-    answers: list[tuple[bytes, list[np.ndarray]]] = field(default_factory=list)
-    at: int = 0
-
-    def recall(self, digest: bytes) -> Sequence[np.ndarray] | None:
-        """The next answer, if it is to this question."""
-        if self.at < len(self.answers) and self.answers[self.at][0] == digest:
-            self.at += 1
-            return self.answers[self.at - 1][1]
-        del self.answers[self.at :]
-        return None
-
-    def keep(self, digest: bytes, arrays: Sequence[np.ndarray]) -> None:
-        """Append it."""
-        self.answers.append((digest, [np.array(one) for one in arrays]))
-        self.at += 1
-
-    def after(self, count: int) -> Kept:
-        """What a process finds that begins anew after one that died with so many answers."""
-        return Kept(self.answers[:count])
 
 
 @pytest.fixture(scope="module")

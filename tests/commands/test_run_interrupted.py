@@ -25,7 +25,7 @@ SMALL = {
 }  # fmt: skip
 """Settings of a loop of seconds."""
 STAGES = ("identify", "plan")
-"""Those that keep checkpoints; an estimate is interrupted in test_interrupt.py."""
+"""Those up to the plan that keep checkpoints; an estimate is interrupted in test_interrupt.py."""
 ARTIFACTS = ("30-identify.h5", "40-plan.h5")
 COMMAND = [sys.executable, "-m", "r2s2r_cli", "run", "--until", "plan", "--no-draw"]
 LIMIT_S = 400.0

@@ -13,8 +13,10 @@ from r2s2r_cli.stages.compare.predicted import PredictedRun
 from r2s2r_cli.stages.compare.remembered import question
 from r2s2r_cli.stages.compare.runs import RealRun, real_runs
 from r2s2r_cli.stages.identified import Identified, identified, nominal
+from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.free.mapping import Mapping
 from r2s2r_cli.stages.measures.keyframes import KeyframeErrors
+from r2s2r_cli.stages.segments import segments
 from schemas.config import SimulateSettings
 from tests.support import builders
 from tests.support.identified import identification
@@ -29,8 +31,14 @@ def asked() -> Asked:
     data = builders.estimate()
     data.groups["runs/walk/intervals"]["complete"][:] = True
     data.groups["runs/walk/intervals"]["target"][0, 0] = 0.5
-    (run,), _ = real_runs(data, builders.recording(), ROBOT, iteration=1)
-    assert run.data is not None
+    (run,), _ = real_runs(data, None, ROBOT, iteration=1)
+    walk = run.walk
+    zero, moved = np.zeros_like(walk.p_WE), np.ones_like(walk.p_WE)
+    commands = RunData(
+        "walk", walk.t, walk.p_WE, zero[0], walk.p_WE, zero, moved, zero, zero[..., 0], walk.t, zero[:, :, 0],
+        moved[:, :, 0], walk.intervals, segments(walk.intervals, walk.t),
+    )  # fmt: skip
+    run = replace(run, data=commands)
     return identified(identification(ROBOT), ROBOT), run, SimulateSettings()
 
 
@@ -43,12 +51,18 @@ def number(values: np.ndarray) -> np.ndarray:
 
 def with_effect(model: Identified) -> Identified:
     """The same numbers, with a law more."""
-    return replace(model, mapping=Mapping(ROBOT, model.mapping.frees, ("cable_creep",), fixed=model.mapping.fixed))
+    return replace(model, mapping=Mapping(ROBOT, model.mapping.frees, ("payload",)))
 
 
 def held(model: Identified) -> Identified:
     """With a number that was given."""
-    return replace(model, mapping=Mapping(ROBOT, model.mapping.frees, fixed={"stiffness": 1.1}))
+    return replace(model, mapping=Mapping(ROBOT, model.mapping.frees, fixed={"motor_lag": 0.05}))
+
+
+def commanded(run: RealRun) -> RealRun:
+    """A motor command is another."""
+    assert run.data is not None
+    return replace(run, data=replace(run.data, control=number(run.data.control)))
 
 
 MODELS: dict[str, Callable[[Identified], Identified]] = {
@@ -56,6 +70,7 @@ MODELS: dict[str, Callable[[Identified], Identified]] = {
     "a number": lambda m: replace(m, values=number(m.values)),
     "none of them": lambda m: nominal(ROBOT),
     "an effect": with_effect,
+    "a number that is given": held,
     "a sensor": lambda m: replace(m, bias=np.full(6, 1e-3)),
     "the delay": lambda m: replace(m, command_delay=0.02),
 }
@@ -65,7 +80,7 @@ RUNS: dict[str, Callable[[RealRun], RealRun]] = {
     "its targets": lambda r: replace(r, targets=replace(r.targets, target=number(r.targets.target))),
     "its opening": lambda r: replace(r, opening=Opening(1)),
     "no commands": lambda r: replace(r, data=None),
-    "a command": lambda r: replace(r, data=replace(r.data, control=number(r.data.control))),
+    "a command": commanded,
 }
 SETTINGS = ({"step_s": 0.002}, {"frame_rate_hz": 25.0}, {"rod_contact": False})
 

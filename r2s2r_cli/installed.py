@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from importlib.metadata import EntryPoint, entry_points
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 GROUP = "r2s2r.effects"
 """The group of entry points. Each names an instance of a subclass of Effect, or the class itself."""
@@ -10,6 +13,8 @@ GROUP = "r2s2r.effects"
 
 def installed() -> tuple[EntryPoint, ...]:
     """Entry points of effects, by name."""
+    from importlib.metadata import entry_points  # few commands ask, and it loads much
+
     return tuple(sorted(entry_points(group=GROUP), key=lambda one: one.name))
 
 

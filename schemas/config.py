@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from schemas.base import Frozen
+from schemas.described import Described
 from schemas.estimate import EstimateSettings
 
 LONGEST_STEP_S = 0.01
@@ -14,28 +15,22 @@ LONGEST_STEP_S = 0.01
 EngineStep = Annotated[float, Field(strict=True, gt=0, le=LONGEST_STEP_S)]
 
 
-class ImportSettings(Frozen):
+class ImportSettings(Described):
     """Settings of `import`."""
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
 
     rod_length_tolerance: Annotated[float, Field(strict=True, gt=0, lt=0.5)] = 0.05
     """Largest relative departure of the fitted rod length from robot.toml; beyond it is another robot or unit."""
 
 
-class CalibrateSettings(Frozen):
+class CalibrateSettings(Described):
     """Settings of `calibrate`."""
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
 
     swap_threshold_m: Annotated[float, Field(strict=True, gt=0, le=1)] = 0.05
     """A recalibration that moves a length by more than this is reported as a swapped sensor."""
 
 
-class RecordSettings(Frozen):
+class RecordSettings(Described):
     """Settings of `record`."""
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
 
     rest_s: Annotated[float, Field(strict=True, ge=0, le=600)] = 2.0
     """How long the robot is held in its rest shape (all cables long), before and after every run [s]."""
@@ -52,10 +47,8 @@ class RecordSettings(Frozen):
     """A camera without a frame for longer than this [s] stops the robot."""
 
 
-class SimulateSettings(Frozen):
+class SimulateSettings(Described):
     """Settings of `simulate`."""
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
 
     step_s: EngineStep = 0.001
     """Step of the engine [s]; must divide the controller's period. Where cables are stiff it is divided further."""
@@ -67,10 +60,8 @@ class SimulateSettings(Frozen):
     """Whether rods collide with each other."""
 
 
-class IdentifySettings(Frozen):
+class IdentifySettings(Described):
     """Settings of `identify`. What each does to a fit: docs/guides/identify.md."""
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
 
     step_s: EngineStep = 0.001
     """Step of the engine [s]; must divide the controller's period. Where cables are stiff it is divided further."""
@@ -94,10 +85,8 @@ class IdentifySettings(Frozen):
     """Planted robots of --self-test."""
 
 
-class PlanSettings(Frozen):
+class PlanSettings(Described):
     """Settings of `plan`. What each does: docs/guides/plan.md."""
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
 
     step_s: EngineStep = 0.001
     """Step of the engine [s]; must divide the controller's period. Where cables are stiff it is divided further."""
@@ -141,10 +130,8 @@ class PlanSettings(Frozen):
     """And its heading [deg]."""
 
 
-class DiagnoseSettings(Frozen):
+class DiagnoseSettings(Described):
     """Settings of `diagnose`. What each does: docs/guides/diagnose.md."""
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
 
     step_s: EngineStep = 0.002
     """Step of the engine [s]. Where cables are stiff it is divided further."""
@@ -155,20 +142,19 @@ class DiagnoseSettings(Frozen):
 class RunConfig(Frozen):
     """The settings of every stage; a stage stores its own section in what it writes."""
 
-    imports: ImportSettings = Field(default=ImportSettings(), alias="import")
-    calibrate: CalibrateSettings = CalibrateSettings()
-    record: RecordSettings = RecordSettings()
-    estimate: EstimateSettings = EstimateSettings()
-    simulate: SimulateSettings = SimulateSettings()
-    identify: IdentifySettings = IdentifySettings()
-    plan: PlanSettings = PlanSettings()
-    diagnose: DiagnoseSettings = DiagnoseSettings()
+    # Not made by validation, which would build the models whenever a command starts: the defaults are valid, a test says.
+    imports: ImportSettings = Field(default=ImportSettings.model_construct(), alias="import")
+    calibrate: CalibrateSettings = CalibrateSettings.model_construct()
+    record: RecordSettings = RecordSettings.model_construct()
+    estimate: EstimateSettings = EstimateSettings.model_construct()
+    simulate: SimulateSettings = SimulateSettings.model_construct()
+    identify: IdentifySettings = IdentifySettings.model_construct()
+    plan: PlanSettings = PlanSettings.model_construct()
+    diagnose: DiagnoseSettings = DiagnoseSettings.model_construct()
 
 
-class LinkSettings(Frozen):
+class LinkSettings(Described):
     """Where the robot is, for the commands that move it: what `--port` and `--protocol` say goes before it."""
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
 
     port: str = ""
     """The robot's /dev/ttyUSB0, socket://HOST:PORT or udp://HOST:PORT; empty: --port names it every time."""
@@ -183,4 +169,4 @@ class ProjectFile(RunConfig):
     name: Annotated[str, Field(min_length=1)]
     robot: str = "robot.toml"
     """Path of the robot description, relative to the project."""
-    link: LinkSettings = LinkSettings()
+    link: LinkSettings = LinkSettings.model_construct()

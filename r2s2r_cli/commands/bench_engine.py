@@ -12,7 +12,6 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict
 from enum import StrEnum
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
@@ -77,6 +76,8 @@ def engine(
 
 
 def _measured(plan: Plan, turns: int, quick: bool, console: Console) -> EngineBenchResult:
+    from importlib.metadata import version
+
     from r2s2r_cli.commands import bench_gait
     from r2s2r_cli.commands.bench_sides import MujocoSide, OurSide
 

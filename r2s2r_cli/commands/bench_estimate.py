@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -68,6 +67,7 @@ def _measured(
 ) -> EstimateBenchResult:
     import tempfile
     from dataclasses import asdict
+    from importlib.metadata import version
 
     from r2s2r_cli.commands.bench_engine import machine
     from r2s2r_cli.commands.bench_estimate_case import SETTINGS, make_case

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -113,6 +112,7 @@ def _measured(
     name: str, seeds: Iterable[int], theirs: tuple[str, ...], hard: bool, seconds: int, step: float, console: Console
 ) -> IdentifyBenchResult:
     import tomllib
+    from importlib.metadata import version
 
     from r2s2r_cli.commands.bench_engine import machine
     from r2s2r_cli.commands.bench_identify_case import FRAME_S, NOISE_M, make_case

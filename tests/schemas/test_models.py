@@ -10,6 +10,7 @@ import pytest
 from pydantic import ValidationError
 
 from r2s2r_cli.stages.init.robots import robot_toml
+from schemas.base import Frozen
 from schemas.config import ProjectFile, RunConfig
 from schemas.header import Provenance
 from schemas.policy import PolicyFile
@@ -98,6 +99,16 @@ def test_settings_all_have_defaults_and_refuse_what_is_unknown() -> None:
             RunConfig.model_validate({section: {"no_such_key": 1}})
     with pytest.raises(ValidationError, match="name"):
         ProjectFile.model_validate({"schema_version": 1})
+
+
+def test_settings_that_are_not_given_are_valid() -> None:
+    """Defaults are made without validation: they are what validation makes of them."""
+    made = ProjectFile(schema_version=1, name="p")
+    given = made.model_dump(by_alias=True)
+    assert ProjectFile.model_validate(given) == made
+    for key, field in ProjectFile.model_fields.items():
+        if isinstance(field.default, Frozen):
+            assert field.default == type(field.default)(), key
 
 
 def test_the_minimal_sidecar_is_one_once_its_source_is_true() -> None:

@@ -15,8 +15,7 @@ def changed(path: str, stage: str, how: str) -> str:
     return f"recorded under an older {path}: {STAYS}" if stage in MEASURED else f"input {path} changed: {how}"
 
 
-def itself_stale(path: str, stage: str) -> str:
-    """Of an input that is stale itself."""
-    return f"recorded under {path}, which is stale itself: {STAYS}" if stage in MEASURED else (
-        f"input {path} is stale itself"
-    )  # fmt: skip
+def itself_unfresh(path: str, stage: str, state: str) -> str:
+    """Of an input that is stale, or damaged, itself."""
+    itself = "stale itself" if state == "stale" else state
+    return f"recorded under {path}, which is {itself}: {STAYS}" if stage in MEASURED else f"input {path} is {itself}"

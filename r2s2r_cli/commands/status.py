@@ -16,7 +16,7 @@ from r2s2r_cli.commands.next_command import explained, forward
 from r2s2r_cli.commands.unfinished import UNDER_WAY, Kept, checkpoints, interrupted, unsealed
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import ArtifactError, GateError
-from r2s2r_cli.measured import MEASURED, itself_stale
+from r2s2r_cli.measured import MEASURED, itself_unfresh
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from r2s2r_cli.store.again import stage_at
 from r2s2r_cli.store.brief import brief
@@ -99,10 +99,10 @@ def survey(project: Project, *, thorough: bool = False) -> StatusResult:
     kept = checkpoints(project)
     again: list[str] = []
     runs: list[str] = []
-    stale: set[str] = set()
+    unfresh: dict[str, str] = {}
     listed = project.artifacts()
     # As they are read: what is made of the runs of all iterations is after them, and before what reads it.
-    found = {path: _going_on(*_state(project, iterations.get(path.parent), path, stale, thorough), kept)
+    found = {path: _going_on(*_state(project, iterations.get(path.parent), path, unfresh, thorough), kept)
              for path in sorted(listed, key=lambda path: LATER.get(path.name, 0))}  # fmt: skip
     states = [found[path][0] for path in listed]
     # A stage that reads what is damaged fails: what brings that back comes first, in the order in which it is read.
@@ -153,7 +153,7 @@ def _gap(project: Project) -> CompareReport | None:
 
 
 def _state(
-    project: Project, iteration: Iteration | None, path: Path, stale: set[str], thorough: bool
+    project: Project, iteration: Iteration | None, path: Path, unfresh: dict[str, str], thorough: bool
 ) -> tuple[ArtifactState, Mending]:
     """The line of one artifact, and what mends it; nothing where it is fresh."""
     name = project.relative(path)
@@ -163,14 +163,14 @@ def _state(
     except ArtifactError as error:
         state, why, mend = "damaged", [error.what], Mending(_mends(error, path, name))
     else:
-        own, upstream = _reasons(project, iteration, header, stale)
+        own, upstream = _reasons(project, iteration, header, unfresh)
         # Stale through an input alone: made from the same input again it would be the same. And of a measurement under
         # an older plan nothing is to be mended.
         mend = mending(project, header, path, own) if own and header.provenance.stage not in MEASURED else Mending()
         why = own + ([mend.why_not] if mend.why_not else []) + upstream
         state = "stale" if why else "fresh"
     if state != "fresh":
-        stale.add(name)
+        unfresh[name] = state
     made = header.provenance if header else None
     line = {
         "stage": made.stage if made else _stage(path), "iteration": iteration.number if iteration else None,
@@ -215,13 +215,14 @@ def _mends(error: ArtifactError, path: Path, name: str) -> str:
 
 
 def _reasons(
-    project: Project, iteration: Iteration | None, header: Header, stale: set[str]
+    project: Project, iteration: Iteration | None, header: Header, unfresh: Mapping[str, str]
 ) -> tuple[list[str], list[str]]:
-    """Why an artifact is stale: by itself, and through inputs that are."""
+    """Why an artifact is stale: by itself, and through inputs that are stale or damaged (unfresh: state by name)."""
     from r2s2r_cli.commands.freshness import own_reasons
 
-    upstream = [ref.path for ref in header.provenance.inputs if ref.path in stale]
-    return own_reasons(project, iteration, header), [itself_stale(path, header.provenance.stage) for path in upstream]
+    inputs, stage = [ref.path for ref in header.provenance.inputs], header.provenance.stage
+    upstream = [itself_unfresh(path, stage, unfresh[path]) for path in inputs if path in unfresh]
+    return own_reasons(project, iteration, header), upstream
 
 
 def _remarks(state: ArtifactState) -> str:

@@ -54,6 +54,15 @@ def test_a_damaged_artifact_keeps_its_stage(estimated: Path) -> None:
     assert found[ESTIMATE]["mend"] == "r2s2r estimate --iteration 1"
 
 
+def test_what_was_made_of_a_damaged_artifact_says_that_it_is_damaged(estimated: Path) -> None:
+    """It is stale; its input is not called so."""
+    recording = "iterations/001/10-record.h5"
+    spoil(estimated / recording)
+    found = {one["artifact"]: one for one in json.loads(invoke("status", "--check", "--json").stdout)["artifacts"]}
+    assert (found[recording]["state"], found[ESTIMATE]["state"]) == ("damaged", "stale")
+    assert found[ESTIMATE]["reasons"] == [f"input {recording} is damaged"]
+
+
 def test_a_recording_without_a_head_is_a_robots_unless_its_logs_are_there(estimated: Path) -> None:
     """The name of a recording is that of both: the logs tell them apart."""
     (estimated / "iterations/001/10-record.h5").write_bytes(b"")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from typing import Any, Literal, Self
 
@@ -81,7 +82,7 @@ class GroupSpec(Frozen):
 
     def matches(self, path: str) -> bool:
         """Whether the concrete group path (`runs/crawl/caps`) is one of this spec's."""
-        return re.fullmatch(_pattern(self.path), path) is not None
+        return _pattern(self.path).fullmatch(path) is not None
 
     def dataset(self, path: str) -> DatasetSpec | None:
         """The specification of a dataset of this group, by its relative path."""
@@ -111,5 +112,7 @@ class ArtifactSpec(Frozen):
         return next((g for g in self.groups if g.matches(path)), None)
 
 
-def _pattern(path: str) -> str:
-    return "/".join(r"[A-Za-z0-9][\w.+-]*" if part.startswith("{") else re.escape(part) for part in path.split("/"))
+@functools.cache
+def _pattern(path: str) -> re.Pattern[str]:
+    parts = (r"[A-Za-z0-9][\w.+-]*" if part.startswith("{") else re.escape(part) for part in path.split("/"))
+    return re.compile("/".join(parts))

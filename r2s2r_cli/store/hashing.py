@@ -30,19 +30,39 @@ class Digests:
     """Over the rest that can be read: descriptions, root attributes, provenance."""
 
 
-def digest_file(file: h5py.File) -> Digests:
-    """Compute the digests of an open artifact. Raises what h5py raises on damaged data."""
+Scalars = dict[str, str | int | float | bool]
+"""Attributes of a node, by name."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """A group or dataset below the root, with its attributes, which take longer to read than small data."""
+
+    path: str
+    node: Any
+    attributes: Scalars
+
+
+def nodes_of(file: h5py.File) -> list[Node]:
+    """Every node of an open artifact, by path. Raises what h5py raises on damage; ForeignContent."""
+    return [Node(path, node, attributes(node)) for path, node in sorted(walk(file))]
+
+
+def digest_file(file: h5py.File, nodes: list[Node] | None = None) -> Digests:
+    """Compute the digests of an open artifact. nodes: of this file, where they were read already. Raises what h5py
+    raises on damaged data."""
     datasets: dict[str, str] = {}
     rest: dict[str, object] = {}
     groups: dict[str, object] = {}
-    for path, node in sorted(walk(file)):
+    for one in nodes_of(file) if nodes is None else nodes:
+        path, is_dataset = one.path, isinstance(one.node, h5py.Dataset)
         if path == PROVENANCE or path.startswith(PROVENANCE + "/"):
-            rest[path] = dataset_digest(node) if isinstance(node, h5py.Dataset) else attributes(node)
-        elif isinstance(node, h5py.Dataset):
-            datasets[path] = dataset_digest(node)
-            rest[path] = {k: v for k, v in attributes(node).items() if k not in _IDENTITY}
+            rest[path] = dataset_digest(one.node, one.attributes) if is_dataset else one.attributes
+        elif is_dataset:
+            datasets[path] = dataset_digest(one.node, one.attributes)
+            rest[path] = {k: v for k, v in one.attributes.items() if k not in _IDENTITY}
         else:
-            groups[path] = attributes(node)
+            groups[path] = one.attributes
     root = {k: v for k, v in attributes(file).items() if k not in HASH_ATTRIBUTES}
     identity = {k: root.pop(k, None) for k in ("kind", "schema_version")}
     content = json_sha256({"identity": identity, "datasets": datasets, "groups": groups})
@@ -109,7 +129,7 @@ def _keep(broken: Broken | None, path: str, error: Exception) -> None:
     broken.append((path, error))
 
 
-def attributes(node: h5py.Group | h5py.Dataset) -> dict[str, str | int | float | bool]:
+def attributes(node: h5py.Group | h5py.Dataset) -> Scalars:
     """The scalar attributes of a node as plain Python values."""
     return {name: plain(value) for name, value in node.attrs.items()}
 
@@ -131,11 +151,12 @@ def plain(value: object) -> str | int | float | bool:
     raise ForeignContent(f"an attribute is of the type {type(value).__name__}, artifacts have single values only")
 
 
-def dataset_digest(dataset: h5py.Dataset) -> str:
-    """Digest of dtype, shape, unit, dims, frame and data. Raises what h5py raises on damage; ForeignContent."""
+def dataset_digest(dataset: h5py.Dataset, known: Scalars | None = None) -> str:
+    """Digest of dtype, shape, unit, dims, frame and data. known: its attributes, where they were read already. Raises
+    what h5py raises on damage; ForeignContent."""
     check_dataset(dataset)
     digest = hashlib.sha256()
-    identity = {k: v for k, v in attributes(dataset).items() if k in _IDENTITY}
+    identity = {k: v for k, v in (attributes(dataset) if known is None else known).items() if k in _IDENTITY}
     digest.update(canonical_json([dataset.dtype.str, list(dataset.shape), identity]).encode())
     for block in blocks(dataset):
         digest.update(np.ascontiguousarray(block).data)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import h5py
 
-from r2s2r_cli.store.hashing import PROVENANCE, attributes, walk
+from r2s2r_cli.store.hashing import PROVENANCE, Node, nodes_of
 from schemas.base import DIM_SIZES, ArtifactSpec, DatasetSpec, GroupSpec
 
 BLOB_BYTES, BLOB_OFFSET = "bytes", "offset"
@@ -15,6 +15,7 @@ _NUMPY_NAME = {"bool": "bool", "str": "S"}
 _PYTHON_TYPE: dict[str, tuple[type, ...]] = {"str": (str,), "int": (int,), "float": (float,), "bool": (bool,)}
 
 
+Nodes = dict[str, Node]
 Sizes = dict[tuple[str, str], tuple[int, str]]
 """(scope, axis) -> its length and the dataset that it was first met in."""
 
@@ -32,17 +33,14 @@ class Mismatch:
     """Where it needs another remedy than the check that found it."""
 
 
-def check_layout(file: h5py.File, spec: ArtifactSpec) -> list[Mismatch]:
-    """Compare an open file with the layout of its kind: presence, dtype, dims, unit, frame, attributes."""
-    groups: dict[str, h5py.Group] = {}
-    datasets: dict[str, h5py.Dataset] = {}
-    for path, node in walk(file):
-        if path == PROVENANCE or path.startswith(PROVENANCE + "/"):
-            continue
-        if isinstance(node, h5py.Group):
-            groups[path] = node
-        else:
-            datasets[path] = node
+def check_layout(file: h5py.File, spec: ArtifactSpec, nodes: list[Node] | None = None) -> list[Mismatch]:
+    """Compare an open file with the layout of its kind: presence, dtype, dims, unit, frame, attributes. nodes: of this
+    file, where they were read already."""
+    groups: Nodes = {}
+    datasets: Nodes = {}
+    for one in nodes_of(file) if nodes is None else nodes:
+        if one.path != PROVENANCE and not one.path.startswith(PROVENANCE + "/"):
+            (groups if isinstance(one.node, h5py.Group) else datasets)[one.path] = one
     return [*_unknown(groups, datasets, spec), *_missing_groups(groups, spec), *_check_groups(groups, datasets, spec)]
 
 
@@ -76,9 +74,7 @@ def scope(path: str, group: GroupSpec) -> str:
     return "/".join(path.split("/")[:2]) if "{" in group.path else path
 
 
-def _unknown(
-    groups: dict[str, h5py.Group], datasets: dict[str, h5py.Dataset], spec: ArtifactSpec
-) -> Iterator[Mismatch]:
+def _unknown(groups: Nodes, datasets: Nodes, spec: ArtifactSpec) -> Iterator[Mismatch]:
     for path in sorted({**groups, **datasets}):
         found = owner(path, spec)
         if path in datasets and (found is None or found[2] is None):
@@ -87,7 +83,7 @@ def _unknown(
             yield Mismatch(path, "the schema knows no such group", f"a group of {spec.kind}", "an unknown one")
 
 
-def _missing_groups(groups: dict[str, h5py.Group], spec: ArtifactSpec) -> Iterator[Mismatch]:
+def _missing_groups(groups: Nodes, spec: ArtifactSpec) -> Iterator[Mismatch]:
     for group in spec.groups:
         if not group.required:
             continue
@@ -102,9 +98,7 @@ def _missing_groups(groups: dict[str, h5py.Group], spec: ArtifactSpec) -> Iterat
                 yield Mismatch(f"{path}/{tail}", "a required group is missing", group.description, "nothing")
 
 
-def _check_groups(
-    groups: dict[str, h5py.Group], datasets: dict[str, h5py.Dataset], spec: ArtifactSpec
-) -> Iterator[Mismatch]:
+def _check_groups(groups: Nodes, datasets: Nodes, spec: ArtifactSpec) -> Iterator[Mismatch]:
     sizes: Sizes = {}
     for path, node in sorted(groups.items()):
         group = spec.group(path)
@@ -133,8 +127,8 @@ def on_disk(dataset: DatasetSpec) -> list[tuple[str, DatasetSpec]]:
     return [(f"{dataset.path}/{BLOB_BYTES}", data), (f"{dataset.path}/{BLOB_OFFSET}", offset)]
 
 
-def _check_attributes(path: str, node: h5py.Group, group: GroupSpec) -> Iterator[Mismatch]:
-    found = attributes(node)
+def _check_attributes(path: str, node: Node, group: GroupSpec) -> Iterator[Mismatch]:
+    found = node.attributes
     for attribute in group.attributes:
         where = f"{path}@{attribute.name}"
         if attribute.name not in found:
@@ -152,7 +146,8 @@ def _check_attributes(path: str, node: h5py.Group, group: GroupSpec) -> Iterator
         yield Mismatch(f"{path}@{name}", "the schema knows no such attribute", "one of the schema", "an unknown one")
 
 
-def _check_dataset(path: str, node: h5py.Dataset, spec: DatasetSpec, scope: str, sizes: Sizes) -> Iterator[Mismatch]:
+def _check_dataset(path: str, one: Node, spec: DatasetSpec, scope: str, sizes: Sizes) -> Iterator[Mismatch]:
+    node: h5py.Dataset = one.node
     received = "S" if node.dtype.kind == "S" else node.dtype.name
     if received != _NUMPY_NAME.get(spec.dtype, spec.dtype):
         yield Mismatch(path, "a dataset has the wrong dtype", spec.dtype, received)
@@ -161,7 +156,7 @@ def _check_dataset(path: str, node: h5py.Dataset, spec: DatasetSpec, scope: str,
     else:
         for name, size in zip(spec.dims, node.shape, strict=True):
             yield from _check_axis(path, name, size, scope, sizes)
-    found = attributes(node)
+    found = one.attributes
     for name, expected in (("unit", spec.unit), ("dims", ",".join(spec.dims)), ("frame", spec.frame)):
         if found.get(name) != expected:
             text = str(found.get(name, "nothing")) or "an empty text"

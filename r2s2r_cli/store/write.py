@@ -13,7 +13,7 @@ import numpy as np
 from r2s2r_cli import __version__
 from r2s2r_cli.artifact import ArtifactData, Blobs, Group, Rows, Scalar, Value
 from r2s2r_cli.store.atomic import replacing
-from r2s2r_cli.store.hashing import PROVENANCE, digest_file
+from r2s2r_cli.store.hashing import PROVENANCE, digest_file, nodes_of
 from r2s2r_cli.store.hdf5_file import writable
 from r2s2r_cli.store.header import MAX_BLOCK, block, block_size, body_sha256, read_header, write_block
 from r2s2r_cli.store.layout import BLOB_BYTES, BLOB_OFFSET, check_layout, on_disk
@@ -224,10 +224,11 @@ def _set_attribute(node: h5py.Group | h5py.Dataset, name: str, value: Scalar) ->
 def _seal(temp: Path, spec: ArtifactSpec, draft: Header) -> Header:
     """Reopen, check the layout, and write the digests of what can be read back."""
     with writable(temp, "r+") as (file, _):
-        mismatches = check_layout(file, spec)
+        nodes = nodes_of(file)
+        mismatches = check_layout(file, spec, nodes)
         if mismatches:
             raise ValueError(f"not the layout of {spec.kind}: {mismatches[0]}")
-        digests = digest_file(file)
+        digests = digest_file(file, nodes)
         for name, digest in (("content_sha256", digests.content), ("seal_sha256", digests.seal)):
             file.attrs.modify(name, np.array(digest.encode(), dtype=h5py.string_dtype("utf-8", 64)))
     body, length = body_sha256(temp, draft.body_offset)

@@ -30,8 +30,10 @@ COMMAND = [sys.executable, "-m", "r2s2r_cli", "rig"]
 def running(folder: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
     """The command in a process of its own; killed at the end, if it still runs."""
     child = subprocess.Popen(
-        [*COMMAND, *arguments], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+        [*COMMAND, *arguments], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        # Under nohup a suite ignores SIGHUP, and so would what it starts.
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),
+    )  # fmt: skip
     try:
         yield child
     finally:

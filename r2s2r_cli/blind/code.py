@@ -52,8 +52,16 @@ def _reached(home: Path, begin: tuple[str, ...]) -> set[Path]:
     return found
 
 
+_BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")
+"""Where statements hold statements."""
+
+
 def _imports(path: Path) -> Iterator[str]:
-    for node in ast.walk(ast.parse(path.read_bytes())):
+    todo: list[ast.AST] = [*ast.parse(path.read_bytes()).body]
+    while todo:
+        node = todo.pop()
+        for block in _BLOCKS:
+            todo += getattr(node, block, ())
         if isinstance(node, ast.Import):
             yield from (one.name for one in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:

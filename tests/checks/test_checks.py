@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import shlex
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from typer.main import get_command
@@ -78,6 +80,12 @@ def test_every_check_says_what_why_and_how_to_fix(entry: Check) -> None:
     assert (entry.function.__doc__ or "").strip()
 
 
+@functools.cache
+def command_line() -> Any:
+    """All commands, built once."""
+    return get_command(app)
+
+
 @pytest.mark.parametrize("entry", CHECKS, ids=lambda entry: entry.name)
 def test_a_fix_is_a_line_to_paste_or_names_no_command(entry: Check) -> None:
     """A command stands first, and its remark behind it as a shell skips it; words alone hold none, half of which
@@ -89,7 +97,7 @@ def test_a_fix_is_a_line_to_paste_or_names_no_command(entry: Check) -> None:
     words = shlex.split(said, comments=True)
     assert said.partition("   # ")[0].split() == words
     if words[0] == "r2s2r":
-        command = get_command(app).commands[words[1]]  # type: ignore[attr-defined]
+        command = command_line().commands[words[1]]
         command.make_context(words[1], [word for word in words[2:] if word != "--help"])
 
 

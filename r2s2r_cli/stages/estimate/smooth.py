@@ -15,6 +15,7 @@ import numpy as np
 
 from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.estimate.kalman import Disturbances, Filtered, Smoothed, backward, forward
+from r2s2r_cli.stages.estimate.likelihood import log_likelihood
 
 MIN_FRAMES = 5
 """Fewer frames leave no innovations to fit the process noise to (two go into the start)."""
@@ -174,7 +175,7 @@ def fit_density(
     caps = y.shape[1] // 3
 
     def best(grid: np.ndarray) -> np.ndarray:
-        loglik = forward(t, y, var, np.repeat(10.0**grid, 3, axis=1), free).loglik
+        loglik = log_likelihood(t, y, var, np.repeat(10.0**grid, 3, axis=1), free)
         pick = np.argmax(np.sum(loglik.reshape(len(grid), caps, 3), axis=2), axis=0)
         return grid[pick, np.arange(caps)]
 

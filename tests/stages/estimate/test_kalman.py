@@ -7,6 +7,7 @@ import pytest
 
 from r2s2r_cli.stages.estimate import kalman
 from r2s2r_cli.stages.estimate.kalman import Disturbances, backward, forward, process, transition
+from r2s2r_cli.stages.estimate.likelihood import log_likelihood
 from r2s2r_cli.stages.estimate.noise import MIN_NOISE
 from tests.stages.estimate import dense
 from tests.stages.estimate.dense import covariance
@@ -45,6 +46,15 @@ def solved(
     left = np.eye(n * 2) - gain @ select
     posterior = left @ cov @ left.T + gain @ np.diag(var[seen]) @ gain.T
     return (mean0 + gain @ rest).reshape(n, 2), posterior, float(loglik)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_likelihood_alone_is_that_of_the_filter(seed: int) -> None:
+    """Of every process noise of a grid and every series, with what is missing, kicks and jumps."""
+    t, y, var, _, free = problem(seed)
+    density = 10.0 ** np.linspace(-8, 2, 11)[:, None]
+    expected = forward(t, y, var, density, free).loglik
+    assert log_likelihood(t, y, var, density, free) == pytest.approx(expected, rel=1e-10, abs=1e-10)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import platform
 import subprocess
 import sys
@@ -67,6 +68,11 @@ def config_sha256(settings: Mapping[str, Any], robot: Mapping[str, Any]) -> str:
 
 def package_versions() -> dict[str, str]:
     """Installed versions of what can change a result."""
+    return dict(_package_versions())
+
+
+@functools.cache
+def _package_versions() -> dict[str, str]:
     versions = {"r2s2r": __version__, "python": sys.version.split()[0]}
     for name in PACKAGES:
         try:
@@ -76,8 +82,10 @@ def package_versions() -> dict[str, str]:
     return versions
 
 
+@functools.cache
 def source_commit() -> tuple[str | None, bool | None]:
-    """Commit and dirty flag of the source checkout; (None, None) where r2s2r was installed from a wheel."""
+    """Commit and dirty flag of the source checkout; (None, None) where r2s2r was installed from a wheel. Looked at once
+    a process, which has loaded what it computes with."""
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():
         return None, None

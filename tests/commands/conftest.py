@@ -27,6 +27,24 @@ def invoke(*arguments: str) -> Any:
     return CliRunner().invoke(app, list(arguments))
 
 
+@pytest.fixture(autouse=True)
+def sketches(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures that commands draw in this process are small, without axes and not laid out, in a third of the time:
+    what stands in them is tested in tests/views, from values. The slow tests look at whole ones."""
+    from matplotlib.figure import Figure
+
+    save = Figure.savefig
+
+    def sketched(figure: Figure, *to: Any, **how: Any) -> None:
+        figure.set_layout_engine("none")
+        for axes in figure.axes:
+            axes.set_axis_off()
+        save(figure, *to, **{**how, "dpi": 20})
+
+    if request.node.get_closest_marker("slow") is None:
+        monkeypatch.setattr(Figure, "savefig", sketched)
+
+
 @pytest.fixture(scope="session")
 def templates(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two projects with the kinematic sample: `new`, and `done` with it imported, estimated and drawn."""

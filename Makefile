@@ -54,6 +54,9 @@ demo-beside:
 	@{ bash examples/01_first_project/run.sh "$(DEMO)" && bash examples/14_diagnose/run.sh --out "$(DEMO)/diagnosis"; } \
 	  > "$(DEMO)/beside.txt" 2>&1 || { cat "$(DEMO)/beside.txt"; exit 1; }
 
+# What the tests compile is kept for the next time: it goes by a name that counts all sources of the engine.
+test test-slow test-soak: export R2S2R_CACHE ?= $(abspath $(VENV))/kernels
+
 test: $(VENV)/.dev-stamp  ## the test suite, without the slow tests
 	@$(PY) -m pytest $(PYTEST_FLAGS)
 

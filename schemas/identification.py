@@ -19,6 +19,8 @@ TRUST = {
     4: "fixed: it was not free",
 }
 
+NOT_IDENTIFIABLE = 2
+"""The code of TRUST for a number that nothing speaks for."""
 FIXED_BY_HAND = 4
 """The code of TRUST for a number that was given."""
 

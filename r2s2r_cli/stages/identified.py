@@ -102,7 +102,7 @@ class Identified:
         for k in np.flatnonzero(~said):
             free = self.mapping.frees[k]
             if math.isfinite(free.prior_sd):
-                drawn = free.to_z(_inside(free, free.start)) + free.prior_sd * rng.standard_normal(count)
+                drawn = free.to_z(_inside(free, free.mean)) + free.prior_sd * rng.standard_normal(count)
                 deviation[:, k] = drawn - z[k]
         deviation[0] = 0.0
         found = np.array([
@@ -162,6 +162,7 @@ def _free(own: Free, table: Group, k: int) -> Free:
     return replace(
         own,
         start=mean if math.isfinite(mean) else float(table["start"][k]),
+        off=None,
         lower=low if math.isfinite(low) else own.lower,
         upper=high if math.isfinite(high) else own.upper,
         coordinate=_COORDINATES[int(table["coordinate"][k])],

@@ -66,7 +66,7 @@ def fit_closed(
 
     def problem_at(values: np.ndarray, noise: float) -> ClosedResiduals:
         windows = training_windows(runs, train, predictor, values, recipe, known)
-        return ClosedResiduals(predictor, windows, values, spread=recipe.spread, noise=noise)
+        return ClosedResiduals(predictor, windows, values, spread=recipe.spread, noise=noise, held=recipe.held)
 
     def hear(stage: str) -> Callable[[Progress], None] | None:
         return None if progress is None else partial(progress, stage)
@@ -78,7 +78,9 @@ def fit_closed(
     _, solution = planes(problem, z, spread, loss, seed, hear(PLANES))
     problem = problem_at(values_of(frees, solution.z[:n]), recipe.noise)
     if problem.misfit(solution.z[: len(problem.z0)]) < EXACT:
-        problem = ClosedResiduals(predictor, problem.windows, problem.at, spread=recipe.spread, noise=0.0)
+        problem = ClosedResiduals(
+            predictor, problem.windows, problem.at, spread=recipe.spread, noise=0.0, held=recipe.held
+        )
     surface, solution = planes(problem, solution.z[:n], posterior(solution, problem), loss, seed + 1, hear(LAST))
     return ClosedFit(problem, surface, solution, values_of(frees, solution.z[:n]))
 

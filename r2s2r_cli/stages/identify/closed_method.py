@@ -13,6 +13,7 @@ from r2s2r_cli.stages.identify.closed_residuals import ClosedResiduals
 from r2s2r_cli.stages.identify.conclude import Fitted, concluded, start_found
 from r2s2r_cli.stages.identify.found import Found, TraceStep
 from r2s2r_cli.stages.identify.free import select
+from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding_effects, require_any
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import default_free
@@ -23,7 +24,7 @@ from r2s2r_cli.stages.identify.solve.record import Progress as SolverProgress
 from r2s2r_cli.stages.identify.solve.starts import CLOSE
 from r2s2r_cli.stages.identify.task import Task, busy, specs_asked
 from r2s2r_cli.stages.identify.training import training_windows
-from r2s2r_cli.stages.identify.trust.identifiability import identifiability
+from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, identifiability
 
 LOSS = (
     "end caps at the key frame of each interval and its duration, controller in the loop, windows of {window} "
@@ -44,9 +45,15 @@ def find_closed(task: Task) -> Found:
     problem = closed_problem(task, predictor)
     before = identifiability(problem, problem.z0, problem.frees)
     kept = Kept(task.checkpoint)
-    fits = [_fit_of(task, predictor, kept, start) for start in range(task.settings.starts)]
-    first = np.array([free.start for free in problem.frees])
-    best = min(fits, key=lambda one: (one.problem.noise > 0, one.solution.cost))
+    task, predictor = holding_effects(task, predictor, before, _looked)
+    require_any(task.held, before.names)
+
+    def fitted(task: Task, predictor: Predictor) -> list[ClosedFit]:
+        return [_fit_of(task, predictor, kept, start) for start in range(task.settings.starts)]
+
+    task, fits = fitted_to_shown(task, predictor, fitted, lambda made: _as_fit(_best(made)), kept=kept, look=_looked)
+    best = _best(fits)
+    first = np.array([free.start for free in best.problem.frees])
     near = [one.solution.z[: len(first)] for one in fits if one.solution.cost <= best.solution.cost + CLOSE]
     rows = tuple(start_found(first, _as_fit(one)) for one in fits)
     took, real = best.problem.seconds(best.solution.z)
@@ -58,7 +65,17 @@ def find_closed(task: Task) -> Found:
             ROUGH.format(float(np.median(best.surface.rough))),
         ),
     )  # fmt: skip
-    return concluded(task, predictor, made)
+    return concluded(task, best.problem.predictor, made)
+
+
+def _best(fits: Sequence[ClosedFit]) -> ClosedFit:
+    return min(fits, key=lambda one: (one.problem.noise > 0, one.solution.cost))
+
+
+def _looked(task: Task, predictor: Predictor) -> Identifiability:
+    """What the windows say in closed loop where a fit begins."""
+    problem = closed_problem(task, predictor)
+    return identifiability(problem, problem.z0, problem.frees, refuse=False)
 
 
 def closed_predictor(task: Task) -> Predictor:
@@ -73,7 +90,8 @@ def closed_problem(task: Task, predictor: Predictor | None = None) -> ClosedResi
     predictor = predictor or closed_predictor(task)
     values = np.array([free.start for free in predictor.mapping.frees])
     windows = training_windows(task.runs, task.request.train, predictor, values, task.recipe)
-    return ClosedResiduals(predictor, windows, values, spread=task.recipe.spread, noise=task.recipe.noise)
+    recipe = task.recipe
+    return ClosedResiduals(predictor, windows, values, spread=recipe.spread, noise=recipe.noise, held=recipe.held)
 
 
 def _fit_of(task: Task, predictor: Predictor, kept: Kept, start: int) -> ClosedFit:

@@ -40,11 +40,11 @@ class ClosedResiduals(CapResiduals):
 
     def __init__(
         self, predictor: Predictor, windows: Sequence[Window], values: np.ndarray, *,
-        spread: StartSpread | None = None, noise: float = 1e-3,
+        spread: StartSpread | None = None, noise: float = 1e-3, held: Sequence[str] = (),
     ) -> None:  # fmt: skip
         import torch
 
-        super().__init__(predictor, windows, spread=spread, noise=noise)
+        super().__init__(predictor, windows, spread=spread, noise=noise, held=held)
         self.flights = tuple(Flight(one) for one in windows)
         self.at, self.noise = np.asarray(values, dtype=float), noise
         period = predictor.mapping.robot.pid.rate_hz**-1
@@ -63,7 +63,7 @@ class ClosedResiduals(CapResiduals):
         self.lower, self.upper = np.concatenate([self.lower, -wide]), np.concatenate([self.upper, wide])
         self.prior_mean = np.concatenate([self.prior_mean, np.zeros(len(extra))])
         self.prior_sd = np.concatenate([self.prior_sd, np.where(extra > 0, extra, FIXED_SD)])
-        self.z0 = self.prior_mean.copy()
+        self.z0 = np.concatenate([self.z0, np.zeros(len(extra))])
         runs = list(dict.fromkeys(w.run.name for w in windows))
         most = 1 + max(max(w.intervals) for w in windows)
         number = np.concatenate([runs.index(f.window.run.name) * most + np.array(f.numbers) for f in self.flights])

@@ -19,7 +19,7 @@ from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.identify.closed_residuals import ClosedResiduals
 from r2s2r_cli.stages.identify.solve.levenberg import levenberg_marquardt
 from r2s2r_cli.stages.identify.solve.loss import Loss
-from r2s2r_cli.stages.identify.solve.problem import Evaluation
+from r2s2r_cli.stages.identify.solve.problem import Evaluation, still_of
 from r2s2r_cli.stages.identify.solve.record import Counts, Progress, Reason, Solution
 from r2s2r_cli.stages.identify.trust.information import marginal
 
@@ -58,6 +58,7 @@ class Surface:
         # Both sides of a pair are as far from the point, so what is even in the distance drops out of the slopes.
         room = np.minimum(high - centre, centre - low)
         by = np.clip(by, -room, room)
+        by[:, still_of(problem)] = 0.0
         samples = problem.batch(np.vstack([centre[None], centre + by, centre - by]))
         up, down = samples[1 : len(by) + 1], samples[len(by) + 1 :]
         good = np.isfinite(up).all(axis=1) & np.isfinite(down).all(axis=1)
@@ -78,7 +79,7 @@ class Surface:
         self.lower, self.upper = np.concatenate([problem.lower, -wide]), np.concatenate([problem.upper, wide])
         self.prior_mean = np.concatenate([problem.prior_mean, none])
         self.prior_sd = np.concatenate([problem.prior_sd, none + 1.0])
-        self.z0 = self.prior_mean.copy()
+        self.z0 = np.concatenate([problem.z0, none])
         self.block, self.cluster, self.held = problem.block, problem.cluster, problem.held
         self.predictor, self.windows, self.split = problem.predictor, problem.windows, problem.split
         self.centre = centre

@@ -9,10 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from r2s2r_cli.stages.identify.conclude import Fitted, concluded, start_found
-from r2s2r_cli.stages.identify.default_method import first_fit, holding, loss_words
+from r2s2r_cli.stages.identify.default_method import first_fit, loss_words
 from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep
 from r2s2r_cli.stages.identify.free.base import values_of
+from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding
 from r2s2r_cli.stages.identify.kept import Kept
+from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.rounds import START_SPREAD, Fit
 from r2s2r_cli.stages.identify.solve.cma_es import Sampled, cma_es
@@ -29,16 +31,19 @@ def find_cma(task: Task) -> Found:
     """The default fit; CMA-ES from robot.toml's values as wide as their priors, at the start states of that fit; the
     better of the two, CMA-ES's finished by Levenberg-Marquardt. Raises as `identify`."""
     predictor = task.predictor(free_parameters(task.robot, task.runs, task.request, task.settings))
-    task, before = holding(task, predictor)
+    task, predictor, before = holding(task, predictor)
     kept = Kept(task.checkpoint)
-    fitted = first_fit(task, predictor, kept)
-    sampled = _sampled(task, fitted, kept)
-    best, starts, words = better_of(task, fitted, sampled)
+
+    def both(task: Task, predictor: Predictor) -> tuple[Fit, tuple[StartFound, ...], str]:
+        fitted = first_fit(task, predictor, kept)
+        return better_of(task, fitted, _sampled(task, fitted, kept))
+
+    task, (best, starts, words) = fitted_to_shown(task, predictor, both, lambda made: made[0], kept=kept)
     made = Fitted(
         best, starts, best.solution.z[None, : len(best.values)], tuple(kept.steps),
         f"{loss_words(task)}; CMA-ES over the parameters beside it", before, task.settings.profiles, remarks=(words,),
     )  # fmt: skip
-    return concluded(task, predictor, made)
+    return concluded(task, best.problem.predictor, made)
 
 
 def _sampled(task: Task, fitted: Fit, kept: Kept) -> Sampled:

@@ -38,17 +38,18 @@ class Fitted:
     remarks: tuple[str, ...] = ()
 
 
-def known_before(task: Task, predictor: Predictor) -> Identifiability:
-    """What the training intervals can tell at all, at the values of robot.toml, each interval from its own start.
+def known_before(task: Task, predictor: Predictor, *, refuse: bool = True) -> Identifiability:
+    """What the training intervals can tell at all, where a fit would begin, each interval from its own start.
 
-    Raises InputError for starts on a bound, and for parameters that were asked for and have no effect. One of the
-    default set may have none: a random policy need not reel out every cable. It is not identifiable, and is held.
+    Raises, with `refuse`, InputError for starts on a bound, and for parameters that were asked for and have no effect.
+    One of the default set may have none: a random policy need not reel out every cable. It is not identifiable, and is
+    held.
     """
     frees, recipe = predictor.mapping.frees, task.recipe
     values = np.array([free.start for free in frees])
     windows = training_windows(task.runs, task.request.train, predictor, values, replace(recipe, window=1))
-    problem = CapResiduals(predictor, windows, spread=recipe.spread, noise=recipe.noise)
-    return identifiability(problem, problem.z0, frees, excused=task.of_default)
+    problem = CapResiduals(predictor, windows, spread=recipe.spread, noise=recipe.noise, held=recipe.held)
+    return identifiability(problem, problem.z0, frees, refuse=refuse, excused=task.of_default)
 
 
 def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:

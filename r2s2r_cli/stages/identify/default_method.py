@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.identify.alike import as_the_others
-from r2s2r_cli.stages.identify.conclude import Fitted, concluded, known_before, start_found
+from r2s2r_cli.stages.identify.conclude import Fitted, concluded, start_found
 from r2s2r_cli.stages.identify.fit import fit
 from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep
 from r2s2r_cli.stages.identify.free.base import values_of
+from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.rounds import Fit, more_starts
 from r2s2r_cli.stages.identify.solve.record import Checkpoint as SolverCheckpoint, Progress as SolverProgress
 from r2s2r_cli.stages.identify.task import Task, free_parameters
-from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, Trust
 from r2s2r_cli.stages.identify.windows import spans
 
 LOSS = (
@@ -33,30 +30,19 @@ def find_default(task: Task) -> Found:
     """Fit and judge. Raises as `identify`."""
     frees = free_parameters(task.robot, task.runs, task.request, task.settings)
     predictor = task.predictor(frees)
-    task, before = holding(task, predictor)
+    task, predictor, before = holding(task, predictor)
     kept = Kept(task.checkpoint)
-    fitted = first_fit(task, predictor, kept)
+    task, fitted = shown_fit(task, predictor, kept)
     starts, near = _other_starts(task, fitted)
     made = Fitted(fitted, starts, near, tuple(kept.steps), loss_words(task), before, task.settings.profiles)
-    return concluded(task, predictor, made)
+    return concluded(task, fitted.problem.predictor, made)
 
 
-def holding(task: Task, predictor: Predictor) -> tuple[Task, Identifiability]:
-    """The task with those parameters held at their starts that its training intervals do not show, and what they show.
-
-    Raises as `known_before`, and InputError where they show none at all.
-    """
-    before = known_before(task, predictor)
-    both = zip(before.names, before.trust, strict=True)
-    held = tuple(name for name, trust in both if trust is Trust.NOT_IDENTIFIABLE)
-    if held and len(held) == len(before.names):
-        shown = ", ".join(held[:3]) + (f" and {len(held) - 3} more" if len(held) > 3 else "")
-        raise InputError(
-            "the training intervals show no parameter that is free: there is nothing to fit", where="--train",
-            expected="intervals in which the robot moves as a free parameter says",
-            received=f"none that shows {shown}", hint="r2s2r inspect 20-estimate.h5   # targets of each interval",
-        )  # fmt: skip
-    return replace(task, held=held), before
+def shown_fit(task: Task, predictor: Predictor, kept: Kept) -> tuple[Task, Fit]:
+    """The fit without what of effects it turns out not to show, and the task with that held. Raises as `fit`."""
+    return fitted_to_shown(
+        task, predictor, lambda task, predictor: first_fit(task, predictor, kept), lambda made: made, kept=kept
+    )
 
 
 def loss_words(task: Task) -> str:

@@ -114,7 +114,7 @@ def _on_bound(one: ParameterFound) -> str:
     if one.trust is Trust.NOT_IDENTIFIABLE:
         return (
             f"{name} went to its bound {one.value:g} although the runs do not determine it: other numbers can make up "
-            f"for it, so give it a value that is known, --fix {name}={free.start:g}, or a narrower prior"
+            f"for it, so give it a value that is known, --fix {name}={free.mean:g}, or a narrower prior"
         )
     unit = "" if free.unit == "1" else f" {free.unit}"
     asked = "less" if low else "more"

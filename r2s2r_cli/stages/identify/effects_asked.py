@@ -14,7 +14,7 @@ from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.stages.identify.free.catalogue import entries, require_effects
 from r2s2r_cli.stages.identify.free.entry import inside
-from schemas.identification import FIXED_BY_HAND
+from schemas.identification import FIXED_BY_HAND, NOT_IDENTIFIABLE
 
 if TYPE_CHECKING:
     from schemas.robot import Robot
@@ -68,8 +68,8 @@ def effects_asked(words: Sequence[str], robot: Robot) -> EffectsAsked:
 
 
 def effects_kept(before: ArtifactData, robot: Robot) -> EffectsAsked:
-    """Of an earlier identification: its effects, each free number of theirs starting from what was found, and what was
-    fixed by hand as it was."""
+    """Of an earlier identification: its effects, each free number of theirs starting from what was found, but for what
+    was held without the effect, which is looked for as if for the first time; and what was fixed by hand as it was."""
     known, table = entries(robot), before.groups["parameters"]
     ids = tuple(str(before.groups["fit"].attributes["effects"]).split())
     specs, fixed = list[str](), dict[str, float]()
@@ -79,6 +79,8 @@ def effects_kept(before: ArtifactData, robot: Robot) -> EffectsAsked:
         free, value = known[name].free, float(table["value"][k])
         if int(table["trust"][k]) == FIXED_BY_HAND:
             fixed[name] = value
+        elif int(table["trust"][k]) == NOT_IDENTIFIABLE and value == free.off:
+            specs.append(name)
         else:
             specs.append(f"{name}={inside(value, free.lower, free.upper, free.prior_sd)!r}")
     return EffectsAsked(ids, tuple(specs), fixed)

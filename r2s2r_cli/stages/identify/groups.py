@@ -74,7 +74,7 @@ def _parameters(parameters: Sequence[ParameterFound]) -> Group:
             "range": floats([one.range for one in parameters]).reshape(-1, 2),
             "bounds": np.where(np.isfinite(bounds), bounds, _NAN),
             "start": floats([free.start for free in frees]),
-            "prior_mean": np.where(flat, _NAN, floats([free.start for free in frees])),
+            "prior_mean": np.where(flat, _NAN, floats([free.mean for free in frees])),
             "prior_sd": np.where(flat, _NAN, floats([free.prior_sd for free in frees])),
             "coordinate": np.array([_COORDINATES[free.coordinate] for free in frees], np.uint8),
             "identifiable": np.array([one.identifiable for one in parameters], dtype=bool),

@@ -29,6 +29,13 @@ class Kept:
         self._values.update(values)
         self.held = True
 
+    def restart(self, **values: Any) -> None:
+        """What was done so far is done again in another way: its trace and what was saved of it are forgotten, and
+        `values` are held for the next save."""
+        self.saved, self._values = {}, {}
+        self.steps.clear()
+        self.hold(**values)
+
     def save(self, **values: Any) -> None:
         """Replace what was saved. Raises what the checkpoint raises."""
         self.hold(**values)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.stages.identify.before import names_of, specs_of
 from r2s2r_cli.stages.identify.conclude import Fitted, concluded, known_before, start_found
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.identify.default_method import loss_words
@@ -22,16 +23,16 @@ from r2s2r_cli.stages.identify.fit import fit
 from r2s2r_cli.stages.identify.found import Found, TraceStep, Update
 from r2s2r_cli.stages.identify.free import Free, select
 from r2s2r_cli.stages.identify.free.base import Coordinate
-from r2s2r_cli.stages.identify.free.catalogue import own_entries
+from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding_effects
 from r2s2r_cli.stages.identify.kept import Kept
+from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
+from r2s2r_cli.stages.identify.rounds import Fit
 from r2s2r_cli.stages.identify.solve.record import Progress as SolverProgress
 from r2s2r_cli.stages.identify.task import Task, free_parameters, specs_asked
 from r2s2r_cli.stages.identify.trust.identifiability import Trust
 from r2s2r_cli.stages.identify.trusted import Sureness, sureness
 from r2s2r_cli.stages.identify.twice import learned_twice
-from schemas.identification import FIXED_BY_HAND
-from schemas.robot import Robot
 
 DRIFT = 0.05
 """Standard deviation of what a run changes: of a logarithmic coordinate, 5 %; else this share of its width."""
@@ -63,11 +64,8 @@ def find_online(task: Task) -> Found:
     rollouts = first.rollouts + kept.saved.get("rollouts", 0)
     for k in range(len(updates), len(order)):
         frees = tuple(drifted(free, known) for free in wide)
-        predictor = task.predictor(frees)
-        made = fit(
-            task.runs, (order[k],), predictor, task.recipe, seed=task.request.seed,
-            progress=_progress(task, kept.steps, order, k),
-        )  # fmt: skip
+        made = _fit_to(replace(task, request=replace(task.request, train=(order[k],))), frees, kept, (k, order))
+        frees, predictor = made.problem.frees, made.problem.predictor
         sure = sureness(made, made.solution.z[None, : len(frees)], loss=task.recipe.loss, seed=task.request.seed)
         known = learned(known, frees, sure)
         updates.append(update_of(order[k].run, frees, sure))
@@ -84,6 +82,19 @@ def find_online(task: Task) -> Found:
         tuple(updates), remarks,
     )  # fmt: skip
     return concluded(task, predictor, last)
+
+
+def _fit_to(task: Task, frees: Sequence[Free], kept: Kept, place: tuple[int, Sequence[Selection]]) -> Fit:
+    """The fit to one run, which is the task's, the place-th of several; what it does not show of effects is held."""
+    steps = len(kept.steps)
+
+    def make(own: Task, predictor: Predictor) -> Fit:
+        del kept.steps[steps:]
+        return fit(own.runs, own.request.train, predictor, own.recipe, seed=own.request.seed,
+                   progress=_progress(own, kept.steps, place[1], place[0]))  # fmt: skip
+
+    own, predictor = holding_effects(task, task.predictor(frees))
+    return fitted_to_shown(own, predictor, make, lambda made: made)[1]
 
 
 def _remarks(twice: tuple[str, ...]) -> tuple[str, ...]:
@@ -111,34 +122,8 @@ def first_free(task: Task) -> tuple[Free, ...]:
     before = task.request.before
     if before is None:
         return free_parameters(task.robot, task.runs, task.request, task.settings)
-    specs = specs_asked(task.request, task.settings, tuple(specs_of(before).values()))
+    specs = specs_asked(task.request, task.settings, tuple(specs_of(before, task.robot).values()))
     return select(specs, task.robot, task.request.effects, task.request.fixed)
-
-
-def specs_of(before: ArtifactData) -> dict[str, str]:
-    """What was free there, as after --free, by name."""
-    group = before.groups["parameters"]
-    found = {}
-    for k, name in enumerate(_names(before)):
-        if int(group["trust"][k]) == FIXED_BY_HAND:
-            continue
-        mean, sd = float(group["prior_mean"][k]), float(group["prior_sd"][k])
-        low, high = (float(end) for end in group["bounds"][k])
-        start = mean if math.isfinite(mean) else float(group["start"][k])
-        spec = f"{name}={start!r}"
-        if math.isfinite(low) and math.isfinite(high):
-            spec += f",{low!r}..{high!r}"
-        # A winch held as others are that came out equal, on a bound say, has a prior of no width: nobody asked for it.
-        found[name] = spec + (f",~{sd!r}" if math.isfinite(sd) and sd > 0 else "")
-    return found
-
-
-def given_in(before: ArtifactData, robot: Robot) -> dict[str, float]:
-    """What was not free there but had a value of its own, by hand or with the default set, by name, in its unit.
-    Without the numbers of effects (`effects_asked.effects_kept` has those)."""
-    group, own = before.groups["parameters"], own_entries(robot)
-    fixed = zip(_names(before), group["trust"], group["value"], strict=True)
-    return {name: float(value) for name, trust, value in fixed if int(trust) == FIXED_BY_HAND and name in own}
 
 
 def known_of(before: ArtifactData) -> Known:
@@ -149,7 +134,7 @@ def known_of(before: ArtifactData) -> Known:
     group = before.groups["parameters"]
     covariance = before.groups["covariance"]["covariance"] if "covariance" in before.groups else None
     known = Known({}, {})
-    for k, name in enumerate(_names(before)):
+    for k, name in enumerate(names_of(before)):
         sd = math.nan if covariance is None else math.sqrt(max(float(covariance[k, k]), 0.0))
         if bool(group["identifiable"][k]) and math.isfinite(sd) and sd > 0:
             known.value[name], known.sd_z[name] = float(group["value"][k]), sd
@@ -163,7 +148,7 @@ def drifted(free: Free, known: Known) -> Free:
     margin = INSIDE * (free.upper - free.lower) if math.isfinite(free.upper - free.lower) else 0.0
     value = min(max(known.value[free.name], free.lower + margin), free.upper - margin)
     sd = math.hypot(known.sd_z[free.name], drift_of(free))
-    return replace(free, start=value, prior_sd=min(sd, free.prior_sd))
+    return replace(free, start=value, prior_sd=min(sd, free.prior_sd), off=None)
 
 
 def drift_of(free: Free) -> float:
@@ -192,7 +177,7 @@ def learned(known: Known, frees: Sequence[Free], sure: Sureness) -> Known:
 
 def update_of(run: str, frees: Sequence[Free], sure: Sureness) -> Update:
     """The estimate after a run, in units: of what it did not determine, what was known before, with sd NaN."""
-    value, sd = np.array([free.start for free in frees]), np.full(len(frees), math.nan)
+    value, sd = np.array([free.mean for free in frees]), np.full(len(frees), math.nan)
     for k, one in enumerate(sure.parameters):
         if _determined(sure, k):
             value[k], sd[k] = one.value, one.sd if math.isfinite(one.sd) else math.nan
@@ -235,7 +220,3 @@ def _progress(
         task.progress(Step.share("fit", share, one.cost))
 
     return told
-
-
-def _names(before: ArtifactData) -> list[str]:
-    return [name.decode() for name in before.groups["parameters"]["name"].tolist()]

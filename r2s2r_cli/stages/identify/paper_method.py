@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,6 +12,7 @@ from r2s2r_cli import __version__
 from r2s2r_cli.stages.identify.conclude import judged_by
 from r2s2r_cli.stages.identify.found import Found, ParameterFound, StartFound, TraceStep
 from r2s2r_cli.stages.identify.free import select
+from r2s2r_cli.stages.identify.holding import effects_moving, held_at, holding_effects, require_any
 from r2s2r_cli.stages.identify.paper import (
     PAPER_FREE,
     PaperFit,
@@ -28,6 +29,7 @@ from r2s2r_cli.stages.identify.request import Step
 from r2s2r_cli.stages.identify.solve.record import names_on_bound
 from r2s2r_cli.stages.identify.task import Task, specs_asked
 from r2s2r_cli.stages.identify.trust.identifiability import Trust
+from r2s2r_cli.stages.identify.trusted import NOT_SHOWN, held_as
 
 NO_SD = "method paper gives no uncertainty"
 LOSS = "Key Frame Loss of the paper, mean squared distance of the end caps at key frames [m^2], {drive}, state detached"
@@ -41,11 +43,20 @@ def find_paper(task: Task) -> Found:
     """
     request, settings = task.request, task.settings
     made, judge = paper_engines(task)
+    task, judge = holding_effects(task, judge)
+    require_any(task.held, judge.mapping.names)
     named = {run.name: run for run in task.runs}
     demos = [demo for one in request.train for demo in demonstrations(named[one.run], one)]
     asked = Settings(iterations=settings.max_iterations, closed_loop=request.drive == "closed loop")
-    fit = _fitted(task, made, demos, asked)
-    return _found(task, made, judge, fit, demos)
+    names: Sequence[str] = _saved(task).get("held", ())
+    while True:
+        task, judge = held_at(task, judge, [name for name in names if name not in task.held])
+        made = replace(made, numbers=made.numbers.starting(judge.mapping.frees))
+        fit = _fitted(task, made, demos, replace(asked, held=task.held))
+        still = dict(zip(fit.names, _still(fit), strict=True))
+        names = [name for name in effects_moving(judge.mapping.frees, task.held) if still[name]]
+        if not names:
+            return _found(task, made, judge, fit, demos)
 
 
 def paper_engines(task: Task) -> tuple[Preset, Predictor]:
@@ -66,19 +77,28 @@ def paper_engines(task: Task) -> tuple[Preset, Predictor]:
 def _fitted(task: Task, made: Preset, demos: list[Demonstration], asked: Settings) -> PaperFit:
     """Adam, with progress and checkpoints. The last step is left out of the checkpoint: a resumed fit makes it again,
     and knows its mask."""
-    keep = task.checkpoint
-    saved = keep.load() if keep is not None else None
+    keep, saved, held = task.checkpoint, _saved(task), list(task.held)
     starts = [settled_start(made, demo.p_WE[0], run=demo.name) for demo in demos]
 
     def save(values: Mapping[str, Any]) -> None:
         if keep is not None and len(values["rows"]) < asked.iterations:
-            keep.save({"adam": dict(values)})
+            keep.save({"adam": dict(values), "held": held})
 
     return identify_paper(
         made.world, made.numbers, demos, starts, asked,
         progress=lambda number, loss: task.progress(Step("fit", number, asked.iterations, loss)), save=save,
-        resume=None if saved is None else saved["adam"],
+        resume=saved["adam"] if saved.get("held") == held else None,
     )  # fmt: skip
+
+
+def _saved(task: Task) -> dict[str, Any]:
+    """By an interrupted fit, of what it held; {} where there was none."""
+    return (task.checkpoint.load() if task.checkpoint is not None else None) or {}
+
+
+def _still(fit: PaperFit) -> np.ndarray:
+    """(n,) bool: the loss had no derivative by it at any step."""
+    return np.asarray(~np.any(fit.trace.gradients != 0, axis=0))
 
 
 def _found(task: Task, made: Preset, predictor: Predictor, fit: PaperFit, demos: list[Demonstration]) -> Found:
@@ -95,7 +115,7 @@ def _found(task: Task, made: Preset, predictor: Predictor, fit: PaperFit, demos:
         warnings.append("the loss was still falling when Adam ended: --set identify.max_iterations=N for more steps")
     return Found(
         request=task.request, robot=task.robot.name, engine=f"r2s2r {__version__}", step=made.world.step,
-        loss=LOSS.format(drive=task.request.drive), parameters=(*_parameters(fit, made), *task.fixed()),
+        loss=LOSS.format(drive=task.request.drive), parameters=(*_parameters(fit, made, task.held), *task.fixed()),
         train_segments=judged.train_segments, train=judged.train, test_segments=judged.test_segments, test=judged.test,
         cost=float(trace.whole[best]), residuals=_residuals(demos), converged=False, reason=reason,
         rollouts=steps * len(demos) + predictor.rollouts + judged.rollouts, floor=judged.floor,
@@ -111,16 +131,18 @@ def _residuals(demos: list[Demonstration]) -> int:
     return sum(len(demo.spans) * demo.p_WE[0].size for demo in demos)
 
 
-def _parameters(fit: PaperFit, made: Preset) -> tuple[ParameterFound, ...]:
+def _parameters(fit: PaperFit, made: Preset, held: Sequence[str]) -> tuple[ParameterFound, ...]:
     """Values without an interval: Adam gives none, and none is made up."""
     frees, nan = made.numbers.frees, float("nan")
     lower, upper = (np.array([getattr(free, side) for free in frees]) for side in ("lower", "upper"))
     bound = names_on_bound(fit.best, lower, upper, fit.names)
-    still = ~np.any(fit.trace.gradients != 0, axis=0)
+    still = _still(fit)
     found = []
     for k, free in enumerate(frees):
         trust, reason = Trust.WEAK, NO_SD
-        if still[k]:
+        if free.name in held:
+            trust, reason = Trust.NOT_IDENTIFIABLE, f"{NOT_SHOWN}: {held_as(free)}"
+        elif still[k]:
             trust, reason = Trust.NOT_IDENTIFIABLE, "the loss had no derivative by it at any step"
         elif free.name in bound:
             trust, reason = Trust.ON_BOUND, f"the runs ask for more than its bound allows; {NO_SD}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from r2s2r_cli.engine import Parameters
-    from r2s2r_cli.stages.identify.free import Mapping
+    from r2s2r_cli.stages.identify.free import Free, Mapping
     from r2s2r_cli.stages.identify.free.mapping import Observation
     from r2s2r_cli.stages.identify.ways import Way
 
@@ -68,6 +69,12 @@ class Predictor:
         self.simulator = Simulator(self.structure, cache_dir=cache_dir, threads=threads)
         self.rollouts = 0
         self.ways: dict[str, Way] = {}
+
+    def starting(self, frees: Sequence[Free]) -> Predictor:
+        """The same, with its machine code and its count of rollouts, for other starts and priors of its numbers."""
+        other = copy(self)
+        other.mapping = self.mapping.starting(frees)
+        return other
 
     @property
     def native(self) -> bool:

@@ -29,7 +29,8 @@ class CapResiduals:
     noise: sd of an observed coordinate is at least this [m]; a model that is not exact misses by more than the tracker.
     key_only: compare key frames only (the paper's Key Frame Loss without its detours), else every frame. Windows whose
     start is known have no offsets. cluster: target interval of each residual, in which misfit and tracker errors
-    persist; windows that overlap share it. held: parameters that stay at their starts.
+    persist; windows that overlap share it. held: parameters that stay at their starts. A fit begins at z0, which of an
+    effect is not the mean of its prior.
     """
 
     def __init__(
@@ -56,11 +57,12 @@ class CapResiduals:
         self.lower = np.concatenate([bounds[:, 0], np.full(rest, -np.inf)])
         self.upper = np.concatenate([bounds[:, 1], np.full(rest, np.inf)])
         start = np.array([free.to_z(free.start) for free in self.frees])
-        self.prior_mean = np.concatenate([start, np.zeros(rest)])
+        mean = np.array([free.to_z(free.mean) for free in self.frees])
+        self.prior_mean = np.concatenate([mean, np.zeros(rest)])
         self.held = tuple(held)
         own_sd = [FIXED_SD if free.name in held else free.prior_sd for free in self.frees]
         self.prior_sd = np.concatenate([np.array(own_sd), *each])
-        self.z0 = self.prior_mean.copy()
+        self.z0 = np.concatenate([start, np.zeros(rest)])
         self.kept = np.concatenate([w.key if key_only else np.ones(len(w.frames), bool) for w in windows])
         self._observed = np.concatenate([w.run.observed[w.frames] for w in windows])[self.kept]
         self._noise = np.concatenate([w.run.sd_at(w.frames, LEAST_NOISE) for w in windows])[self.kept]
@@ -80,9 +82,9 @@ class CapResiduals:
         other.frees = tuple(frees)
         start = [free.to_z(free.start) for free in frees]
         own_sd = [FIXED_SD if free.name in self.held else free.prior_sd for free in frees]
-        other.prior_mean = np.concatenate([start, self.prior_mean[n:]])
+        other.prior_mean = np.concatenate([[free.to_z(free.mean) for free in frees], self.prior_mean[n:]])
         other.prior_sd = np.concatenate([own_sd, self.prior_sd[n:]])
-        other.z0 = other.prior_mean.copy()
+        other.z0 = np.concatenate([start, self.prior_mean[n:]])
         return other
 
     @property

@@ -25,8 +25,8 @@ from r2s2r_cli.stages.identify.windows import window
 from schemas.results_identify import Recovered, RecoveredCase, SelfTestReport
 
 SPREAD = {Coordinate.LOG: 0.2, Coordinate.LOGIT: 0.5, Coordinate.LINEAR: 0.1}
-"""Standard deviation of the planted values about their starts, where the prior is wider: in the coordinate; LINEAR: as
-a share of the range. A fifth is what robots are off by; wilder ones would often not walk at all."""
+"""Standard deviation of the planted values about the means of their priors, where these are wider: in the coordinate;
+LINEAR: as a share of the range. A fifth is what robots are off by; wilder ones would often not walk at all."""
 MARGIN = 0.02
 """Share of its range within which no value is planted: a truth on a bound cannot be covered from both sides."""
 
@@ -87,12 +87,12 @@ def self_test(
 
 
 def drawn(free: Free, rng: np.random.Generator) -> float:
-    """A value to plant: normal about the start in the coordinate, inside the bounds."""
+    """A value to plant: normal about the mean of the prior in the coordinate, inside the bounds."""
     if free.coordinate is Coordinate.LINEAR:
         usual = SPREAD[Coordinate.LINEAR] * (free.upper - free.lower)
     else:
         usual = SPREAD[free.coordinate]
-    value = free.from_z(free.to_z(free.start) + min(usual, free.prior_sd) * float(rng.normal()))
+    value = free.from_z(free.to_z(free.mean) + min(usual, free.prior_sd) * float(rng.normal()))
     edge = MARGIN * (free.upper - free.lower)
     return float(np.clip(value, free.lower + edge, free.upper - edge))
 

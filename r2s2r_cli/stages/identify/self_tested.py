@@ -7,7 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from r2s2r_cli.stages.identify.data import RunData
-from r2s2r_cli.stages.identify.default_method import first_fit, holding
+from r2s2r_cli.stages.identify.default_method import shown_fit
+from r2s2r_cli.stages.identify.holding import holding
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.request import Progress, Request, silent
 from r2s2r_cli.stages.identify.self_test import Fitted, self_test
@@ -39,11 +40,11 @@ def self_tested(
 
     def once(planted: Sequence[RunData]) -> Fitted:
         before = predictor.rollouts
-        own, _ = holding(replace(task, runs=planted), predictor)
-        made = first_fit(own, predictor, Kept(None))
+        own, begun, _ = holding(replace(task, runs=planted), predictor)
+        own, made = shown_fit(own, begun, Kept(None))
         near = made.solution.z[None, : len(frees)]
         sure = sureness(made, near, loss=own.recipe.loss, seed=request.seed)
-        return Fitted(sure.parameters, made.solution.reason.converged, predictor.rollouts - before)
+        return Fitted(sure.parameters, made.solution.reason.converged, made.problem.predictor.rollouts - before)
 
     trained = {one.run for one in request.train}
     return self_test(

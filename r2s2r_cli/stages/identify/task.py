@@ -77,7 +77,7 @@ class Task:
     @property
     def _beside(self) -> dict[str, float]:
         """What has a value beside the numbers that are free where nobody names any."""
-        from r2s2r_cli.stages.identify.online import given_in
+        from r2s2r_cli.stages.identify.before import given_in
 
         before = self.request.before
         return default_fixed(self.robot) if before is None else given_in(before, self.robot)
@@ -99,7 +99,7 @@ class Task:
         return tuple(
             ParameterFound(
                 known[name], value, nan, nan, nan, (nan, nan), None,
-                "fixed by hand" if name in self.request.fixed else f"{why}; robot.toml has {known[name].start:g}",
+                "fixed by hand" if name in self.request.fixed else f"{why}; robot.toml has {known[name].mean:g}",
             )
             for name, value in self.given.items()
         )  # fmt: skip

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from r2s2r_cli.stages.identify.found import ParameterFound, ProfileFound
-from r2s2r_cli.stages.identify.free.base import values_of
+from r2s2r_cli.stages.identify.free.base import Free, values_of
 from r2s2r_cli.stages.identify.rounds import MOST_UNKNOWNS, Fit, members_for
 from r2s2r_cli.stages.identify.settled import spread_of
 from r2s2r_cli.stages.identify.solve.loss import LOSSES
@@ -22,6 +22,7 @@ from r2s2r_cli.stages.identify.trust.redraw import redraw_linear, spans
 from r2s2r_cli.stages.identify.trust.worth import worth
 
 LINEAR_DRAWS = 1000
+NOT_SHOWN = "the training intervals do not show it"
 
 
 @dataclass(frozen=True)
@@ -38,16 +39,24 @@ class Sureness:
 def sureness(fitted: Fit, others: np.ndarray, *, loss: str, seed: int) -> Sureness:
     """Of a finished fit. others: parameters (k, p), z, of other fits that explain the data about as well."""
     problem, solution, frees = fitted.problem, fitted.solution, fitted.problem.frees
-    robust, group = LOSSES[loss], problem.cluster
-    spread = spread_of(problem, solution, robust, fitted.drawn)
+    spread, after = known_after(fitted, loss)
+    drawn = redraw_linear(
+        problem, solution, problem.cluster, loss=LOSSES[loss], block=problem.block, draws=LINEAR_DRAWS, seed=seed
+    )
+    reach = spans(frees, drawn.z, others if len(others) else None)
+    return Sureness(_parameters(fitted, spread, after, reach), spread, after, reach)
+
+
+def known_after(fitted: Fit, loss: str) -> tuple[Covariance, Identifiability]:
+    """How sure a finished fit is, and what the data say at its solution."""
+    problem, solution = fitted.problem, fitted.solution
+    spread = spread_of(problem, solution, LOSSES[loss], fitted.drawn)
     after = identifiability(
-        problem, solution.z, frees,
+        problem, solution.z, problem.frees,
         evaluation=Evaluation(solution.residual, solution.jacobian, problem.block), weight=solution.weight,
         inflation=spread.inflation, refuse=False,
     )  # fmt: skip
-    drawn = redraw_linear(problem, solution, group, loss=robust, block=problem.block, draws=LINEAR_DRAWS, seed=seed)
-    reach = spans(frees, drawn.z, others if len(others) else None)
-    return Sureness(_parameters(fitted, spread, after, reach), spread, after, reach)
+    return spread, after
 
 
 def _parameters(
@@ -63,9 +72,9 @@ def _parameters(
     for k, free in enumerate(frees):
         trust, reason = judged[k]
         if free.name in problem.held:
-            trust, reason = Trust.NOT_IDENTIFIABLE, "the training intervals do not show it: held at its start"
+            trust, reason = Trust.NOT_IDENTIFIABLE, f"{NOT_SHOWN}: {held_as(free)}"
             if free.name in fitted.alike:
-                reason = f"the training intervals do not show it: held as the {fitted.alike[free.name]} others are"
+                reason = f"{NOT_SHOWN}: held as the {fitted.alike[free.name]} others are"
         elif trust is not Trust.NOT_IDENTIFIABLE and free.name in bound and values[k] != free.start:
             trust, reason = Trust.ON_BOUND, "the runs ask for more than its bound allows"
         wide = (np.nan, np.nan) if trust is Trust.NOT_IDENTIFIABLE else (float(reach[k, 0]), float(reach[k, 1]))
@@ -77,6 +86,15 @@ def _parameters(
             )
         )  # fmt: skip
     return tuple(found)
+
+
+def held_as(free: Free) -> str:
+    """Where a number is held that the data do not show; of an effect with how far from there it may be."""
+    if free.off is None:
+        return "held at its start"
+    unit = "" if free.unit == "1" else f" {free.unit}"
+    wide = f", prior sd {free.prior_sd:.3g}{unit}" if np.isfinite(free.prior_sd) else ""
+    return f"held at {free.mean:g}{unit}, without the effect{wide}"
 
 
 def weakest(sure: Sureness, count: int) -> tuple[int, ...]:

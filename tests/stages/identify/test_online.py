@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from r2s2r_cli.stages.identify.before import specs_of
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.identify.found import ParameterFound
 from r2s2r_cli.stages.identify.free import select
@@ -25,7 +26,6 @@ from r2s2r_cli.stages.identify.online import (
     first_free,
     known_of,
     learned,
-    specs_of,
     update_of,
 )
 from r2s2r_cli.stages.identify.request import Request
@@ -78,7 +78,7 @@ def test_knowledge_that_is_not_used_is_told() -> None:
 
 def test_what_was_free_is_free_again() -> None:
     """With the start, bounds and prior that it had, as a spec that can be read."""
-    specs = specs_of(identification(found()))
+    specs = specs_of(identification(found()), subject().robot)
     speed, bounce = select(tuple(specs.values()), subject().robot)
     assert (speed.name, speed.start, speed.lower, speed.upper, speed.prior_sd) == ("motor_speed", 1.0, 0.1, 2.0, 0.3)
     assert (bounce.name, bounce.start, bounce.upper) == ("restitution", 0.3, 0.95)
@@ -89,7 +89,7 @@ def test_a_winch_whose_likes_came_out_equal_can_be_gone_on_with() -> None:
     (free,) = select((f"motor_speed_in.{subject().robot.actuated[0]}",), subject().robot)
     held = ParameterFound(replace(free, prior_sd=0.0), free.start, 0.0, 0.0, 0.0, NAN, Trust.NOT_IDENTIFIABLE)
     before = identification(found(parameters=(held,), information=None, updates=(), starts=(), trace=(), profiles=()))
-    (again,) = select(tuple(specs_of(before).values()), subject().robot)
+    (again,) = select(tuple(specs_of(before, subject().robot).values()), subject().robot)
     assert (again.start, again.prior_sd) == (free.start, free.prior_sd)
 
 

@@ -28,7 +28,8 @@ class Free:
     """A parameter that is free in a fit. All numbers in `unit`.
 
     start: value of robot.toml, where a fit begins. lower, upper: hard bounds. prior_sd: standard deviation of a normal
-    prior about `start`, in the coordinate (for LOG: relative); inf: flat within the bounds. what: for people.
+    prior about `mean`, in the coordinate (for LOG: relative); inf: flat within the bounds. what: for people. off: of an
+    effect's number that nobody gave a start, the value of a robot without the effect; None: of all other numbers.
     """
 
     name: str
@@ -39,6 +40,12 @@ class Free:
     coordinate: Coordinate = Coordinate.LOG
     prior_sd: float = math.inf
     what: str = ""
+    off: float | None = None
+
+    @property
+    def mean(self) -> float:
+        """Of the prior, and what it is held at where data do not show it: a fit of an effect begins beside it."""
+        return self.start if self.off is None else self.off
 
     def to_z(self, value: float) -> float:
         """The coordinate of a value inside the bounds or on them."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections.abc
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -91,6 +92,12 @@ class Mapping:
             if isinstance(entry.action, Outside) and entry.action.key in ("command_delay", "camera_delay")
         )  # fmt: skip
         self.in_engine = tuple(not isinstance(entry.action, Outside) for entry in self._entries)
+
+    def starting(self, frees: collections.abc.Sequence[Free]) -> Mapping:
+        """The same with other starts and priors of its free numbers."""
+        other = copy(self)
+        other.frees = tuple(frees)
+        return other
 
     def theta(self, values: Vector) -> Parameters:
         """Parameters at values (n,) or (B, n): batch 1 or B. Differentiable by the values."""

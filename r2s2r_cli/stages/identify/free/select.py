@@ -103,6 +103,8 @@ def _with(free: Free, spec: Spec, text: str) -> Free:
         prior_sd=free.prior_sd if spec.prior_sd is None else spec.prior_sd,
     )
     unit = "" if free.unit == "1" else f" {free.unit}"
+    if spec.start is not None or not made.lower <= made.mean <= made.upper:
+        made = replace(made, off=None)  # whoever says where it begins says what they think it is
     range_of = f"{made.lower:g} to {made.upper:g}{unit}"
     possible = f"{free.lower:g} to {free.upper:g}{unit}"
     if not all(math.isfinite(value) for value in (made.start, made.lower, made.upper)):

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Settings:
     """The paper's preset. rate: Adam's, in the units of the numbers. windows: of multiple shooting. closed_loop: the
-    controller runs inside the simulation; False: recorded commands are replayed. attached: None, as the loss has it."""
+    controller runs inside the simulation; False: recorded commands are replayed. attached: None, as the loss has it.
+    held: numbers that stay where they start."""
 
     loss: Loss = Loss.KEY_FRAME
     iterations: int = 60
@@ -34,6 +35,7 @@ class Settings:
     closed_loop: bool = True
     attached: bool | None = None
     norm: Norm = Norm.SQUARED
+    held: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -156,6 +158,8 @@ def _evaluate(
         whole.append(found.value.parts.mean().item())
         kept.append(found.value.kept.mean())
         words.append(f"{demo.name}: {found.mask.words}" if found.mask else f"{demo.name}: no mask")
+    if x.grad is not None:
+        x.grad[[k for k, name in enumerate(numbers.names) if name in settings.held]] = 0.0
     gradient = [0.0] * len(values) if x.grad is None else x.grad.tolist()
     if not np.isfinite([total, *gradient]).all():
         raise _failed(numbers, values, iteration, f"loss {total:g}, derivative {', '.join(f'{g:g}' for g in gradient)}")

@@ -11,7 +11,7 @@ import numpy as np
 from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.identify.solve.linearised import cost_of, not_finite
 from r2s2r_cli.stages.identify.solve.loss import LOSSES, Loss
-from r2s2r_cli.stages.identify.solve.problem import Problem
+from r2s2r_cli.stages.identify.solve.problem import Problem, still_of
 from r2s2r_cli.stages.identify.solve.record import Counts, Progress, names_on_bound
 
 
@@ -52,6 +52,7 @@ def cma_es(
     The nuisances, hundreds of unknowns about which the parameters hardly disagree, stay at z0: give the solution of
     Levenberg-Marquardt, and this says whether other parameters explain the data better with the same start states. A
     lower cost found here is a defect there; an equal one says nothing about minima further than the samples reach.
+    So do parameters that are held.
 
     z0: (n,). sd0: of the first samples, in z, one number or (parameters,). budget: evaluations at most. Points where
     the simulation is not finite are worse than all others. tolerance: of the cost, ends the search. population: samples
@@ -66,14 +67,17 @@ def cma_es(
 
     import cma
 
-    count = len(problem.names)
+    moving = np.setdiff1d(np.arange(len(problem.names)), still_of(problem))
+    count = len(moving)
     z0 = np.clip(np.asarray(z0, dtype=float), problem.lower, problem.upper)
-    unit = np.broadcast_to(np.asarray(sd0, dtype=float), (count,))
-    lower, upper = problem.lower[:count], problem.upper[:count]
+    unit = np.broadcast_to(np.asarray(sd0, dtype=float), (len(problem.names),))[moving]
+    lower, upper = problem.lower[moving], problem.upper[moving]
     draw = np.random.default_rng(seed)
 
     def whole(u: np.ndarray) -> np.ndarray:
-        return np.concatenate([np.clip(z0[:count] + unit * u, lower, upper), z0[count:]])
+        z: np.ndarray = z0.copy()
+        z[moving] = np.clip(z0[moving] + unit * u, lower, upper)
+        return z
 
     def cost(u: np.ndarray) -> float:
         try:
@@ -87,7 +91,7 @@ def cma_es(
         return batch(np.array([whole(u) for u in samples]))
 
     options: dict[str, Any] = {
-        "bounds": [_list((lower - z0[:count]) / unit), _list((upper - z0[:count]) / unit)],
+        "bounds": [_list((lower - z0[moving]) / unit), _list((upper - z0[moving]) / unit)],
         "maxfevals": budget,
         **({} if population is None else {"popsize": population}),
         "tolfun": tolerance,
@@ -98,6 +102,9 @@ def cma_es(
         "verb_disp": 0,
         "signals_filename": None,
     }
+    if not count:
+        (alone,) = together([np.zeros(0)])
+        return Sampled(z0, alone, (alone,), Counts(plain=1), "nothing moves", seed, ())
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # its parser of options stumbles over one of its own defaults
         search = cma.CMAEvolutionStrategy(np.zeros(count), 1.0, options)

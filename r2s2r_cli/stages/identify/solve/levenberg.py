@@ -10,7 +10,7 @@ import numpy as np
 from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.identify.solve.linearised import Linearised, cost_of, linearise
 from r2s2r_cli.stages.identify.solve.loss import LOSSES, Loss
-from r2s2r_cli.stages.identify.solve.problem import Problem
+from r2s2r_cli.stages.identify.solve.problem import Problem, still_of
 from r2s2r_cli.stages.identify.solve.record import (
     Checkpoint,
     Counts,
@@ -97,6 +97,7 @@ def _iterate(
     """One accepted step, or the same point with the reason why there is none."""
     damping, growth, counts = state.damping, state.growth, state.counts
     tolerance, step_sd = limits
+    still = still_of(problem)
     while damping <= MOST_DAMPING:
         step = at.step(damping, problem.lower, problem.upper)
         predicted = 0.0 if step is None else at.decrease(step)
@@ -106,6 +107,7 @@ def _iterate(
         new = None
         if step is not None and predicted > 0:
             z = np.clip(at.z + step, problem.lower, problem.upper)
+            z[still] = at.z[still]
             new, gain, counts = _try(problem, z, at, predicted, loss, counts)
         length = 0.0 if step is None else at.length(step)
         if new is None:
@@ -118,8 +120,8 @@ def _iterate(
         small = state.small_steps + 1 if free and length <= step_sd else 0
         gained = (at.cost - new.cost) / at.cost
         idle = state.idle_steps + 1 if gained <= tolerance else 0
-        still = max(gained, predicted / at.cost) if free else 1.0
-        reason_now = _done(still <= tolerance, small, idle)
+        least = max(gained, predicted / at.cost) if free else 1.0
+        reason_now = _done(least <= tolerance, small, idle)
         damping = max(damping * max(FASTEST, 1.0 - (2.0 * gain - 1.0) ** 3), LEAST_DAMPING)
         costs = (*state.costs, new.cost)
         z_now = tuple(new.z.tolist())

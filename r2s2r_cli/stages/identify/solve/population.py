@@ -18,10 +18,8 @@ import numpy as np
 
 from r2s2r_cli.errors import NumericalError
 from r2s2r_cli.stages.identify.solve.loss import Loss, robust_sum
-from r2s2r_cli.stages.identify.solve.problem import Evaluation, Problem
+from r2s2r_cli.stages.identify.solve.problem import HELD, Evaluation, Problem
 
-HELD = 1e-6
-"""An unknown with a narrower prior does not move and needs no candidates."""
 RIDGE = 1e-3
 """Of the regression, on slopes in standard deviations of the draw: with few good candidates it stays defined."""
 CLOSE = 1.0

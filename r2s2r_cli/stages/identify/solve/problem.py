@@ -7,6 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
+HELD = 1e-6
+"""An unknown with a narrower prior does not move."""
+
 
 @dataclass(frozen=True)
 class Evaluation:
@@ -38,3 +41,9 @@ class Problem(Protocol):
     def evaluate(self, z: np.ndarray, *, jacobian: bool = True) -> Evaluation:
         """Residuals at z. Raises NumericalError where the simulation is not finite: a step to be refused."""
         ...
+
+
+def still_of(problem: Problem) -> np.ndarray:
+    """Which of the parameters do not move since they are held, ascending: they stay where they are to the last bit."""
+    found: np.ndarray = np.flatnonzero(problem.prior_sd[: len(problem.names)] <= HELD)
+    return found

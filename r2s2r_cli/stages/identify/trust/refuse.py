@@ -42,7 +42,7 @@ def refuse_hopeless(
         if bad.any():
             i = int(np.flatnonzero(bad)[0])
             bad_names = [name for name, one in zip(names, bad, strict=True) if one]
-            fix = " ".join(f"--fix {name}={frees[names.index(name)].start:g}" for name in bad_names)
+            fix = " ".join(f"--fix {name}={frees[names.index(name)].mean:g}" for name in bad_names)
             raise InputError(
                 f"{', '.join(bad_names)} {what}", where="--free",
                 expected=f"residuals that change by {NOTHING:g} sd or more within what is thought possible",

@@ -2,8 +2,9 @@
 
 Fits of an effect begin beside its off value, where each of its numbers does something. What the data say nothing of
 must not stay there: the refined simulator would have an effect that nobody has seen. So it is held at the mean of its
-prior, before the others are fitted, which go without it. What a fit ends with is looked at again: where data are worse
-explained than a fit hopes to begin with, they show less.
+prior, before the others are fitted, which go without it. Where a fit ends it is asked again, since a simulator that
+errs by more than noise is told less by the same data; then it is made again without what it does not show. What an
+effect is like (`Free.shape`) shows as far as the effect is there: that is asked at the end alone.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, Tru
 from r2s2r_cli.stages.identify.trusted import known_after
 
 Look = Callable[[Task, Predictor], Identifiability]
-"""What the training intervals say at the starts of a predictor's numbers, with those of the task held; refuses none."""
+"""What the training intervals say where a fit would begin, with the numbers of the task held; refuses none."""
 Made = TypeVar("Made")
 
 
@@ -34,8 +35,9 @@ def holding(task: Task, predictor: Predictor) -> tuple[Task, Predictor, Identifi
     Raises as `known_before`, and InputError where they show none at all.
     """
     before = known_before(task, predictor)
-    held = tuple(name for name, trust in zip(before.names, before.trust, strict=True) if _unknown(trust))
-    task, predictor = held_at(task, predictor, held)
+    frees = predictor.mapping.frees
+    likely = set(effects_moving(frees, ())) - set(_unshown_before(before, frees, ()))
+    task, predictor = held_at(task, predictor, [name for name in _unknown(before) if name not in likely])
     require_any(task.held, before.names)
     return task, predictor, before
 
@@ -48,21 +50,22 @@ def holding_effects(
     frees = predictor.mapping.frees
     if not effects_moving(frees, task.held):
         return task, predictor
-    names = unshown(before or (look or looked)(task, predictor), frees, task.held)
+    names = _unshown_before(before or (look or _looked)(task, predictor), frees, task.held)
     return held_at(task, predictor, names, look)
 
 
 def held_at(task: Task, predictor: Predictor, names: Sequence[str], look: Look | None = None) -> tuple[Task, Predictor]:
-    """Hold these as well, each at the mean of its prior; and what of an effect shows no more without them, as the
-    place of a patch that is none."""
+    """Hold these as well, each at the mean of its prior; and what of an effect does nothing any more without them, as
+    the place of a patch that is none."""
     while names:
         frees = tuple(
             replace(free, start=free.mean) if free.name in names else free for free in predictor.mapping.frees
         )
         off = any(free.name in names and free.off is not None for free in frees)
         task, predictor = replace(task, held=(*task.held, *names)), predictor.starting(frees)
-        left = off and effects_moving(frees, task.held)
-        names = unshown((look or looked)(task, predictor), frees, task.held) if left else ()
+        names = ()
+        if off and effects_moving(frees, task.held):
+            names = _unshown_before((look or _looked)(task, predictor), frees, task.held)
     return task, predictor
 
 
@@ -81,30 +84,18 @@ def fitted_to_shown(
     interrupted fit takes that up there.
     """
     if kept is not None:
-        names = tuple(name for name in kept.saved.get("held", ()) if name not in task.held)
+        names = [name for name in kept.saved.get("held", ()) if name not in task.held]
         task, predictor = held_at(task, predictor, names, look)
     while True:
         made = make(task, predictor)
-        fit = fit_of(made)
-        frees = predictor.mapping.frees
-        may = effects_moving(frees, task.held)
-        names = unshown(known_after(fit, task.recipe.loss)[1], frees, task.held) if may else ()
+        moving = effects_moving(predictor.mapping.frees, task.held)
+        unknown = _unknown(known_after(fit_of(made), task.recipe.loss)[1]) if moving else ()
+        names = [name for name in moving if name in unknown]
         if not names:
             return task, made
         task, predictor = held_at(task, predictor, names, look)
         if kept is not None:
             kept.restart(held=list(task.held))
-
-
-def looked(task: Task, predictor: Predictor) -> Identifiability:
-    """By command replay, each interval from its own start."""
-    return known_before(task, predictor, refuse=False)
-
-
-def unshown(info: Identifiability, frees: Sequence[Free], held: Collection[str]) -> tuple[str, ...]:
-    """Numbers of effects that the data do not show, but for those that are held already."""
-    unknown = {name for name, trust in zip(info.names, info.trust, strict=True) if _unknown(trust)}
-    return tuple(name for name in effects_moving(frees, held) if name in unknown)
 
 
 def require_any(held: Collection[str], names: Sequence[str]) -> None:
@@ -124,5 +115,18 @@ def effects_moving(frees: Sequence[Free], held: Collection[str]) -> tuple[str, .
     return tuple(free.name for free in frees if free.off is not None and free.name not in held)
 
 
-def _unknown(trust: Trust) -> bool:
-    return trust is Trust.NOT_IDENTIFIABLE
+def _unshown_before(info: Identifiability, frees: Sequence[Free], held: Collection[str]) -> tuple[str, ...]:
+    """Numbers of effects, not held yet, that are not shown where a fit begins; shapes where they do nothing at all."""
+    unknown, moving = set(_unknown(info)), effects_moving(frees, held)
+    shapes = {free.name for free in frees if free.shape}
+    return tuple(name for name in moving if name in (info.no_effect if name in shapes else unknown))
+
+
+def _unknown(info: Identifiability) -> tuple[str, ...]:
+    both = zip(info.names, info.trust, strict=True)
+    return tuple(name for name, trust in both if trust is Trust.NOT_IDENTIFIABLE)
+
+
+def _looked(task: Task, predictor: Predictor) -> Identifiability:
+    """By command replay, each interval from its own start."""
+    return known_before(task, predictor, refuse=False)

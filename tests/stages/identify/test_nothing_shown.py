@@ -20,7 +20,7 @@ NAMES = ("friction", "motor_speed", "stiffness.6", "stiffness.7")
 
 def shown(monkeypatch: pytest.MonkeyPatch, *trust: Trust) -> Any:
     """What the training intervals tell, and a predictor of these numbers."""
-    told = SimpleNamespace(names=NAMES[: len(trust)], trust=trust)
+    told = SimpleNamespace(names=NAMES[: len(trust)], trust=trust, no_effect=())
     monkeypatch.setattr(held, "known_before", lambda *_: told)
     mapping = SimpleNamespace(frees=select(told.names, threebar()))
     predictor = SimpleNamespace(mapping=mapping)

@@ -29,7 +29,8 @@ class Free:
 
     start: value of robot.toml, where a fit begins. lower, upper: hard bounds. prior_sd: standard deviation of a normal
     prior about `mean`, in the coordinate (for LOG: relative); inf: flat within the bounds. what: for people. off: of an
-    effect's number that nobody gave a start, the value of a robot without the effect; None: of all other numbers.
+    effect's number that nobody gave a start, the value of a robot without the effect; None: of all other numbers. shape:
+    it only says what an effect is like, and does nothing where other numbers of the effect are off.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Free:
     prior_sd: float = math.inf
     what: str = ""
     off: float | None = None
+    shape: bool = False
 
     @property
     def mean(self) -> float:

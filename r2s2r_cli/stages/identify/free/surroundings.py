@@ -104,7 +104,10 @@ def effect_entries(robot: Robot) -> list[Entry]:
                 name = family if number is None else f"{family}.{number}"
                 where = "" if own.per == "robot" else f" ({_part(own.per, number)})"
                 what = f"Effect {effect.title}: {own.what}{where}."
-                free = Free(name, own.unit, start, own.lower, own.upper, Coordinate.LINEAR, own.scale, what, own.off)
+                free = Free(
+                    name, own.unit, start, own.lower, own.upper, Coordinate.LINEAR, own.scale, what, own.off,
+                    own.only_shape,
+                )  # fmt: skip
                 action: Action = Assign(places)
                 if name in DELAYS:
                     action = Outside("observation", DELAYS[name], added=name)

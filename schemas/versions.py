@@ -73,7 +73,7 @@ def chain(
 
 
 STAGE_VERSIONS: dict[str, int] = {
-    "import": 1, "calibrate": 1, "record": 1, "estimate": 2, "identify": 4, "simulate": 1, "floor": 4,
+    "import": 1, "calibrate": 1, "record": 1, "estimate": 2, "identify": 5, "simulate": 1, "floor": 4,
     "plan": 4, "execute": 1,
     "compare": 6, "diagnose": 23,
 }  # fmt: skip

@@ -93,8 +93,9 @@ def held_as(free: Free) -> str:
     if free.off is None:
         return "held at its start"
     unit = "" if free.unit == "1" else f" {free.unit}"
-    wide = f", prior sd {free.prior_sd:.3g}{unit}" if np.isfinite(free.prior_sd) else ""
-    return f"held at {free.mean:g}{unit}, without the effect{wide}"
+    where = "the value it is given without data" if free.shape else "which is off"
+    wide = f"; prior sd {free.prior_sd:.3g}{unit}" if np.isfinite(free.prior_sd) else ""
+    return f"held at {free.mean:g}{unit}, {where}{wide}"
 
 
 def weakest(sure: Sureness, count: int) -> tuple[int, ...]:

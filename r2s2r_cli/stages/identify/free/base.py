@@ -29,7 +29,7 @@ class Free:
 
     start: value of robot.toml, where a fit begins. lower, upper: hard bounds. prior_sd: standard deviation of a normal
     prior about `mean`, in the coordinate (for LOG: relative); inf: flat within the bounds. what: for people. off: of an
-    effect's number that nobody gave a start, the value of a robot without the effect; None: of all other numbers. shape:
+    effect's number that nobody gave a start, the value of a robot without the effect; None: of all others. shape:
     it only says what an effect is like, and does nothing where other numbers of the effect are off.
     """
 

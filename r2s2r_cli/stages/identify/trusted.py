@@ -93,7 +93,7 @@ def held_as(free: Free) -> str:
     if free.off is None:
         return "held at its start"
     unit = "" if free.unit == "1" else f" {free.unit}"
-    where = "the value it is given without data" if free.shape else "which is off"
+    where = "the mean of its prior" if free.shape else "which is off"
     wide = f"; prior sd {free.prior_sd:.3g}{unit}" if np.isfinite(free.prior_sd) else ""
     return f"held at {free.mean:g}{unit}, {where}{wide}"
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from r2s2r_cli.stages.identify.closed_fit import ClosedFit, fit_closed
 from r2s2r_cli.stages.identify.closed_residuals import ClosedResiduals
-from r2s2r_cli.stages.identify.conclude import Fitted, concluded, start_found
+from r2s2r_cli.stages.identify.conclude import Assured, Fitted, assured, concluded, start_found
 from r2s2r_cli.stages.identify.found import Found, TraceStep
 from r2s2r_cli.stages.identify.free import select
-from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding_effects, require_any
+from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding_effects, not_identifiable, require_any
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import default_free
@@ -48,16 +48,24 @@ def find_closed(task: Task) -> Found:
     task, predictor = holding_effects(task, predictor, before, _looked)
     require_any(task.held, before.names)
 
-    def fitted(task: Task, predictor: Predictor) -> list[ClosedFit]:
-        return [_fit_of(task, predictor, kept, start) for start in range(task.settings.starts)]
+    def make(task: Task, predictor: Predictor) -> Assured:
+        fits = [_fit_of(task, predictor, kept, start) for start in range(task.settings.starts)]
+        return assured(task, _fitted(task, fits, kept, before))
 
-    task, fits = fitted_to_shown(task, predictor, fitted, lambda made: _as_fit(_best(made)), kept=kept, look=_looked)
-    best = _best(fits)
+    task, known = fitted_to_shown(
+        task, predictor, make, lambda known: not_identifiable(known.sure.parameters), kept=kept, look=_looked
+    )
+    return concluded(task, known.made.fit.problem.predictor, known)
+
+
+def _fitted(task: Task, fits: Sequence[ClosedFit], kept: Kept, before: Identifiability) -> Fitted:
+    """The best of the fits, with those of all starts."""
+    best = min(fits, key=lambda one: (one.problem.noise > 0, one.solution.cost))
     first = np.array([free.start for free in best.problem.frees])
     near = [one.solution.z[: len(first)] for one in fits if one.solution.cost <= best.solution.cost + CLOSE]
     rows = tuple(start_found(first, _as_fit(one)) for one in fits)
     took, real = best.problem.seconds(best.solution.z)
-    made = Fitted(
+    return Fitted(
         _as_fit(best), rows, np.array(near), tuple(kept.steps), LOSS.format(window=task.recipe.window), before,
         profiles=0,
         remarks=(
@@ -65,11 +73,6 @@ def find_closed(task: Task) -> Found:
             ROUGH.format(float(np.median(best.surface.rough))),
         ),
     )  # fmt: skip
-    return concluded(task, best.problem.predictor, made)
-
-
-def _best(fits: Sequence[ClosedFit]) -> ClosedFit:
-    return min(fits, key=lambda one: (one.problem.noise > 0, one.solution.cost))
 
 
 def _looked(task: Task, predictor: Predictor) -> Identifiability:

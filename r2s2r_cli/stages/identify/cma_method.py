@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from r2s2r_cli.stages.identify.conclude import Fitted, concluded, start_found
+from r2s2r_cli.stages.identify.conclude import Assured, Fitted, assured, concluded, start_found
 from r2s2r_cli.stages.identify.default_method import first_fit, loss_words
 from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep
 from r2s2r_cli.stages.identify.free.base import values_of
-from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding
+from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding, not_identifiable
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
@@ -34,16 +34,20 @@ def find_cma(task: Task) -> Found:
     task, predictor, before = holding(task, predictor)
     kept = Kept(task.checkpoint)
 
-    def both(task: Task, predictor: Predictor) -> tuple[Fit, tuple[StartFound, ...], str]:
+    def make(task: Task, predictor: Predictor) -> Assured:
         fitted = first_fit(task, predictor, kept)
-        return better_of(task, fitted, _sampled(task, fitted, kept))
+        best, starts, words = better_of(task, fitted, _sampled(task, fitted, kept))
+        made = Fitted(
+            best, starts, best.solution.z[None, : len(best.values)], tuple(kept.steps),
+            f"{loss_words(task)}; CMA-ES over the parameters beside it", before, task.settings.profiles,
+            remarks=(words,),
+        )  # fmt: skip
+        return assured(task, made)
 
-    task, (best, starts, words) = fitted_to_shown(task, predictor, both, lambda made: made[0], kept=kept)
-    made = Fitted(
-        best, starts, best.solution.z[None, : len(best.values)], tuple(kept.steps),
-        f"{loss_words(task)}; CMA-ES over the parameters beside it", before, task.settings.profiles, remarks=(words,),
-    )  # fmt: skip
-    return concluded(task, best.problem.predictor, made)
+    task, known = fitted_to_shown(
+        task, predictor, make, lambda known: not_identifiable(known.sure.parameters), kept=kept
+    )
+    return concluded(task, known.made.fit.problem.predictor, known)
 
 
 def _sampled(task: Task, fitted: Fit, kept: Kept) -> Sampled:

@@ -9,7 +9,7 @@ import numpy as np
 
 from r2s2r_cli import __version__
 from r2s2r_cli.stages.identify.closed_free_run import loop_of
-from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep, Update
+from r2s2r_cli.stages.identify.found import Found, ProfileFound, StartFound, TraceStep, Update
 from r2s2r_cli.stages.identify.held_out import Judged, held_out
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
@@ -19,7 +19,7 @@ from r2s2r_cli.stages.identify.starts_found import start_shifts
 from r2s2r_cli.stages.identify.task import Task
 from r2s2r_cli.stages.identify.training import training_windows
 from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, identifiability
-from r2s2r_cli.stages.identify.trusted import profiled, sureness, weakest, widened_by
+from r2s2r_cli.stages.identify.trusted import Sureness, profiled, sureness, weakest, widened_by
 
 
 @dataclass(frozen=True)
@@ -52,18 +52,34 @@ def known_before(task: Task, predictor: Predictor, *, refuse: bool = True) -> Id
     return identifiability(problem, problem.z0, frees, refuse=refuse, excused=task.of_default)
 
 
-def concluded(task: Task, predictor: Predictor, made: Fitted) -> Found:
-    """Judge a fit. Raises what `held_out` raises."""
-    request, recipe, fit = task.request, task.recipe, made.fit
-    sure = sureness(fit, made.near, loss=recipe.loss, seed=request.seed)
+@dataclass(frozen=True)
+class Assured:
+    """A fit with how sure its numbers are. better: all unknowns where a profile came upon a lower cost, else None."""
+
+    made: Fitted
+    sure: Sureness
+    profiles: tuple[ProfileFound, ...]
+    better: np.ndarray | None
+
+
+def assured(task: Task, made: Fitted) -> Assured:
+    """Profiles of the weakest numbers included."""
+    fit, loss, seed = made.fit, task.recipe.loss, task.request.seed
+    sure = sureness(fit, made.near, loss=loss, seed=seed)
     rows = weakest(sure, made.profiles)
     profiles, better = profiled(
-        fit, sure, rows, loss=recipe.loss, seed=request.seed,
+        fit, sure, rows, loss=loss, seed=seed,
         progress=lambda done: task.progress(Step("profiles", done, len(rows))),
     )  # fmt: skip
-    sure = widened_by(fit, sure, profiles)
+    return Assured(made, widened_by(fit, sure, profiles), profiles, better)
+
+
+def concluded(task: Task, predictor: Predictor, known: Assured) -> Found:
+    """Judge a fit. Raises what `held_out` raises."""
+    request, recipe, made, sure = task.request, task.recipe, known.made, known.sure
+    fit, profiles = made.fit, known.profiles
     warnings = [*request.left_out, *made.remarks]
-    if better is not None:
+    if known.better is not None:
         warnings.append(
             "a profile came upon a lower loss: the loss is rough, and the fit is no minimum there. Its intervals hold "
             "what the profile found; judge it by its held-out errors"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from r2s2r_cli.stages.identify.alike import as_the_others
-from r2s2r_cli.stages.identify.conclude import Fitted, concluded, start_found
+from r2s2r_cli.stages.identify.conclude import Assured, Fitted, assured, concluded, start_found
 from r2s2r_cli.stages.identify.fit import fit
 from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep
 from r2s2r_cli.stages.identify.free.base import values_of
-from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding
+from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding, not_identifiable
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
@@ -32,17 +32,17 @@ def find_default(task: Task) -> Found:
     predictor = task.predictor(frees)
     task, predictor, before = holding(task, predictor)
     kept = Kept(task.checkpoint)
-    task, fitted = shown_fit(task, predictor, kept)
-    starts, near = _other_starts(task, fitted)
-    made = Fitted(fitted, starts, near, tuple(kept.steps), loss_words(task), before, task.settings.profiles)
-    return concluded(task, fitted.problem.predictor, made)
 
+    def make(task: Task, predictor: Predictor) -> Assured:
+        fitted = first_fit(task, predictor, kept)
+        starts, near = _other_starts(task, fitted)
+        trace, words = tuple(kept.steps), loss_words(task)
+        return assured(task, Fitted(fitted, starts, near, trace, words, before, task.settings.profiles))
 
-def shown_fit(task: Task, predictor: Predictor, kept: Kept) -> tuple[Task, Fit]:
-    """The fit without what of effects it turns out not to show, and the task with that held. Raises as `fit`."""
-    return fitted_to_shown(
-        task, predictor, lambda task, predictor: first_fit(task, predictor, kept), lambda made: made, kept=kept
+    task, known = fitted_to_shown(
+        task, predictor, make, lambda known: not_identifiable(known.sure.parameters), kept=kept
     )
+    return concluded(task, known.made.fit.problem.predictor, known)
 
 
 def loss_words(task: Task) -> str:

@@ -15,13 +15,12 @@ from typing import TypeVar
 
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.identify.conclude import known_before
+from r2s2r_cli.stages.identify.found import ParameterFound
 from r2s2r_cli.stages.identify.free.base import Free
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.predict import Predictor
-from r2s2r_cli.stages.identify.rounds import Fit
 from r2s2r_cli.stages.identify.task import Task
 from r2s2r_cli.stages.identify.trust.identifiability import Identifiability, Trust
-from r2s2r_cli.stages.identify.trusted import known_after
 
 Look = Callable[[Task, Predictor], Identifiability]
 """What the training intervals say where a fit would begin, with the numbers of the task held; refuses none."""
@@ -73,15 +72,15 @@ def fitted_to_shown(
     task: Task,
     predictor: Predictor,
     make: Callable[[Task, Predictor], Made],
-    fit_of: Callable[[Made], Fit],
+    unknown: Callable[[Made], Collection[str]],
     *,
     kept: Kept | None = None,
     look: Look | None = None,
 ) -> tuple[Task, Made]:
     """What `make` makes, made again without what of effects its end does not show, until it shows all that moved.
 
-    fit_of: the fit of what was made. kept: its trace and checkpoint, which begin again with what is held by then: an
-    interrupted fit takes that up there.
+    unknown: names of what was made that its end does not show. kept: its trace and checkpoint, which begin again with
+    what is held by then: an interrupted fit takes that up there.
     """
     if kept is not None:
         names = [name for name in kept.saved.get("held", ()) if name not in task.held]
@@ -89,13 +88,18 @@ def fitted_to_shown(
     while True:
         made = make(task, predictor)
         moving = effects_moving(predictor.mapping.frees, task.held)
-        unknown = _unknown(known_after(fit_of(made), task.recipe.loss)[1]) if moving else ()
-        names = [name for name in moving if name in unknown]
+        gone = unknown(made) if moving else ()
+        names = [name for name in moving if name in gone]
         if not names:
             return task, made
         task, predictor = held_at(task, predictor, names, look)
         if kept is not None:
             kept.restart(held=list(task.held))
+
+
+def not_identifiable(parameters: Sequence[ParameterFound]) -> set[str]:
+    """Names of those that are reported so."""
+    return {one.free.name for one in parameters if one.trust is Trust.NOT_IDENTIFIABLE}
 
 
 def require_any(held: Collection[str], names: Sequence[str]) -> None:

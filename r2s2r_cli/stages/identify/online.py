@@ -8,7 +8,7 @@ whose measurement is a whole fit). What the runs did not determine keeps its pri
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -16,22 +16,21 @@ import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.stages.identify.before import names_of, specs_of
-from r2s2r_cli.stages.identify.conclude import Fitted, concluded, known_before, start_found
+from r2s2r_cli.stages.identify.conclude import Assured, Fitted, assured, concluded, known_before, start_found
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.identify.default_method import loss_words
 from r2s2r_cli.stages.identify.fit import fit
 from r2s2r_cli.stages.identify.found import Found, TraceStep, Update
 from r2s2r_cli.stages.identify.free import Free, select
 from r2s2r_cli.stages.identify.free.base import Coordinate
-from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding_effects
+from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding_effects, not_identifiable
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
-from r2s2r_cli.stages.identify.rounds import Fit
 from r2s2r_cli.stages.identify.solve.record import Progress as SolverProgress
 from r2s2r_cli.stages.identify.task import Task, free_parameters, specs_asked
 from r2s2r_cli.stages.identify.trust.identifiability import Trust
-from r2s2r_cli.stages.identify.trusted import Sureness, sureness
+from r2s2r_cli.stages.identify.trusted import Sureness
 from r2s2r_cli.stages.identify.twice import learned_twice
 
 DRIFT = 0.05
@@ -64,9 +63,8 @@ def find_online(task: Task) -> Found:
     rollouts = first.rollouts + kept.saved.get("rollouts", 0)
     for k in range(len(updates), len(order)):
         frees = tuple(drifted(free, known) for free in wide)
-        made = _fit_to(replace(task, request=replace(task.request, train=(order[k],))), frees, kept, (k, order))
-        frees, predictor = made.problem.frees, made.problem.predictor
-        sure = sureness(made, made.solution.z[None, : len(frees)], loss=task.recipe.loss, seed=task.request.seed)
+        last = _fit_to(replace(task, request=replace(task.request, train=(order[k],))), frees, kept, (k, order))
+        frees, predictor, sure = last.made.fit.problem.frees, last.made.fit.problem.predictor, last.sure
         known = learned(known, frees, sure)
         updates.append(update_of(order[k].run, frees, sure))
         if k + 1 < len(order):
@@ -76,25 +74,32 @@ def find_online(task: Task) -> Found:
             )
     predictor.rollouts += rollouts
     remarks = (*_remarks(learned_twice(before, task.runs, order)), *_dropped(known_of(before), task, wide))
-    last = Fitted(
-        made, (start_found([free.start for free in frees], made),), made.solution.z[None, : len(frees)],
-        tuple(kept.steps), f"{loss_words(task)}; run after run, the cost is of the last", None, task.settings.profiles,
-        tuple(updates), remarks,
-    )  # fmt: skip
-    return concluded(task, predictor, last)
+    words = f"{loss_words(task)}; run after run, the cost is of the last"
+    made = replace(last.made, trace=tuple(kept.steps), loss=words, updates=tuple(updates), remarks=remarks)
+    return concluded(task, predictor, replace(last, made=made))
 
 
-def _fit_to(task: Task, frees: Sequence[Free], kept: Kept, place: tuple[int, Sequence[Selection]]) -> Fit:
-    """The fit to one run, which is the task's, the place-th of several; what it does not show of effects is held."""
-    steps = len(kept.steps)
+def _fit_to(task: Task, frees: Sequence[Free], kept: Kept, place: tuple[int, Sequence[Selection]]) -> Assured:
+    """The fit to one run, the task's, one of several. What it does not show of effects is held: of the last, what is
+    reported so; of others what their information does not determine, since the next goes on from that."""
+    steps, (k, order) = len(kept.steps), place
+    final = k + 1 == len(order)
 
-    def make(own: Task, predictor: Predictor) -> Fit:
+    def make(own: Task, predictor: Predictor) -> Assured:
         del kept.steps[steps:]
-        return fit(own.runs, own.request.train, predictor, own.recipe, seed=own.request.seed,
-                   progress=_progress(own, kept.steps, place[1], place[0]))  # fmt: skip
+        made = fit(own.runs, own.request.train, predictor, own.recipe, seed=own.request.seed,
+                   progress=_progress(own, kept.steps, order, k))  # fmt: skip
+        first, near = [free.start for free in made.problem.frees], made.solution.z[None, : len(frees)]
+        starts, profiles = (start_found(first, made),), own.settings.profiles if final else 0
+        return assured(own, Fitted(made, starts, near, (), "", None, profiles))
+
+    def unknown(made: Assured) -> Collection[str]:
+        both = zip(made.sure.parameters, made.sure.after.trust, strict=True)
+        hidden = {one.free.name for one, trust in both if trust is Trust.NOT_IDENTIFIABLE}
+        return not_identifiable(made.sure.parameters) if final else hidden
 
     own, predictor = holding_effects(task, task.predictor(frees))
-    return fitted_to_shown(own, predictor, make, lambda made: made)[1]
+    return fitted_to_shown(own, predictor, make, unknown)[1]
 
 
 def _remarks(twice: tuple[str, ...]) -> tuple[str, ...]:

@@ -7,13 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from r2s2r_cli.stages.identify.data import RunData
-from r2s2r_cli.stages.identify.default_method import shown_fit
-from r2s2r_cli.stages.identify.holding import holding
+from r2s2r_cli.stages.identify.default_method import first_fit
+from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding, not_identifiable
 from r2s2r_cli.stages.identify.kept import Kept
+from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Progress, Request, silent
+from r2s2r_cli.stages.identify.rounds import Fit
 from r2s2r_cli.stages.identify.self_test import Fitted, self_test
 from r2s2r_cli.stages.identify.task import Task, free_parameters, require_replay
-from r2s2r_cli.stages.identify.trusted import sureness
+from r2s2r_cli.stages.identify.trusted import Sureness, sureness
 from schemas.config import IdentifySettings
 from schemas.results_identify import SelfTestReport
 from schemas.robot import Robot
@@ -41,9 +43,13 @@ def self_tested(
     def once(planted: Sequence[RunData]) -> Fitted:
         before = predictor.rollouts
         own, begun, _ = holding(replace(task, runs=planted), predictor)
-        own, made = shown_fit(own, begun, Kept(None))
-        near = made.solution.z[None, : len(frees)]
-        sure = sureness(made, near, loss=own.recipe.loss, seed=request.seed)
+
+        def make(own: Task, predictor: Predictor) -> tuple[Fit, Sureness]:
+            made = first_fit(own, predictor, Kept(None))
+            near = made.solution.z[None, : len(frees)]
+            return made, sureness(made, near, loss=own.recipe.loss, seed=request.seed)
+
+        _, (made, sure) = fitted_to_shown(own, begun, make, lambda both: not_identifiable(both[1].parameters))
         return Fitted(sure.parameters, made.solution.reason.converged, made.problem.predictor.rollouts - before)
 
     trained = {one.run for one in request.train}

@@ -39,24 +39,16 @@ class Sureness:
 def sureness(fitted: Fit, others: np.ndarray, *, loss: str, seed: int) -> Sureness:
     """Of a finished fit. others: parameters (k, p), z, of other fits that explain the data about as well."""
     problem, solution, frees = fitted.problem, fitted.solution, fitted.problem.frees
-    spread, after = known_after(fitted, loss)
-    drawn = redraw_linear(
-        problem, solution, problem.cluster, loss=LOSSES[loss], block=problem.block, draws=LINEAR_DRAWS, seed=seed
-    )
-    reach = spans(frees, drawn.z, others if len(others) else None)
-    return Sureness(_parameters(fitted, spread, after, reach), spread, after, reach)
-
-
-def known_after(fitted: Fit, loss: str) -> tuple[Covariance, Identifiability]:
-    """How sure a finished fit is, and what the data say at its solution."""
-    problem, solution = fitted.problem, fitted.solution
-    spread = spread_of(problem, solution, LOSSES[loss], fitted.drawn)
+    robust, group = LOSSES[loss], problem.cluster
+    spread = spread_of(problem, solution, robust, fitted.drawn)
     after = identifiability(
-        problem, solution.z, problem.frees,
+        problem, solution.z, frees,
         evaluation=Evaluation(solution.residual, solution.jacobian, problem.block), weight=solution.weight,
         inflation=spread.inflation, refuse=False,
     )  # fmt: skip
-    return spread, after
+    drawn = redraw_linear(problem, solution, group, loss=robust, block=problem.block, draws=LINEAR_DRAWS, seed=seed)
+    reach = spans(frees, drawn.z, others if len(others) else None)
+    return Sureness(_parameters(fitted, spread, after, reach), spread, after, reach)
 
 
 def _parameters(

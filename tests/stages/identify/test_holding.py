@@ -152,17 +152,16 @@ def test_what_an_effect_is_like_is_asked_where_the_effect_is_there(looks: list[t
     assert [one.start for one in begun.mapping.frees[1:]] == [1.0, 0.0]
 
 
-def test_a_fit_is_made_again_without_what_its_end_does_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fit_is_made_again_without_what_its_end_does_not_show() -> None:
     """Both numbers moved; the end shows the ratio alone; the second fit begins without the lag, with an empty trace
     and its own checkpoint, and an interrupted one is taken up there."""
     frees = free("friction", RATIO, LAG)
-    monkeypatch.setattr(module, "known_after", lambda made, loss: (None, made))
     tried = []
 
     def make(own: Task, predictor: Any) -> Any:
         tried.append((own.held, predictor.mapping.frees[2].start))
         kept.steps.append(len(tried))  # type: ignore[arg-type]
-        return predictor.told((*own.held, LAG))
+        return {*own.held, LAG}
 
     kept = Kept(None)
     kept.saved = {"round": 2}

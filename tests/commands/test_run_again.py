@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from r2s2r_cli.errors import UsageError
+from r2s2r_cli.store.header import read_header
 from tests.commands.conftest import invoke
 from tests.commands.test_mend import put
 from tests.commands.test_run import CUT_OFF, Calls, calls
@@ -50,8 +51,9 @@ def told(words: Sequence[str]) -> str:
 
 def test_what_was_run_is_run_again(older: Path) -> None:
     """Policies, repeats and camera as they were recorded, the port that is named now; of its iteration, and it asks."""
+    camera = read_header(older / "iterations" / "001" / "50-execute.h5").provenance.settings["flags"]["camera"]
     assert told(["--iteration", "1", *ROBOT]) == (
-        "execute straight turn-counterclockwise --port socket://nowhere:1 --camera rig://127.0.0.1:42585 --repeats 2 "
+        f"execute straight turn-counterclockwise --port socket://nowhere:1 --camera {camera} --repeats 2 "
         "--iteration 1 --force"
     )
 

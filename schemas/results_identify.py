@@ -17,7 +17,7 @@ class ParameterFigures(Frozen):
     """One parameter. None: the runs do not say it."""
 
     value: float
-    """With which the errors were found. Where it is not identifiable nothing speaks for it."""
+    """With which the errors were found. Where it is not identifiable nothing speaks for it; of an effect it is off."""
     sd: float | None
     lower: float | None
     upper: float | None

@@ -52,7 +52,8 @@ Every number of every effect in `r2s2r_cli/effects` as well: `EFFECT.PARAMETER` 
 element where it has elements (`cap_friction.factor.3` for cap 3; `cap_friction.factor` is one number for all caps).
 Bounds and the prior's scale are those of the effect, the coordinate is linear, and the fit starts at the effect's off
 value; beside it where that is a bound, or other numbers would do nothing there (`friction_anisotropy.ratio`,
-`friction_field.patch_factor`). A free number of an effect puts the effect into the simulator.
+`friction_field.patch_factor`). The prior is about the off value, and there a number is held that the training intervals
+do not show; both are at START where you give one. A free number of an effect puts the effect into the simulator.
 """
 _TITLES = {"robot": "Robot and ground", "log": "Log", "controller": "Controller"}
 

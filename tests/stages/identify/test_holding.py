@@ -13,7 +13,7 @@ import pytest
 
 from r2s2r_cli.effects import CATALOGUE, FURTHER
 from r2s2r_cli.stages.identified import identified
-from r2s2r_cli.stages.identify import holding as module
+from r2s2r_cli.stages.identify import holding as module, online
 from r2s2r_cli.stages.identify.before import specs_of
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.identify.effects_asked import effects_kept
@@ -26,6 +26,7 @@ from r2s2r_cli.stages.identify.holding import fitted_to_shown, held_at, holding,
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.online import Known, drifted
 from r2s2r_cli.stages.identify.recipe import Recipe
+from r2s2r_cli.stages.identify.request import Request
 from r2s2r_cli.stages.identify.residuals import FIXED_SD, CapResiduals
 from r2s2r_cli.stages.identify.task import Task
 from r2s2r_cli.stages.identify.training import training_windows
@@ -257,3 +258,29 @@ def test_draws_of_what_is_not_shown_lie_about_off() -> None:
     assert drawn[0] == 0.0
     assert np.mean(drawn > 1e-6) == pytest.approx(0.5, abs=0.03)
     assert np.sqrt(np.mean(drawn**2)) == pytest.approx(lag.prior_sd / math.sqrt(2.0), rel=0.05)
+
+
+@pytest.mark.parametrize("last", [True, False])
+def test_of_a_run_among_several_its_information_counts(monkeypatch: pytest.MonkeyPatch, last: bool) -> None:
+    """Online a run of few windows reports no number, and the next goes on from what it says: only of the last, whose
+    numbers are written down, what is reported as not identifiable is off."""
+    frees = free("motor_speed", LAG)
+    told = SimpleNamespace(
+        parameters=tuple(ParameterFound(one, one.start, 0.1, 0.0, 1.0, NAN, HIDDEN) for one in frees),
+        after=SimpleNamespace(trust=(SHOWN, SHOWN)),
+    )
+    held = []
+
+    def fit(*arguments: Any, **options: Any) -> Any:
+        held.append(arguments[3].held)
+        z = np.zeros(2)
+        return SimpleNamespace(problem=SimpleNamespace(frees=frees), solution=SimpleNamespace(z=z))
+
+    monkeypatch.setattr(online, "fit", fit)
+    monkeypatch.setattr(online, "start_found", lambda *arguments: None)
+    monkeypatch.setattr(online, "assured", lambda own, made: SimpleNamespace(made=made, sure=told))
+    monkeypatch.setattr(Task, "predictor", lambda own, frees: Shown(frees))
+    request = Request((Selection("walk", (1,)),))
+    order = (Selection("walk", (1,)),) if last else (Selection("walk", (1,)), Selection("later", (1,)))
+    online._fit_to(replace(task(), request=request), frees, Kept(None), (0, order))
+    assert held == ([(), (LAG,)] if last else [()])

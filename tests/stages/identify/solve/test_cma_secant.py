@@ -10,7 +10,7 @@ from r2s2r_cli.stages.identify.solve.cma_es import cma_es
 from r2s2r_cli.stages.identify.solve.levenberg import levenberg_marquardt
 from r2s2r_cli.stages.identify.solve.loss import StudentT
 from r2s2r_cli.stages.identify.solve.secant import secant_jacobian
-from tests.stages.identify.solve.problems import DECAY_START, decay, formula
+from tests.stages.identify.solve.problems import DECAY_START, decay, formula, linear
 
 
 @pytest.mark.parametrize("limits", [{}, {"lower": 0.0, "upper": [1.8, 5.0, 5.0]}])
@@ -121,3 +121,30 @@ def test_secants_at_bounds_and_beside_failures() -> None:
         secant_jacobian(batch(f), np.zeros(2), (1e-3, 1e-2), lower=0.0, upper=0.0)
     with pytest.raises(NumericalError, match="not finite"):
         secant_jacobian(batch(f), np.array([0.0, 2.0]), (1e-3, 1e-2))
+
+
+@pytest.mark.parametrize("place", [0, 2])
+def test_what_is_held_stays_to_the_last_bit(place: int) -> None:
+    """On its lower bound, as an effect that is off: both solvers find the best of the others with it there, which pulls
+    it away with all its weight."""
+    held, sd, lower = 1.0 / 3.0, np.full(4, 3.0), np.full(4, -np.inf)
+    sd[place], lower[place] = 1e-9, held
+    problem, a, b = linear(lower=lower, prior_mean=np.where(np.arange(4) == place, held, 0.0), prior_sd=sd)
+    others = np.delete(np.arange(4), place)
+    left, right = np.vstack([a[:, others], np.eye(3) / 3.0]), np.append(b - held * a[:, place], np.zeros(3))
+    best = np.linalg.lstsq(left, right)[0]
+    start = np.where(np.arange(4) == place, held, 0.5)
+    for z in (
+        levenberg_marquardt(problem, start, tolerance=1e-12).z,
+        cma_es(problem, start, sd0=0.3, budget=3000, seed=3).z,
+    ):
+        assert z[place] == held
+        assert z[others] == pytest.approx(best, abs=2e-3)
+
+
+def test_where_all_is_held_nothing_is_sampled() -> None:
+    """CMA-ES of no dimension is the cost where everything stays."""
+    problem, _, b = linear(prior_sd=1e-9)
+    found = cma_es(problem, np.zeros(4), sd0=0.3, budget=100, seed=0)
+    assert found.counts.plain == 1 and found.cost == pytest.approx(0.5 * b @ b)
+    np.testing.assert_array_equal(found.z, 0.0)

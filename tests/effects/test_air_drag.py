@@ -6,7 +6,7 @@ import pytest
 
 from r2s2r_cli.effects.air_drag import AirDrag
 from r2s2r_cli.engine import Parameters, Structure
-from tests.support.engine import MASS, G, roll, simulate, state, vector
+from tests.support.engine import MASS, G, after, simulate, state, vector
 from tests.support.lone_rod import lone_rod
 
 H, DRAG = 1e-3, 0.4
@@ -35,8 +35,8 @@ def test_turning_dies_away_at_the_same_rate() -> None:
     kept = (1.0 - H * DRAG / MASS) ** 60
     for spin in (vector(0.0, 0.0, 3.0), vector(2.0, 0.0, 0.0)):
         start = state(structure, vector(0.0, 0.0, 50.0)[None], w=spin.expand(1, 1, 3))
-        after = roll(structure, theta, start, 60, H)[-1]
-        assert after.w_R[0, 0].norm().item() == pytest.approx(float(spin.norm()) * kept, rel=1e-12)
+        end = after(structure, theta, start, 60, H)
+        assert end.w_R[0, 0].norm().item() == pytest.approx(float(spin.norm()) * kept, rel=1e-12)
 
 
 def test_a_heavy_rod_is_braked_less() -> None:
@@ -44,7 +44,7 @@ def test_a_heavy_rod_is_braked_less() -> None:
     structure, theta = rod(DRAG)
     _, heavy = rod(DRAG, mass=2 * MASS)
     start = state(structure, vector(0.0, 0.0, 50.0)[None], v=vector(0.5, 0.0, 0.0).expand(1, 1, 3))
-    after = roll(structure, heavy, start, 100, H)[-1]
-    assert float(after.v_WB[0, 0, 0]) == pytest.approx(0.5 * (1.0 - H * DRAG / (2 * MASS)) ** 100, rel=1e-12)
-    light = roll(structure, theta, start, 100, H)[-1]
-    assert float(light.v_WB[0, 0, 0]) < float(after.v_WB[0, 0, 0])
+    slow = after(structure, heavy, start, 100, H)
+    assert float(slow.v_WB[0, 0, 0]) == pytest.approx(0.5 * (1.0 - H * DRAG / (2 * MASS)) ** 100, rel=1e-12)
+    light = after(structure, theta, start, 100, H)
+    assert float(light.v_WB[0, 0, 0]) < float(slow.v_WB[0, 0, 0])

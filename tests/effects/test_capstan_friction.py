@@ -76,7 +76,7 @@ def test_it_takes_energy() -> None:
     """A cable pulled out and let back again and again takes energy in every round: with a winch that keeps its pull,
     the integral of the law over both ways, by a long stroke 2 sinh(wrap) times pull and stroke; with a winch that
     holds, some as well."""
-    stroke, n, wrap = 10 * SLIDE_M, 2000, 0.2
+    stroke, n, wrap = 10 * SLIDE_M, 1000, 0.2
     steps = torch.cat([torch.full((n,), stroke / n), torch.full((n,), -stroke / n)]).double().tolist()
     for follows in (True, False):
         way, stretch, force, taken = column(0.0), 0.01, column(0.0), []

@@ -19,6 +19,7 @@ from tests.support.engine import (
     MASS,
     RADIUS,
     G,
+    after,
     lying,
     pointing,
     roll,
@@ -104,11 +105,11 @@ def test_friction_holds_a_cap_on_the_slope_or_does_not() -> None:
     for friction in (0.0, 2 * slope):
         structure, theta = rod(friction=friction)
         start = state(structure, middle[None], q=pointing(axis))
-        moved.append(roll(structure, theta, start, 100, H, every=20))
+        moved.append(simulate(structure, theta, start, 100, H, every=20))
     # The push of a step is that of the load before: one step less.
-    assert float(moved[0][1].v_WB[0, 0, 0]) == pytest.approx(19 * H * 0.5 * G * slope, rel=0.03)
-    assert float((moved[1][-1].p_WB[0, 0] - middle).abs().max()) < 2e-5
-    assert float(moved[1][-1].v_WB.abs().max()) < 1e-4
+    assert float(moved[0].at(1).v_WB[0, 0, 0]) == pytest.approx(19 * H * 0.5 * G * slope, rel=0.03)
+    assert float((moved[1].at(-1).p_WB[0, 0] - middle).abs().max()) < 2e-5
+    assert float(moved[1].at(-1).v_WB.abs().max()) < 1e-4
 
 
 def test_friction_and_slope_add_up() -> None:
@@ -164,7 +165,7 @@ def test_the_line_can_lie_anywhere() -> None:
         start, p_WB=start.p_WB @ R.T + shift, v_WB=start.v_WB @ R.T,
         q_WR=roma.quat_product(q.expand_as(start.q_WR), start.q_WR),
     )  # fmt: skip
-    ours, theirs = roll(plain, theta, start, 300, H)[-1], roll(turned, other, twin, 300, H)[-1]
+    ours, theirs = after(plain, theta, start, 300, H), after(turned, other, twin, 300, H)
     assert float(ours.p_WB[0, 0, 0]) > -0.02
     assert float((theirs.p_WB - ours.p_WB @ R.T - shift).abs().max()) < 1e-6
     assert float((theirs.v_WB - ours.v_WB @ R.T).abs().max()) < 1e-5
@@ -187,6 +188,6 @@ def test_it_bears_the_weight() -> None:
     structure, theta = rod(friction=0.5)
     start = coming(structure, 0.0, at=0.0)
     start = replace(start, p_WB=start.p_WB + vector(0.0, 0.0, HEIGHT))
-    after = roll(structure, theta, start, 10, H)[-1]
-    assert after.extra["obstacle.force"][0].numpy() == pytest.approx([MASS * G / 2, MASS * G / 2], rel=1e-6)
-    assert float(after.p_WB[0, 0, 2]) == pytest.approx(RADIUS + HEIGHT, abs=1e-9)
+    end = roll(structure, theta, start, 10, H)[-1]
+    assert end.extra["obstacle.force"][0].numpy() == pytest.approx([MASS * G / 2, MASS * G / 2], rel=1e-6)
+    assert float(end.p_WB[0, 0, 2]) == pytest.approx(RADIUS + HEIGHT, abs=1e-9)

@@ -95,7 +95,7 @@ def test_a_cable_that_is_to_go_beyond_the_top_is_never_done() -> None:
     runs = []
     for share in (0.0, 1.0):
         made = with_(top_share=share, top_m=0.215)
-        simulator = Simulator(made.structure, native=False)
+        simulator = Simulator(made.structure)
         target = none[:, None] + 0.42  # 0.226 m
         runs.append(closed_loop(simulator, made.theta, made.start, pid, target, none, none + 1.0))
     plain, clipped = runs

@@ -23,9 +23,20 @@ def trees() -> dict[str, ast.Module]:
     return {name(path): ast.parse(path.read_text()) for path in TESTS}
 
 
+def statements(tree: ast.Module) -> Iterator[ast.AST]:
+    """The module and all its statements, those within others too. Expressions are not gone through, which are most."""
+    waiting: list[ast.AST] = [tree]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        for block in ("body", "orelse", "finalbody", "handlers", "cases"):
+            inner = getattr(node, block, ())
+            waiting += inner if isinstance(inner, list) else ()
+
+
 def functions_of(tree: ast.Module) -> Iterator[ast.FunctionDef]:
     """The test functions of a file, also those inside classes."""
-    for node in ast.walk(tree):
+    for node in statements(tree):
         if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
             yield node
 
@@ -51,7 +62,7 @@ def test_no_two_functions_of_a_file_share_a_name(trees: dict[str, ast.Module]) -
     """No test hides an earlier one of the same name in the same scope."""
     twice = []
     for path, tree in trees.items():
-        for scope in ast.walk(tree):
+        for scope in statements(tree):
             if isinstance(scope, ast.Module | ast.ClassDef):
                 names = Counter(node.name for node in scope.body if isinstance(node, ast.FunctionDef))
                 twice += [(path, one) for one, count in names.items() if count > 1]

@@ -34,12 +34,13 @@ REAL = Path(__file__).resolve().parents[2] / "shared" / "real"
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
     """Collect tests without collecting garbage: it would look a dozen times at millions of objects that all stay, which
-    is a third of the time. Nor are they looked at later on."""
+    is a third of the time. Nor are they looked at later on, and what tests leave behind is seldom."""
     gc.disable()
     try:
         return (yield)
     finally:
         gc.freeze()
+        gc.set_threshold(10_000, 20, 100)
         gc.enable()
 
 

@@ -42,7 +42,12 @@ def new_figure(width: float, height: float) -> Figure:
 def png_bytes(figure: Figure, dpi: int = 100) -> bytes:
     """The figure as PNG; equal figures give equal bytes."""
     buffer = io.BytesIO()
+    layout = figure.get_layout_engine()
+    if layout is not None and figure.dpi == dpi:  # or all would be drawn once more, for nothing but the layout
+        layout.execute(figure)
+        figure.set_layout_engine(None)
     figure.savefig(buffer, format="png", dpi=dpi, metadata={"Software": None})
+    figure.set_layout_engine(layout)
     return buffer.getvalue()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +27,13 @@ def invoke(*arguments: str) -> Any:
     return CliRunner().invoke(app, list(arguments))
 
 
-@pytest.fixture(autouse=True)
-def sketches(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(scope="module", autouse=True)
+def sketches(request: pytest.FixtureRequest) -> Iterator[None]:
     """Pictures that commands draw in this process are small, without axes and not laid out, in a third of the time:
-    what stands in them is tested in tests/views, from values. The slow tests look at whole ones."""
+    what stands in them is tested in tests/views, from values. Among the slow tests are some that look at them."""
+    if request.config.getoption("markexpr") != "not slow":
+        yield
+        return
     from matplotlib.figure import Figure
 
     save = Figure.savefig
@@ -41,8 +44,9 @@ def sketches(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
             axes.set_axis_off()
         save(figure, *to, **{**how, "dpi": 20})
 
-    if request.node.get_closest_marker("slow") is None:
-        monkeypatch.setattr(Figure, "savefig", sketched)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", sketched)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -101,12 +101,12 @@ def smooth(
         quality = np.where(found > 0, found, quality).astype(np.uint8)
         used, free = _interventions(y, quality, kick)
         density = fit_density(t, used, var, free, last)
-        _, state = _pass(t, used, var, free, density + np.log10(BURSTS))
+        state = backward(t, used, var, free, _filtered(t, used, var, free, density + np.log10(BURSTS)))
         found, last = _breaks(state, quality, limit), density
         if not np.any(found):
             break
     _check_explained(density)
-    fit, _ = _pass(t, used, var, free, density)
+    fit = _filtered(t, used, var, free, density)
     return _tracks(fit, state, quality, used, BURSTS * 10.0**density)
 
 
@@ -157,11 +157,8 @@ def _interventions(y: np.ndarray, quality: np.ndarray, kick: np.ndarray) -> tupl
     return np.where(unused, np.nan, y), Disturbances(kick, jump)
 
 
-def _pass(
-    t: np.ndarray, y: np.ndarray, var: np.ndarray, free: Disturbances, log_density: np.ndarray
-) -> tuple[Filtered, Smoothed]:
-    fit = forward(t, y, var, np.repeat(10.0**log_density, 3)[None], free)
-    return fit, backward(t, y, var, free, fit)
+def _filtered(t: np.ndarray, y: np.ndarray, var: np.ndarray, free: Disturbances, log_density: np.ndarray) -> Filtered:
+    return forward(t, y, var, np.repeat(10.0**log_density, 3)[None], free)
 
 
 def fit_density(

@@ -239,7 +239,9 @@ def _difference(old: np.ndarray, new: np.ndarray, rule: Rule | None) -> str | No
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("project", type=Path, nargs="?", default=Path(__file__).parent / "project")
+    parser.epilog = "It works on a copy. Exit code 1 where a result is not what it was."
+    where = "the project's directory; without it, the sample project"
+    parser.add_argument("project", type=Path, nargs="?", default=Path(__file__).parent / "project", help=where)
     parser.add_argument("--newest", action="store_true", help="of every stage the last artifact only")
     asked = parser.parse_args()
     found = main(asked.project, newest=asked.newest)

@@ -90,8 +90,8 @@ def compare(
         console.say("nothing was interrupted: there is no checkpoint to go on from")
     run = StageRun(
         stage="compare", kind="comparison", project=here, iteration=place, find_inputs=asked.refs,
-        report_model=CompareReport, flags=asked.flags(), dry_run=dry_run,
-        force=force or (resume and unfinished.exists()),
+        report_model=CompareReport, flags=asked.flags(), dry_run=dry_run, force=force,
+        resumed=resume and unfinished.exists(),
     )  # fmt: skip
     wanted, digests = run.wanted, [ref.sha256 for ref in run.inputs]
     # An effect of a package is another one in its next version.

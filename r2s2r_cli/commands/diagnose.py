@@ -122,7 +122,7 @@ def diagnose(
         run = StageRun(
             stage="diagnose", kind="diagnosis", project=here, iteration=place, find_inputs=asked.refs,
             report_model=DiagnoseReport, overrides=overrides, flags=asked.flags(), dry_run=dry_run,
-            force=force or (resume and unfinished.exists()),
+            force=force, resumed=resume and unfinished.exists(),
         )  # fmt: skip
         if dry_run:
             asked.evidence(console.say)

@@ -193,7 +193,7 @@ def _fit(asked: Asked, overrides: dict[str, Any], console: Console, how: _Ways) 
     run = StageRun(
         stage="identify", kind="identification", project=here, iteration=place, find_inputs=asked.refs,
         report_model=IdentifyReport, overrides=overrides, flags=asked.flags(), dry_run=how.dry_run,
-        force=how.force or (resume and unfinished.exists()),
+        force=how.force, resumed=resume and unfinished.exists(),
     )  # fmt: skip
     if how.dry_run or writer(here.root) is not None:  # to wait for the other one mends no misspelt request
         asked.check(settings)

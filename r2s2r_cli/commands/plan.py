@@ -93,7 +93,8 @@ def plan(
         console.say("nothing was interrupted: there is no checkpoint to go on from")
     run = StageRun(
         stage="plan", kind="plan", project=here, iteration=place, find_inputs=asked.refs, report_model=PlanReport,
-        overrides=overrides, flags=asked.flags(), dry_run=dry_run, force=force or (resume and unfinished.exists()),
+        overrides=overrides, flags=asked.flags(), dry_run=dry_run, force=force,
+        resumed=resume and unfinished.exists(),
     )  # fmt: skip
     digests = [ref.sha256 for ref in run.inputs]
     key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)

@@ -74,7 +74,7 @@ def _say_checkpoints(start: Path | None, console: Console) -> None:
 
     project = Project.find(start)
     for kept in checkpoints(project).values():
-        console.say(f"{project.relative(kept.path)}: interrupted, kept to be gone on with: {kept.command}")
+        console.say(f"{kept.name}: interrupted; {kept.use}")
 
 
 def _leftovers(start: Path | None) -> tuple[list[Path], list[Path]]:

@@ -218,6 +218,7 @@ def _kept(project: Project, place: Iteration, step: Step, steps: Sequence[Step])
 def _resumed(step: Step) -> tuple[str, ...]:
     """`--resume` where there is something to go on from."""
     from r2s2r_cli.commands.unfinished import RESUMED
-    from r2s2r_cli.store.checkpoint import checkpoint_of
+    from r2s2r_cli.store.checkpoint import checkpoint_of, head_of
 
-    return ("--resume",) if step.name in RESUMED.values() and checkpoint_of(step.target).exists() else ()
+    there = step.name in RESUMED.values() and head_of(checkpoint_of(step.target)) is not None
+    return ("--resume",) if there else ()

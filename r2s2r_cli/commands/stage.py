@@ -49,6 +49,8 @@ class StageRun(Generic[Report]):
     flags: Mapping[str, Any] = field(default_factory=dict)
     dry_run: bool = False
     force: bool = False
+    resumed: bool = False
+    """Whether there is something to go on from: it is made, fresh or not."""
     guard: Callable[[Header | None], None] | None = None
     """Raises where the artifact in the way must not be replaced; in a dry run as well."""
     executed: bool = False
@@ -72,11 +74,11 @@ class StageRun(Generic[Report]):
         `draw` yields (suffix, bytes): `-run.png`, `.html`. `after` runs once the artifact stands, under the lock.
         """
         present, why = self.why(drawn=draw is not None)
-        if self.force and not why:
-            why = ["--force was given"]
+        if not why and (self.force or self.resumed):
+            why = ["--force was given" if self.force else "--resume goes on with what was interrupted"]
         if present is not None and not why:
             return self._fresh(present, draw)
-        if self.guard is not None and not self.force:
+        if self.guard is not None and not (self.force or self.resumed):
             self.guard(present)
         if self.dry_run:
             return self._result("dry_run", present, why, None), None

@@ -74,11 +74,13 @@ def status(
         console.hint(result.next)
     unfit = [a for a in result.artifacts if a.state not in ("fresh", *UNDER_WAY)]
     if check and unfit:
+        damaged = [a for a in unfit if a.state == "damaged"]  # of which the others may be stale
+        first, also = (damaged or unfit)[0], f", {len(damaged)} damaged" if damaged else ""
         raise GateError(
-            f"{len(unfit)} of {len(result.artifacts)} artifacts are not fresh",
-            where=unfit[0].artifact,
+            f"{len(unfit)} of {len(result.artifacts)} artifacts are not fresh{also}",
+            where=first.artifact,
             expected="fresh",
-            received=f"{unfit[0].state}: {'; '.join(brief(unfit[0].reasons))}",
+            received=f"{first.state}: {'; '.join(brief(first.reasons))}",
             hint=result.next or "r2s2r status",
         )
 
@@ -112,7 +114,7 @@ def survey(project: Project, *, thorough: bool = False) -> StatusResult:
         runs += [mend.runs] if mend.runs else []
     busy = writer(project.root) if journals or kept else None
     states += [unsealed(project, iterations.get(path.parent), path, busy) for path in journals]
-    states += [interrupted(project, one, busy) for one in kept.values()]
+    states += [interrupted(one, busy) for one in kept.values()]
     if busy is None:
         again = [f"{_RECOVER}{shlex.quote(project.relative(path))}" for path in journals] + again
         again += [one.command for one in kept.values()]
@@ -187,7 +189,7 @@ def _going_on(
     """The same, mended by going on where a checkpoint of it is kept: made anew, that would be lost. Looked at or
     recovered, it is not."""
     one = kept.get((state.stage, state.iteration))
-    if one is None or not mend.command or mend.command.startswith((_RECOVER, "ls ")):
+    if one is None or not one.readable or not mend.command or mend.command.startswith((_RECOVER, "ls ")):
         return state, mend
     return state.model_copy(update={"mend": one.command if state.mend else ""}), replace(mend, command=one.command)
 

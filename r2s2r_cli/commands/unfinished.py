@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from r2s2r_cli.store.checkpoint import checkpoint_of, command_of
+from r2s2r_cli.store.checkpoint import checkpoint_of, command_of, head_of
 from r2s2r_cli.store.project import Iteration, Project, journal_of
 from schemas.results import ArtifactState
 
@@ -22,17 +22,35 @@ class Kept:
     """A checkpoint."""
 
     path: Path
+    name: str
+    """Its path in the project."""
     stage: str
     iteration: int
     latest: bool = True
     """Whether a command without --iteration means this one."""
 
     @cached_property
+    def readable(self) -> bool:
+        """Whether its head is whole: without it nothing goes on from it."""
+        return head_of(self.path) is not None
+
+    @cached_property
     def command(self) -> str:
-        """What goes on from it: as it was typed, or, of an older r2s2r, without its options."""
+        """What goes on from it: as it was typed, or, of an older r2s2r, without its options. Where nothing does, what
+        removes it."""
+        if not self.readable:
+            return shlex.join(["rm", self.name])
         typed = command_of(self.path) or (self.stage, "--iteration", str(self.iteration))
         named = self.latest or any(word.partition("=")[0] == "--iteration" for word in typed)
         return shlex.join(["r2s2r", *typed, *([] if named else ["--iteration", str(self.iteration)]), "--resume"])
+
+    @property
+    def use(self) -> str:
+        """What it is good for, with the command behind: a table breaks a long one before its end, and without its last
+        word, --resume, the work begins anew."""
+        if not self.readable:
+            return f"its head is damaged, nothing goes on from it: {self.command}"
+        return f"--resume goes on with what is kept: {self.command}"
 
 
 def checkpoints(project: Project) -> dict[tuple[str, int | None], Kept]:
@@ -40,19 +58,18 @@ def checkpoints(project: Project) -> dict[tuple[str, int | None], Kept]:
     every = project.iterations()
     places = [(one, checkpoint_of(one.artifact(kind)), stage) for one in every for kind, stage in RESUMED.items()]
     return {
-        (stage, one.number): Kept(path, stage, one.number, latest=one == every[-1])
+        (stage, one.number): Kept(path, project.relative(path), stage, one.number, latest=one == every[-1])
         for one, path, stage in places
         if path.exists()
     }
 
 
-def interrupted(project: Project, one: Kept, busy: str | None) -> ArtifactState:
+def interrupted(one: Kept, busy: str | None) -> ArtifactState:
     """A checkpoint. busy: who writes in the project now."""
     running = busy is not None and f"'r2s2r {one.stage}'" in busy
-    # The option comes first: a table breaks a long command before its end, and without it the work begins anew.
-    why = f"{busy} is at work" if running else f"--resume goes on with what is kept: {one.command}"
+    why = f"{busy} is at work" if running else one.use
     return ArtifactState(
-        stage=one.stage, iteration=one.iteration, artifact=project.relative(one.path),
+        stage=one.stage, iteration=one.iteration, artifact=one.name,
         state="running" if running else "interrupted", reasons=(why,), bytes=one.path.stat().st_size,
         content_sha256=None,
     )  # fmt: skip

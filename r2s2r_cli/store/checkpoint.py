@@ -70,7 +70,8 @@ def discard(checkpoint: Path) -> None:
 
 def unreadable(checkpoint: Path, command: Sequence[str], error: Exception) -> InputError:
     """For a checkpoint of either kind that is no checkpoint, or of another form."""
-    return InputError("the checkpoint cannot be read", where=str(checkpoint), received=type(error).__name__,
+    received = f"a file that cannot be opened: {error}" if isinstance(error, OSError) else "a damaged one"
+    return InputError("the checkpoint cannot be read", where=str(checkpoint), received=received,
                       expected="what an interrupted command left", hint=begin_anew(command))  # fmt: skip
 
 
@@ -122,14 +123,21 @@ def begin_anew(command: Sequence[str]) -> str:
     return shlex.join(["r2s2r", *(word for word in command if word != "--resume")])
 
 
+def head_of(checkpoint: Path) -> dict[str, Any] | None:
+    """What the first line of a checkpoint of either kind says; None where it is damaged."""
+    try:
+        with checkpoint.open("rb") as file:
+            found = json.loads(file.readline())
+    except (OSError, ValueError):
+        return None
+    return found if isinstance(found, dict) and "key" in found else None
+
+
 def command_of(checkpoint: Path) -> tuple[str, ...] | None:
     """The words that were typed after `r2s2r` for the work that lies there, of either kind of checkpoint; None where it
     does not say."""
-    try:
-        with checkpoint.open("rb") as file:
-            return tuple(str(word) for word in json.loads(file.readline())["command"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
+    words = (head_of(checkpoint) or {}).get("command")
+    return tuple(str(word) for word in words) if isinstance(words, list) else None
 
 
 def checkpoint_of(artifact: Path) -> Path:

@@ -117,10 +117,14 @@ def test_it_goes_on_with_the_runs_that_are_left(bot: Path, stopped: str) -> None
     """`status` says how. Nothing is simulated twice, and the artifact is that of a comparison in one go."""
     (said,) = [one for one in survey(Project.find(bot)).artifacts if one.artifact == str(KEPT)]
     assert said.state == "interrupted" and "r2s2r compare --of record --no-draw --resume" in said.reasons[0]
+    held = KEPT.read_bytes()
     again = document(*COMMAND, "--resume")
     assert again["state"] == "done" and Engine.done == BOTH[1:]
     assert again["content_sha256"] == stopped
     assert not KEPT.exists()
+    KEPT.write_bytes(held)  # where a fresh artifact was made anew, and that was interrupted
+    why = document(*COMMAND, "--resume", "--dry-run")["reasons"]
+    assert why == ["--resume goes on with what was interrupted"]
 
 
 def test_interrupted_once_more_it_keeps_both_parts(stopped: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -48,8 +48,8 @@ def test_what_was_interrupted_is_left_and_named(project: Path) -> None:
     result = invoke("recover")
     assert (result.exit_code, result.stdout) == (0, "") and kept.exists()
     said = result.stderr.splitlines()
-    words = "iterations/001/40-plan.partial: interrupted, kept to be gone on with: r2s2r plan --to=1,2,0 --resume"
-    assert said[1:] == [words]
+    use = "--resume goes on with what is kept: r2s2r plan --to=1,2,0 --resume"
+    assert said[1:] == [f"iterations/001/40-plan.partial: interrupted; {use}"]
     assert "nothing to recover" in said[0] and "unfinished" not in said[0]
 
 

@@ -84,11 +84,13 @@ def test_a_log_needs_no_robot(project: Path, calls: Calls) -> None:
 
 @pytest.mark.parametrize("kind", ["identification", "plan", "comparison"])
 def test_a_stage_that_was_interrupted_goes_on(estimated: Path, calls: Calls, kind: str) -> None:
-    """The stage that left a checkpoint takes it up, no other one."""
+    """The stage that left a checkpoint takes it up, no other one; what is damaged is not taken up."""
     kept = checkpoint_of(Project.find(estimated).iteration(1).artifact(kind))
-    kept.write_text("{}", "utf-8")
-    assert invoke("run").exit_code == 0
-    assert [words[0] for words in calls if "--resume" in words] == [RESUMED[kind]]
+    for head, resumed in (('{"key": "0"}', [RESUMED[kind]]), ("{", [])):
+        kept.write_text(head, "utf-8")
+        calls.clear()
+        assert invoke("run").exit_code == 0
+        assert [words[0] for words in calls if "--resume" in words] == resumed
 
 
 def test_a_robot_that_has_moved_is_not_moved_again(estimated: Path, calls: Calls) -> None:

@@ -61,6 +61,8 @@ def test_what_was_made_of_a_damaged_artifact_says_that_it_is_damaged(estimated: 
     found = {one["artifact"]: one for one in json.loads(invoke("status", "--check", "--json").stdout)["artifacts"]}
     assert (found[recording]["state"], found[ESTIMATE]["state"]) == ("damaged", "stale")
     assert found[ESTIMATE]["reasons"] == [f"input {recording} is damaged"]
+    said = invoke("status", "--check").stderr
+    assert "error: 2 of 2 artifacts are not fresh, 1 damaged" in said and f"where: {recording}" in said
 
 
 def test_a_recording_without_a_head_is_a_robots_unless_its_logs_are_there(estimated: Path) -> None:

@@ -64,15 +64,29 @@ def test_what_runs_is_no_wreck(bot: Project) -> None:
 
 
 def test_arrays_and_values_say_how_to_go_on(tmp_path: Path) -> None:
-    """Both kinds of checkpoints; those of an older r2s2r name stage and iteration alone, and what is none says
-    nothing."""
+    """Both kinds of checkpoints; those of an older r2s2r name stage and iteration alone. From one whose head is damaged
+    nothing goes on: it is in the way."""
+    name = "iterations/002/40-plan.partial"
     path = tmp_path / "40-plan.partial"
     ArrayCheckpoint(path, "0" * 64, command=("plan", "--to", "1,2,0")).keep(b"0" * 32, [np.zeros(3)])
-    assert Kept(path, "plan", 2).command == "r2s2r plan --to 1,2,0 --resume"
+    assert Kept(path, name, "plan", 2).command == "r2s2r plan --to 1,2,0 --resume"
     path.write_text('{"form": 1, "key": "0", "values": {}}')
-    assert Kept(path, "plan", 2).command == "r2s2r plan --iteration 2 --resume"
-    path.write_bytes(bytes(range(256)))
-    assert Kept(path, "plan", 2).command == "r2s2r plan --iteration 2 --resume"
+    assert Kept(path, name, "plan", 2).command == "r2s2r plan --iteration 2 --resume"
+    for damaged in (bytes(range(256)), bytes(1000), b"", b"[]", b"{}"):
+        path.write_bytes(damaged)
+        assert Kept(path, name, "plan", 2).command == f"rm {name}"
+        assert "nothing goes on from it" in Kept(path, name, "plan", 2).use
+
+
+def test_what_is_damaged_is_not_gone_on_with(bot: Project) -> None:
+    """Neither by the survey, which says what removes it, nor instead of what mends an artifact."""
+    kept = checkpoint_of(bot.iteration(1).artifact("diagnosis"))
+    kept.write_bytes(bytes(kept.stat().st_size))
+    found = survey(bot)
+    assert found.next == f"rm {bot.relative(kept)}"
+    assert "its head is damaged" in found.artifacts[0].reasons[0]
+    bot.iteration(1).artifact("diagnosis").write_bytes(b"")
+    assert survey(bot).next.startswith("r2s2r diagnose") and "--resume" not in survey(bot).next
 
 
 def test_nothing_is_made_anew_over_what_is_kept(bot: Project, monkeypatch: pytest.MonkeyPatch) -> None:

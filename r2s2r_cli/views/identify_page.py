@@ -34,6 +34,9 @@ def verdict(report: IdentifyReport) -> str:
     told = f"The runs determine {len(sure)} of {counted(len(free), 'free parameter')}{f' ({rest})' if rest else ''}."
     if report.method == "paper":
         told = f"The method gives no uncertainty: what {counted(len(free), 'number')} may be worth is not known."
+    unseen = [one for one in report.effects if _unseen(one, report)]
+    if unseen:
+        told += f" The runs show nothing of {' and '.join(unseen)}; to go on without: --with-effect none."
     held = report.heldout
     if held is None:
         return f"{told} Nothing was held out: how well it predicts is not known."
@@ -47,6 +50,12 @@ def verdict(report: IdentifyReport) -> str:
     level = [name for name, one in held.baselines.items() if _open(one)]
     more = f" Not decided against: {', '.join(level)}." if level else ""
     return f"{told} Held out: {found}; in mm: {rivals or 'no baseline'}.{more}"
+
+
+def _unseen(effect: str, report: IdentifyReport) -> bool:
+    """Whether no free number of an effect was identifiable."""
+    trust = [found.trust for name, found in report.parameters.items() if name.startswith(f"{effect}.")]
+    return "not identifiable" in trust and set(trust) <= {"not identifiable", "fixed"}
 
 
 def report_tables(report: IdentifyReport) -> Iterator[PageTable]:

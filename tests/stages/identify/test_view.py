@@ -142,6 +142,21 @@ def test_the_verdict_is_about_what_was_not_fitted() -> None:
     assert "Nothing was held out" in verdict(said.model_copy(update={"heldout": None}))
 
 
+def test_an_effect_of_which_the_runs_show_nothing_is_named() -> None:
+    """With what goes on without it; not one of which a number is known, nor one whose numbers all were given."""
+    made = report(builders.identification())
+    one = next(found for found in made.parameters.values() if found.trust == "not identifiable")
+    numbers = {
+        "obstacle.height_m": "not identifiable", "obstacle.width_m": "fixed", "payload.mass_kg.0": "weak",
+        "payload.place_m.0": "not identifiable", "ground_slope.angle_x_rad": "fixed",
+    }  # fmt: skip
+    parameters = {name: one.model_copy(update={"trust": trust}) for name, trust in numbers.items()}
+    effects = ("obstacle", "payload", "ground_slope")
+    said = verdict(made.model_copy(update={"parameters": parameters, "effects": effects}))
+    assert "The runs show nothing of obstacle; to go on without: --with-effect none. Held out" in said
+    assert "show nothing" not in verdict(made)
+
+
 def test_an_interval_that_holds_zero_is_undecided() -> None:
     """Better in every segment and still undecided: the row says both, and the verdict names the rival."""
     said = report(builders.identification(repeating=True))

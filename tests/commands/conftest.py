@@ -35,17 +35,18 @@ def sketches(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
         return
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     save = Figure.savefig
 
     def sketched(figure: Figure, *to: Any, **how: Any) -> None:
-        figure.set_layout_engine("none")
         for axes in figure.axes:
             axes.set_axis_off()
         save(figure, *to, **{**how, "dpi": 20})
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Figure, "savefig", sketched)
+        patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
         yield
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel, ValidationError
 
@@ -57,7 +58,17 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
 
 def load_model(path: Path, model: type[Model]) -> Model:
     """Read and check a TOML file. Raises InputError naming the first wrong key, with the nearest right one."""
-    return check_model(read_toml(path), model, str(path))
+    text = read_text(path)
+    try:
+        return cast(Model, _valid(text, model))
+    except (ValueError, RecursionError):  # no TOML, or not this model: in words, then
+        return check_model(parse_toml(text, str(path)), model, str(path))
+
+
+@functools.lru_cache(maxsize=8)
+def _valid(text: str, model: type[BaseModel]) -> BaseModel:
+    """The model of a text, parsed and checked once while a process asks for it again; models are immutable."""
+    return model.model_validate(tomllib.loads(text))
 
 
 def check_model(values: dict[str, Any], model: type[Model], where: str, mend: Mend | None = None) -> Model:

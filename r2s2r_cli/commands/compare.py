@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from r2s2r_cli.commands.interrupts import resumable
 from r2s2r_cli.commands.typed import typed_words
 from r2s2r_cli.console import Console
 from r2s2r_cli.options import (
@@ -75,9 +74,8 @@ def compare(
     """
     from r2s2r_cli.commands.compare_inputs import Asked
     from r2s2r_cli.commands.outcome import show_outcome
-    from r2s2r_cli.commands.stage import StageRun
+    from r2s2r_cli.commands.resumable_run import ResumableRun
     from r2s2r_cli.installed import installed_words
-    from r2s2r_cli.store.checkpoint import checkpoint_key, checkpoint_of
     from r2s2r_cli.store.checkpoint_arrays import ArrayCheckpoint
     from schemas.results_compare import CompareReport
 
@@ -85,25 +83,21 @@ def compare(
     here = Project.find(project)
     place = here.iteration(iteration)
     asked = Asked(here, place, tuple(model or ()), None if of is None else of.value, own)
-    unfinished = checkpoint_of(here.artifact("comparison", place))
-    if resume and not unfinished.exists():
-        console.say("nothing was interrupted: there is no checkpoint to go on from")
-    run = StageRun(
+    run = ResumableRun(
         stage="compare", kind="comparison", project=here, iteration=place, find_inputs=asked.refs,
         report_model=CompareReport, flags=asked.flags(), dry_run=dry_run, force=force,
-        resumed=resume and unfinished.exists(),
+        resume=resume,
     )  # fmt: skip
-    wanted, digests = run.wanted, [ref.sha256 for ref in run.inputs]
-    # An effect of a package is another one in its next version.
-    key = checkpoint_key(wanted.stage_version, wanted.settings, wanted.robot, digests, installed_words())
     again = [word for word in typed_words("compare") if word != "--resume"]
-    checkpoint = ArrayCheckpoint(unfinished, key, resume, most=MOST_BYTES, command=again)
-    with resumable(checkpoint, here.relative(unfinished), again, done="simulated"):
-        result, report = run.run(
-            lambda: _compute(asked, checkpoint, console),
-            (lambda data, said: _draw(data, said, here.robot())) if draw else None,
-            lambda said: checkpoint.clear(),
-        )
+    # An effect of a package is another one in its next version.
+    checkpoint = run.checkpoint(ArrayCheckpoint, again, installed_words(), most=MOST_BYTES)
+    result, report = run.run_on(
+        checkpoint,
+        lambda: _compute(asked, checkpoint, console),
+        (lambda data, said: _draw(data, said, here.robot())) if draw else None,
+        console.say,
+        done="simulated",
+    )
     show_outcome(result, console)
     if report is not None:
         _show(report, console)

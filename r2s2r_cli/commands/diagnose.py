@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from r2s2r_cli.commands.interrupts import resumable
 from r2s2r_cli.commands.typed import typed_words
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import UsageError
@@ -90,9 +89,8 @@ def diagnose(
     from r2s2r_cli.commands.diagnose_outcome import answer, pictures, show
     from r2s2r_cli.commands.identify_hints import typed_options, whole_hints
     from r2s2r_cli.commands.outcome import print_config, show_outcome
-    from r2s2r_cli.commands.stage import StageRun
+    from r2s2r_cli.commands.resumable_run import ResumableRun
     from r2s2r_cli.commands.wanted import wanted
-    from r2s2r_cli.store.checkpoint import checkpoint_key, checkpoint_of
     from r2s2r_cli.store.checkpoint_arrays import ArrayCheckpoint
     from r2s2r_cli.store.lock import writer
     from schemas.results_diagnose import DiagnoseReport
@@ -116,28 +114,24 @@ def diagnose(
     with whole_hints(typed, asked.artifacts, "r2s2r diagnose"):
         _require_effects(asked.named)
         settings = here.config(place, overrides).diagnose
-        unfinished = checkpoint_of(here.artifact("diagnosis", place))
-        if resume and not unfinished.exists():
-            console.say("nothing was interrupted: there is no checkpoint to go on from")
-        run = StageRun(
+        run = ResumableRun(
             stage="diagnose", kind="diagnosis", project=here, iteration=place, find_inputs=asked.refs,
             report_model=DiagnoseReport, overrides=overrides, flags=asked.flags(), dry_run=dry_run,
-            force=force, resumed=resume and unfinished.exists(),
+            force=force, resume=resume,
         )  # fmt: skip
         if dry_run:
             asked.evidence(console.say)
         elif writer(here.root) is not None:  # to wait for the other one mends no misspelt request
             asked.evidence(lambda _: None)
-        digests = [ref.sha256 for ref in run.inputs]
-        key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
         again = [word for word in typed_words("diagnose") if word != "--resume"]
-        checkpoint = ArrayCheckpoint(unfinished, key, resume, command=again)
-        with resumable(checkpoint, here.relative(unfinished), again, done="simulated"):
-            result, report = run.run(
-                lambda: _compute(asked, settings, checkpoint, console, draw),
-                partial(pictures, asked=asked.named, only=asked.only, link=here.file.link) if draw else None,
-                lambda said: checkpoint.clear(),
-            )  # fmt: skip
+        checkpoint = run.checkpoint(ArrayCheckpoint, again)
+        result, report = run.run_on(
+            checkpoint,
+            lambda: _compute(asked, settings, checkpoint, console, draw),
+            partial(pictures, asked=asked.named, only=asked.only, link=here.file.link) if draw else None,
+            console.say,
+            done="simulated",
+        )
     show_outcome(answer(result, report), console)
     if report is not None:
         show(report, console, asked.named, only=asked.only, link=here.file.link)

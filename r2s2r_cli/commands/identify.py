@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from r2s2r_cli.commands.interrupts import resumable
 from r2s2r_cli.console import Console
 from r2s2r_cli.options import (
     DrawOption,
@@ -179,35 +178,28 @@ def _fit(asked: Asked, overrides: dict[str, Any], console: Console, how: _Ways) 
     from r2s2r_cli.commands.identify_outcome import Outcome
     from r2s2r_cli.commands.identify_run import compute
     from r2s2r_cli.commands.outcome import show_outcome
-    from r2s2r_cli.commands.stage import StageRun
-    from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_key, checkpoint_of
+    from r2s2r_cli.commands.resumable_run import ResumableRun
+    from r2s2r_cli.store.checkpoint import CheckpointFile
     from r2s2r_cli.store.lock import writer
     from schemas.results_identify import IdentifyReport
 
     here, place = asked.project, asked.iteration
     settings = here.config(place, overrides).identify
-    unfinished = checkpoint_of(here.artifact("identification", place))
-    resume = how.resume
-    if resume and not unfinished.exists():
-        console.say("nothing was interrupted: there is no checkpoint to go on from")
-    run = StageRun(
+    run = ResumableRun(
         stage="identify", kind="identification", project=here, iteration=place, find_inputs=asked.refs,
         report_model=IdentifyReport, overrides=overrides, flags=asked.flags(), dry_run=how.dry_run,
-        force=how.force, resumed=resume and unfinished.exists(),
+        force=how.force, resume=how.resume,
     )  # fmt: skip
     if how.dry_run or writer(here.root) is not None:  # to wait for the other one mends no misspelt request
         asked.check(settings)
-    digests = [ref.sha256 for ref in run.inputs]
-    key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
-    again = ["identify", *asked.typed]
     outcome = Outcome(place.number, asked.typed)
-    checkpoint = CheckpointFile(unfinished, key, resume, again)
-    with resumable(checkpoint, here.relative(unfinished), again):
-        result, report = run.run(
-            lambda: compute(asked, settings, checkpoint, console),
-            outcome.pictures if how.draw else None,
-            lambda said: checkpoint.clear(),
-        )
+    checkpoint = run.checkpoint(CheckpointFile, ["identify", *asked.typed])
+    result, report = run.run_on(
+        checkpoint,
+        lambda: compute(asked, settings, checkpoint, console),
+        outcome.pictures if how.draw else None,
+        console.say,
+    )
     show_outcome(_answer(result, report), console)
     if report is not None:
         outcome.show(report, console)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from r2s2r_cli.commands.interrupts import resumable
 from r2s2r_cli.console import Console
 from r2s2r_cli.options import (
     DrawOption,
@@ -73,9 +72,9 @@ def plan(
     """
     from r2s2r_cli.commands.outcome import print_config, show_outcome
     from r2s2r_cli.commands.plan_inputs import Asked
-    from r2s2r_cli.commands.stage import StageRun
+    from r2s2r_cli.commands.resumable_run import ResumableRun
     from r2s2r_cli.commands.wanted import wanted
-    from r2s2r_cli.store.checkpoint import CheckpointFile, checkpoint_key, checkpoint_of
+    from r2s2r_cli.store.checkpoint import CheckpointFile
     from schemas.results_plan import PlanReport
 
     console = Console(json=json, quiet=quiet)
@@ -88,24 +87,19 @@ def plan(
     settings = here.config(place, overrides).plan
     asked = Asked(here, place, tuple(behaviour or ()), tuple(to or ()), seed, settings.reach_m)
     asked.check(settings)
-    unfinished = checkpoint_of(here.artifact("plan", place))
-    if resume and not unfinished.exists():
-        console.say("nothing was interrupted: there is no checkpoint to go on from")
-    run = StageRun(
+    run = ResumableRun(
         stage="plan", kind="plan", project=here, iteration=place, find_inputs=asked.refs, report_model=PlanReport,
         overrides=overrides, flags=asked.flags(), dry_run=dry_run, force=force,
-        resumed=resume and unfinished.exists(),
+        resume=resume,
     )  # fmt: skip
-    digests = [ref.sha256 for ref in run.inputs]
-    key = checkpoint_key(run.wanted.stage_version, run.wanted.settings, run.wanted.robot, digests)
-    again = ["plan", *_typed(behaviour, to, seed, iteration, set_, project)]
-    checkpoint = CheckpointFile(unfinished, key, resume, again)
-    with resumable(checkpoint, here.relative(unfinished), again, done="found"):
-        result, report = run.run(
-            lambda: _compute(asked, settings, checkpoint, console),
-            (lambda data, said: _draw(data, here.robot(), said)) if draw else None,
-            lambda said: checkpoint.clear(),
-        )
+    checkpoint = run.checkpoint(CheckpointFile, ["plan", *_typed(behaviour, to, seed, iteration, set_, project)])
+    result, report = run.run_on(
+        checkpoint,
+        lambda: _compute(asked, settings, checkpoint, console),
+        (lambda data, said: _draw(data, here.robot(), said)) if draw else None,
+        console.say,
+        done="found",
+    )
     show_outcome(result, console)
     if report is not None:
         _show(report, console)

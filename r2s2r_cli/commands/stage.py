@@ -78,7 +78,7 @@ class StageRun(Generic[Report]):
             why = ["--force was given" if self.force else "--resume goes on with what was interrupted"]
         if present is not None and not why:
             return self._fresh(present, draw)
-        if self.guard is not None and not (self.force or self.resumed):
+        if self.guard is not None and not self.force:
             self.guard(present)
         if self.dry_run:
             return self._result("dry_run", present, why, None), None

@@ -43,6 +43,10 @@ class CheckpointFile:
             raise of_another(self.path, self.command)
         return values
 
+    def require_own(self) -> None:
+        """Raises what `load` raises."""
+        self.load()
+
     def kept(self) -> bool:
         """Whether work of this very request lies there, with which --resume goes on."""
         try:

@@ -93,6 +93,11 @@ class ArrayCheckpoint:
             raise disk_error(error, self.path) from error
         self._mine = True
 
+    def require_own(self) -> None:
+        """Raises what the first `recall` raises."""
+        if self.resume and self.path.exists():
+            self._opened()
+
     def kept(self) -> bool:
         """Whether results of this very request lie there, with which --resume goes on."""
         try:

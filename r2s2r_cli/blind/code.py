@@ -56,12 +56,18 @@ _BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")
 """Where statements hold statements."""
 
 
-def _imports(path: Path) -> Iterator[str]:
-    todo: list[ast.AST] = [*ast.parse(path.read_bytes()).body]
+def statements(tree: ast.Module) -> Iterator[ast.AST]:
+    """The module and all its statements, those within others too. Expressions are not gone through, which are most."""
+    todo: list[ast.AST] = [tree]
     while todo:
         node = todo.pop()
+        yield node
         for block in _BLOCKS:
             todo += getattr(node, block, ())
+
+
+def _imports(path: Path) -> Iterator[str]:
+    for node in statements(ast.parse(path.read_bytes())):
         if isinstance(node, ast.Import):
             yield from (one.name for one in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:

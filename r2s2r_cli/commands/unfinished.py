@@ -6,8 +6,9 @@ import shlex
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
-from r2s2r_cli.store.checkpoint import checkpoint_of, command_of, head_of
+from r2s2r_cli.store.checkpoint import checkpoint_of, command_in, head_of
 from r2s2r_cli.store.project import Iteration, Project, journal_of
 from schemas.results import ArtifactState
 
@@ -30,9 +31,13 @@ class Kept:
     """Whether a command without --iteration means this one."""
 
     @cached_property
+    def _head(self) -> dict[str, Any] | None:
+        return head_of(self.path)
+
+    @property
     def readable(self) -> bool:
         """Whether its head is whole: without it nothing goes on from it."""
-        return head_of(self.path) is not None
+        return self._head is not None
 
     @cached_property
     def command(self) -> str:
@@ -40,7 +45,7 @@ class Kept:
         removes it."""
         if not self.readable:
             return shlex.join(["rm", self.name])
-        typed = command_of(self.path) or (self.stage, "--iteration", str(self.iteration))
+        typed = command_in(self._head) or (self.stage, "--iteration", str(self.iteration))
         named = self.latest or any(word.partition("=")[0] == "--iteration" for word in typed)
         return shlex.join(["r2s2r", *typed, *([] if named else ["--iteration", str(self.iteration)]), "--resume"])
 

@@ -140,7 +140,12 @@ def head_of(checkpoint: Path) -> dict[str, Any] | None:
 def command_of(checkpoint: Path) -> tuple[str, ...] | None:
     """The words that were typed after `r2s2r` for the work that lies there, of either kind of checkpoint; None where it
     does not say."""
-    words = (head_of(checkpoint) or {}).get("command")
+    return command_in(head_of(checkpoint))
+
+
+def command_in(head: Mapping[str, Any] | None) -> tuple[str, ...] | None:
+    """The same of a head."""
+    words = (head or {}).get("command")
     return tuple(str(word) for word in words) if isinstance(words, list) else None
 
 

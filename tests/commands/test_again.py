@@ -99,6 +99,7 @@ def sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         inputs, target = tuple(wish.inputs), wish.recording().target
         _understood(Request(wish.stage, wish.flags, wish.overrides, inputs, wish.seed, target))
 
+    monkeypatch.setattr("r2s2r_cli.commands.resumable_run.ResumableRun", computed)
     monkeypatch.setattr("r2s2r_cli.commands.stage.StageRun", computed)
     monkeypatch.setattr("r2s2r_cli.commands.record_run.carry_out", recorded)
     monkeypatch.setattr("r2s2r_cli.commands.plan_inputs.Asked.check", lambda *given: None)

@@ -197,6 +197,20 @@ def test_what_is_no_checkpoint_is_refused(stopped: str) -> None:
     assert Engine.done == BOTH
 
 
+def test_a_dry_run_finds_out_whether_there_is_a_way_on(stopped: str) -> None:
+    """It refuses what the real one would: another request's, a damaged one. What is there stays as it was."""
+    held = KEPT.read_bytes()
+    dry = (*COMMAND, "--resume", "--dry-run")
+    assert document(*dry)["state"] == "dry_run"
+    other = invoke("compare", "--of", "record", "--model", str(IDENTIFY), "--resume", "--dry-run")
+    assert other.exit_code == 2 and "the checkpoint belongs to another request" in other.stderr
+    assert KEPT.read_bytes() == held
+    KEPT.write_bytes(b"\0" * 20 + held[20:])
+    refused = invoke(*dry)
+    assert refused.exit_code == 4 and "the checkpoint cannot be read" in refused.stderr
+    assert KEPT.read_bytes() == b"\0" * 20 + held[20:]
+
+
 def test_where_nothing_was_interrupted_it_says_so(bot: Path) -> None:
     """And compares all the same."""
     assert "nothing was interrupted" in invoke(*COMMAND, "--resume").stderr

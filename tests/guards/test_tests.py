@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from r2s2r_cli.blind.code import statements
 from tests.guards.listing import ROOT, name, python_files
 
 MAX_LINES = 400
@@ -21,17 +22,6 @@ def trees() -> dict[str, ast.Module]:
     """Every test file, parsed."""
     assert TESTS
     return {name(path): ast.parse(path.read_text()) for path in TESTS}
-
-
-def statements(tree: ast.Module) -> Iterator[ast.AST]:
-    """The module and all its statements, those within others too. Expressions are not gone through, which are most."""
-    waiting: list[ast.AST] = [tree]
-    while waiting:
-        node = waiting.pop()
-        yield node
-        for block in ("body", "orelse", "finalbody", "handlers", "cases"):
-            inner = getattr(node, block, ())
-            waiting += inner if isinstance(inner, list) else ()
 
 
 def functions_of(tree: ast.Module) -> Iterator[ast.FunctionDef]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ast
 import inspect
-import textwrap
 from collections.abc import Iterator
 from typing import Any, get_args
 
@@ -13,6 +11,7 @@ from pydantic.fields import FieldInfo
 
 from r2s2r_cli.rig.world.faults import Fault
 from r2s2r_cli.rig.world.file import World
+from schemas.described import texts_of
 
 EXAMPLE = """\
 seed = 7
@@ -186,17 +185,6 @@ def _attribute_texts(model: type[BaseModel]) -> dict[str, str]:
     """What stands below each field, base classes included; a text below several fields is that of the last of them."""
     texts: dict[str, str] = {}
     for one in reversed(model.__mro__):
-        if not (issubclass(one, BaseModel) and one is not BaseModel):
-            continue
-        body = ast.parse(textwrap.dedent(inspect.getsource(one))).body[0]
-        assert isinstance(body, ast.ClassDef)  # noqa: S101 - the source of a class is a class
-        for statement, after in zip(body.body, body.body[1:], strict=False):
-            if not (isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name)):
-                continue
-            if (
-                isinstance(after, ast.Expr)
-                and isinstance(after.value, ast.Constant)
-                and isinstance(after.value.value, str)
-            ):
-                texts[statement.target.id] = " ".join(after.value.value.split())
+        if issubclass(one, BaseModel) and one is not BaseModel:
+            texts |= {name: " ".join(text.split()) for name, text in texts_of(one).items()}
     return texts

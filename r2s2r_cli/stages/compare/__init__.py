@@ -7,10 +7,10 @@ from pathlib import Path
 
 from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.errors import UsageError
+from r2s2r_cli.stages.checkpoint import Answers
 from r2s2r_cli.stages.compare.errors import run_errors
 from r2s2r_cli.stages.compare.groups import comparison_groups
 from r2s2r_cli.stages.compare.predicted import Model, PredictedRun, predicted
-from r2s2r_cli.stages.compare.remembered import Checkpoint
 from r2s2r_cli.stages.compare.report import Compared, report_of
 from r2s2r_cli.stages.compare.runs import RealRun, real_runs
 from schemas.config import SimulateSettings
@@ -26,7 +26,7 @@ def compare(
     *,
     keyframe_floor_m: float | None = None,
     cache_dir: Path | None = None,
-    checkpoint: Checkpoint | None = None,
+    checkpoint: Answers | None = None,
     done: Callable[[], None] = lambda: None,
 ) -> tuple[ArtifactData, CompareReport]:
     """Every run under every simulator; the layout is that of `schemas/compare.py`.

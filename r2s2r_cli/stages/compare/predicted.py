@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from r2s2r_cli.errors import NumericalError
-from r2s2r_cli.stages.compare.remembered import Checkpoint, question
+from r2s2r_cli.stages.checkpoint import Answers
+from r2s2r_cli.stages.compare.remembered import question
 from r2s2r_cli.stages.compare.runs import RealRun
 from r2s2r_cli.stages.compare.walk import Walk, same_targets
 from r2s2r_cli.stages.identified import Identified
@@ -67,7 +68,7 @@ class PredictedRun:
 
 def predicted(
     model: Model, runs: Sequence[RealRun], settings: SimulateSettings, *, cache_dir: Path | None,
-    checkpoint: Checkpoint | None = None, done: Callable[[], None] = lambda: None,
+    checkpoint: Answers | None = None, done: Callable[[], None] = lambda: None,
 ) -> tuple[PredictedRun, ...]:  # fmt: skip
     """Every run by one simulator. checkpoint: a run that it has is not simulated, every other one is kept there as soon
     as it is. done: called after each. Raises InputError for a robot that cannot be simulated."""

@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from r2s2r_cli.stages.compare.runs import RealRun
 from r2s2r_cli.stages.identified import Identified
 from schemas.config import SimulateSettings
-
-
-class Checkpoint(Protocol):
-    """Where results are kept: a `store.checkpoint_arrays.ArrayCheckpoint`."""
-
-    def recall(self, digest: bytes) -> Sequence[np.ndarray] | None:
-        """What was kept for the next question; None: it must be simulated."""
-
-    def keep(self, digest: bytes, arrays: Sequence[np.ndarray]) -> None:
-        """Keep the answer to the question that was not known."""
 
 
 def question(numbers: Identified, run: RealRun, settings: SimulateSettings) -> bytes:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from r2s2r_cli.errors import InputError
+from r2s2r_cli.stages.checkpoint import Answers
 from r2s2r_cli.stages.diagnose.diagnosis import Diagnosis, SegmentSeen
 from r2s2r_cli.stages.diagnose.evidence import Evidence, require_enough
 from r2s2r_cli.stages.diagnose.much.much import much
@@ -22,7 +23,7 @@ from r2s2r_cli.stages.diagnose.where import Where
 from r2s2r_cli.stages.diagnose.where.where import where
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration, calibration
 from r2s2r_cli.stages.diagnose.which.numbers import SENSOR_LAG, Model
-from r2s2r_cli.stages.diagnose.which.remembered import Checkpoint, Remembered
+from r2s2r_cli.stages.diagnose.which.remembered import Remembered
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
 from r2s2r_cli.stages.diagnose.which.score import Score
 from r2s2r_cli.stages.diagnose.which.which import Compared, compare_effects
@@ -63,7 +64,7 @@ def silent(part: str, done: int, total: int) -> None:
 
 def diagnose(
     evidence: Evidence, settings: Settings | None = None, progress: Told = silent, *, cache_dir: Path | None = None,
-    threads: int = 2, checkpoint: Checkpoint | None = None,
+    threads: int = 2, checkpoint: Answers | None = None,
 ) -> Diagnosis:  # fmt: skip
     """Where the gap lies, which effect causes it, how far it shrinks, and what to run next.
 

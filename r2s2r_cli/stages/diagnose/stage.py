@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.stages.checkpoint import Answers
 from r2s2r_cli.stages.diagnose.diagnose import Settings, diagnose
 from r2s2r_cli.stages.diagnose.evidence import Evidence
 from r2s2r_cli.stages.diagnose.groups import diagnosis_groups
 from r2s2r_cli.stages.diagnose.next_gait import GaitLibrary
 from r2s2r_cli.stages.diagnose.report import diagnose_report
-from r2s2r_cli.stages.diagnose.which.remembered import Checkpoint
 from r2s2r_cli.stages.record.policies import EXCITATIONS, random_targets
 from schemas.config import DiagnoseSettings
 from schemas.results_diagnose import DiagnoseReport
@@ -24,7 +24,7 @@ RANDOM_GAITS, RANDOM_STEPS = 8, 8
 def diagnosed(
     evidence: Evidence, settings: DiagnoseSettings, *, seed: int = 0, effects: tuple[str, ...] | None = None,
     policies: Mapping[str, Sequence[Sequence[float]]] | None = None, cache_dir: Path | None = None,
-    progress: Callable[[str, int, int], None], checkpoint: Checkpoint | None = None,
+    progress: Callable[[str, int, int], None], checkpoint: Answers | None = None,
 ) -> tuple[ArtifactData, DiagnoseReport]:  # fmt: skip
     """Diagnose, and lay out what was found. policies: more to choose the next gait from. Raises as `diagnose`."""
     how = Settings(

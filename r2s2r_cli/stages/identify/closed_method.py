@@ -10,10 +10,10 @@ import numpy as np
 
 from r2s2r_cli.stages.identify.closed_fit import ClosedFit, fit_closed
 from r2s2r_cli.stages.identify.closed_residuals import ClosedResiduals
-from r2s2r_cli.stages.identify.conclude import Assured, Fitted, assured, concluded, start_found
+from r2s2r_cli.stages.identify.conclude import Assured, Fitted, assured, start_found
 from r2s2r_cli.stages.identify.found import Found, TraceStep
 from r2s2r_cli.stages.identify.free import select
-from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding_effects, not_identifiable, require_any
+from r2s2r_cli.stages.identify.holding import concluded_to_shown, holding_effects, require_any
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import default_free
@@ -52,10 +52,7 @@ def find_closed(task: Task) -> Found:
         fits = [_fit_of(task, predictor, kept, start) for start in range(task.settings.starts)]
         return assured(task, _fitted(task, fits, kept, before))
 
-    task, known = fitted_to_shown(
-        task, predictor, make, lambda known: not_identifiable(known.sure.parameters), kept=kept, look=_looked
-    )
-    return concluded(task, known.made.fit.problem.predictor, known)
+    return concluded_to_shown(task, predictor, make, kept, look=_looked)
 
 
 def _fitted(task: Task, fits: Sequence[ClosedFit], kept: Kept, before: Identifiability) -> Fitted:

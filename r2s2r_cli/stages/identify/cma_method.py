@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from r2s2r_cli.stages.identify.conclude import Assured, Fitted, assured, concluded, start_found
+from r2s2r_cli.stages.identify.conclude import Assured, Fitted, assured, start_found
 from r2s2r_cli.stages.identify.default_method import first_fit, loss_words
 from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep
 from r2s2r_cli.stages.identify.free.base import values_of
-from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding, not_identifiable
+from r2s2r_cli.stages.identify.holding import concluded_to_shown, holding
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
@@ -44,10 +44,7 @@ def find_cma(task: Task) -> Found:
         )  # fmt: skip
         return assured(task, made)
 
-    task, known = fitted_to_shown(
-        task, predictor, make, lambda known: not_identifiable(known.sure.parameters), kept=kept
-    )
-    return concluded(task, known.made.fit.problem.predictor, known)
+    return concluded_to_shown(task, predictor, make, kept)
 
 
 def _sampled(task: Task, fitted: Fit, kept: Kept) -> Sampled:

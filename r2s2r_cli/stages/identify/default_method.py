@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from r2s2r_cli.stages.identify.alike import as_the_others
-from r2s2r_cli.stages.identify.conclude import Assured, Fitted, assured, concluded, start_found
+from r2s2r_cli.stages.identify.conclude import Assured, Fitted, assured, start_found
 from r2s2r_cli.stages.identify.fit import fit
 from r2s2r_cli.stages.identify.found import Found, StartFound, TraceStep
 from r2s2r_cli.stages.identify.free.base import values_of
-from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding, not_identifiable
+from r2s2r_cli.stages.identify.holding import concluded_to_shown, holding
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
@@ -39,10 +39,7 @@ def find_default(task: Task) -> Found:
         trace, words = tuple(kept.steps), loss_words(task)
         return assured(task, Fitted(fitted, starts, near, trace, words, before, task.settings.profiles))
 
-    task, known = fitted_to_shown(
-        task, predictor, make, lambda known: not_identifiable(known.sure.parameters), kept=kept
-    )
-    return concluded(task, known.made.fit.problem.predictor, known)
+    return concluded_to_shown(task, predictor, make, kept)
 
 
 def loss_words(task: Task) -> str:

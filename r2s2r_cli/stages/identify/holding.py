@@ -14,8 +14,8 @@ from dataclasses import replace
 from typing import TypeVar
 
 from r2s2r_cli.errors import InputError
-from r2s2r_cli.stages.identify.conclude import known_before
-from r2s2r_cli.stages.identify.found import ParameterFound
+from r2s2r_cli.stages.identify.conclude import Assured, concluded, known_before
+from r2s2r_cli.stages.identify.found import Found, ParameterFound
 from r2s2r_cli.stages.identify.free.base import Free
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.predict import Predictor
@@ -36,7 +36,7 @@ def holding(task: Task, predictor: Predictor) -> tuple[Task, Predictor, Identifi
     before = known_before(task, predictor)
     frees = predictor.mapping.frees
     likely = set(effects_moving(frees, ())) - set(_unshown_before(before, frees, ()))
-    task, predictor = held_at(task, predictor, [name for name in _unknown(before) if name not in likely])
+    task, predictor = held_at(task, predictor, [name for name in undetermined(before) if name not in likely])
     require_any(task.held, before.names)
     return task, predictor, before
 
@@ -97,6 +97,16 @@ def fitted_to_shown(
             kept.restart(held=list(task.held))
 
 
+def concluded_to_shown(
+    task: Task, predictor: Predictor, make: Callable[[Task, Predictor], Assured], kept: Kept, look: Look | None = None
+) -> Found:
+    """The same of a fit that says how sure its numbers are, judged. Raises what `concluded` raises."""
+    task, known = fitted_to_shown(
+        task, predictor, make, lambda made: not_identifiable(made.sure.parameters), kept=kept, look=look
+    )
+    return concluded(task, known.made.fit.problem.predictor, known)
+
+
 def not_identifiable(parameters: Sequence[ParameterFound]) -> set[str]:
     """Names of those that are reported so."""
     return {one.free.name for one in parameters if one.trust is Trust.NOT_IDENTIFIABLE}
@@ -121,12 +131,13 @@ def effects_moving(frees: Sequence[Free], held: Collection[str]) -> tuple[str, .
 
 def _unshown_before(info: Identifiability, frees: Sequence[Free], held: Collection[str]) -> tuple[str, ...]:
     """Numbers of effects, not held yet, that are not shown where a fit begins; shapes where they do nothing at all."""
-    unknown, moving = set(_unknown(info)), effects_moving(frees, held)
+    unknown, moving = set(undetermined(info)), effects_moving(frees, held)
     shapes = {free.name for free in frees if free.shape}
     return tuple(name for name in moving if name in (info.no_effect if name in shapes else unknown))
 
 
-def _unknown(info: Identifiability) -> tuple[str, ...]:
+def undetermined(info: Identifiability) -> tuple[str, ...]:
+    """Names of those that this information does not determine."""
     both = zip(info.names, info.trust, strict=True)
     return tuple(name for name, trust in both if trust is Trust.NOT_IDENTIFIABLE)
 

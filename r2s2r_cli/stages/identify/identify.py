@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from r2s2r_cli.artifact import ArtifactData
+from r2s2r_cli.stages.checkpoint import Values
 from r2s2r_cli.stages.identify.closed_method import closed_predictor, find_closed
 from r2s2r_cli.stages.identify.cma_method import find_cma
 from r2s2r_cli.stages.identify.data import RunData
@@ -15,7 +16,7 @@ from r2s2r_cli.stages.identify.groups import identification
 from r2s2r_cli.stages.identify.online import find_online, first_free
 from r2s2r_cli.stages.identify.paper_method import find_paper, paper_engines
 from r2s2r_cli.stages.identify.report import report_of
-from r2s2r_cli.stages.identify.request import Checkpoint, Progress, Request, silent
+from r2s2r_cli.stages.identify.request import Progress, Request, silent
 from r2s2r_cli.stages.identify.task import Task, require_combination
 from schemas.config import IdentifySettings
 from schemas.results_identify import IdentifyReport
@@ -30,7 +31,7 @@ def identify(
     *,
     cache_dir: Path | None = None,
     progress: Progress = silent,
-    checkpoint: Checkpoint | None = None,
+    checkpoint: Values | None = None,
 ) -> tuple[ArtifactData, IdentifyReport]:
     """Identify a robot from its runs; the layout is that of `schemas/identification.py`.
 
@@ -49,7 +50,7 @@ def find(
     *,
     cache_dir: Path | None = None,
     progress: Progress = silent,
-    checkpoint: Checkpoint | None = None,
+    checkpoint: Values | None = None,
 ) -> Found:
     """The same as values: everything that was found."""
     require_combination(request)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from r2s2r_cli.stages.checkpoint import Values
 from r2s2r_cli.stages.identify.found import TraceStep
-from r2s2r_cli.stages.identify.request import Checkpoint
 
 
 class Kept:
@@ -17,7 +17,7 @@ class Kept:
     held: whether something waits to be saved.
     """
 
-    def __init__(self, checkpoint: Checkpoint | None) -> None:
+    def __init__(self, checkpoint: Values | None) -> None:
         self._checkpoint = checkpoint
         self.saved: dict[str, Any] = (checkpoint.load() if checkpoint is not None else None) or {}
         self.steps = [TraceStep(*row) for row in self.saved.get("trace", ())]

@@ -23,7 +23,7 @@ from r2s2r_cli.stages.identify.fit import fit
 from r2s2r_cli.stages.identify.found import Found, TraceStep, Update
 from r2s2r_cli.stages.identify.free import Free, select
 from r2s2r_cli.stages.identify.free.base import Coordinate
-from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding_effects, not_identifiable
+from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding_effects, not_identifiable, undetermined
 from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.request import Step
@@ -94,9 +94,7 @@ def _fit_to(task: Task, frees: Sequence[Free], kept: Kept, place: tuple[int, Seq
         return assured(own, Fitted(made, starts, near, (), "", None, profiles))
 
     def unknown(made: Assured) -> Collection[str]:
-        both = zip(made.sure.parameters, made.sure.after.trust, strict=True)
-        hidden = {one.free.name for one, trust in both if trust is Trust.NOT_IDENTIFIABLE}
-        return not_identifiable(made.sure.parameters) if final else hidden
+        return not_identifiable(made.sure.parameters) if final else undetermined(made.sure.after)
 
     own, predictor = holding_effects(task, task.predictor(frees))
     return fitted_to_shown(own, predictor, make, unknown)[1]

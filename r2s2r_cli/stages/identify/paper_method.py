@@ -12,7 +12,8 @@ from r2s2r_cli import __version__
 from r2s2r_cli.stages.identify.conclude import judged_by
 from r2s2r_cli.stages.identify.found import Found, ParameterFound, StartFound, TraceStep
 from r2s2r_cli.stages.identify.free import select
-from r2s2r_cli.stages.identify.holding import effects_moving, held_at, holding_effects, require_any
+from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding_effects, require_any
+from r2s2r_cli.stages.identify.kept import Kept
 from r2s2r_cli.stages.identify.paper import (
     PAPER_FREE,
     PaperFit,
@@ -48,15 +49,14 @@ def find_paper(task: Task) -> Found:
     named = {run.name: run for run in task.runs}
     demos = [demo for one in request.train for demo in demonstrations(named[one.run], one)]
     asked = Settings(iterations=settings.max_iterations, closed_loop=request.drive == "closed loop")
-    names: Sequence[str] = _saved(task).get("held", ())
-    while True:
-        task, judge = held_at(task, judge, [name for name in names if name not in task.held])
-        made = replace(made, numbers=made.numbers.starting(judge.mapping.frees))
-        fit = _fitted(task, made, demos, replace(asked, held=task.held))
-        still = dict(zip(fit.names, _still(fit), strict=True))
-        names = [name for name in effects_moving(judge.mapping.frees, task.held) if still[name]]
-        if not names:
-            return _found(task, made, judge, fit, demos)
+    kept = Kept(task.checkpoint)
+
+    def make(task: Task, judge: Predictor) -> tuple[Preset, Predictor, PaperFit]:
+        own = replace(made, numbers=made.numbers.starting(judge.mapping.frees))
+        return own, judge, _fitted(task, own, demos, replace(asked, held=task.held), kept)
+
+    task, (own, judge, fit) = fitted_to_shown(task, judge, make, lambda one: _without_derivative(one[2]), kept=kept)
+    return _found(task, own, judge, fit, demos)
 
 
 def paper_engines(task: Task) -> tuple[Preset, Predictor]:
@@ -74,31 +74,29 @@ def paper_engines(task: Task) -> tuple[Preset, Predictor]:
     return made, task.predictor(frees)
 
 
-def _fitted(task: Task, made: Preset, demos: list[Demonstration], asked: Settings) -> PaperFit:
+def _fitted(task: Task, made: Preset, demos: list[Demonstration], asked: Settings, kept: Kept) -> PaperFit:
     """Adam, with progress and checkpoints. The last step is left out of the checkpoint: a resumed fit makes it again,
     and knows its mask."""
-    keep, saved, held = task.checkpoint, _saved(task), list(task.held)
     starts = [settled_start(made, demo.p_WE[0], run=demo.name) for demo in demos]
 
     def save(values: Mapping[str, Any]) -> None:
-        if keep is not None and len(values["rows"]) < asked.iterations:
-            keep.save({"adam": dict(values), "held": held})
+        if len(values["rows"]) < asked.iterations:
+            kept.save(adam=dict(values))
 
     return identify_paper(
         made.world, made.numbers, demos, starts, asked,
         progress=lambda number, loss: task.progress(Step("fit", number, asked.iterations, loss)), save=save,
-        resume=saved["adam"] if saved.get("held") == held else None,
+        resume=kept.saved.get("adam"),
     )  # fmt: skip
-
-
-def _saved(task: Task) -> dict[str, Any]:
-    """By an interrupted fit, of what it held; {} where there was none."""
-    return (task.checkpoint.load() if task.checkpoint is not None else None) or {}
 
 
 def _still(fit: PaperFit) -> np.ndarray:
     """(n,) bool: the loss had no derivative by it at any step."""
     return np.asarray(~np.any(fit.trace.gradients != 0, axis=0))
+
+
+def _without_derivative(fit: PaperFit) -> list[str]:
+    return [name for name, still in zip(fit.names, _still(fit), strict=True) if still]
 
 
 def _found(task: Task, made: Preset, predictor: Predictor, fit: PaperFit, demos: list[Demonstration]) -> Found:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol
+from typing import Literal
 
 from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.stages.identify.data import Selection
@@ -59,18 +59,6 @@ class Step:
 
 
 Progress = Callable[[Step], None]
-
-
-class Checkpoint(Protocol):
-    """Where a long fit leaves what it has done; JSON values only. What it loads was left by the same request."""
-
-    def load(self) -> dict[str, Any] | None:
-        """What was saved last, or None."""
-        ...
-
-    def save(self, values: Mapping[str, Any]) -> None:
-        """Replace what was saved."""
-        ...
 
 
 def silent(step: Step) -> None:

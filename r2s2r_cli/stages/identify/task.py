@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from r2s2r_cli.errors import InputError, UsageError
+from r2s2r_cli.stages.checkpoint import Values
 from r2s2r_cli.stages.identify.commands import CommandLog
 from r2s2r_cli.stages.identify.data import RunData
 from r2s2r_cli.stages.identify.found import ParameterFound
@@ -16,7 +17,7 @@ from r2s2r_cli.stages.identify.free import Free, Mapping, select
 from r2s2r_cli.stages.identify.free.extend import PLUS, extended, name_of
 from r2s2r_cli.stages.identify.predict import Predictor
 from r2s2r_cli.stages.identify.recipe import Recipe, default_fixed, default_free, recipe_of
-from r2s2r_cli.stages.identify.request import Checkpoint, Progress, Request, silent
+from r2s2r_cli.stages.identify.request import Progress, Request, silent
 from schemas.config import IdentifySettings
 from schemas.robot import Robot
 
@@ -36,7 +37,7 @@ class Task:
     settings: IdentifySettings
     cache_dir: Path | None = None
     progress: Progress = silent
-    checkpoint: Checkpoint | None = None
+    checkpoint: Values | None = None
     held: tuple[str, ...] = ()
     """Free parameters that the training intervals do not show."""
 

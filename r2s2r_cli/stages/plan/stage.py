@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.errors import NumericalError
+from r2s2r_cli.stages.checkpoint import Values
 from r2s2r_cli.stages.plan.choose import ChoiceSettings, Judge, chosen, shortlist
 from r2s2r_cli.stages.plan.conclude import concluded
 from r2s2r_cli.stages.plan.gaits import Gait
@@ -21,24 +22,12 @@ from schemas.config import PlanSettings
 from schemas.results_plan import PlanReport
 from schemas.robot import Robot
 
-__all__ = ["Checkpoint", "Request", "plan"]
-
-
-class Checkpoint(Protocol):
-    """Where finished parts are kept; JSON values only."""
-
-    def load(self) -> dict[str, Any] | None:
-        """What was saved last, or None."""
-        ...
-
-    def save(self, values: Mapping[str, Any]) -> None:
-        """Replace what was saved."""
-        ...
+__all__ = ["Request", "plan"]
 
 
 def plan(
     robot: Robot, request: Request, settings: PlanSettings, *, cache_dir: Path | None = None, threads: int = 1,
-    progress: Progress = lambda part, done, total: None, checkpoint: Checkpoint | None = None,
+    progress: Progress = lambda part, done, total: None, checkpoint: Values | None = None,
 ) -> tuple[ArtifactData, PlanReport]:  # fmt: skip
     """Search gaits, judge them over what is not known, and make long policies of the best. Layout: `schemas/plan.py`.
 

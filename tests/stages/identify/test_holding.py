@@ -267,7 +267,7 @@ def test_of_a_run_among_several_its_information_counts(monkeypatch: pytest.Monke
     frees = free("motor_speed", LAG)
     told = SimpleNamespace(
         parameters=tuple(ParameterFound(one, one.start, 0.1, 0.0, 1.0, NAN, HIDDEN) for one in frees),
-        after=SimpleNamespace(trust=(SHOWN, SHOWN)),
+        after=SimpleNamespace(names=tuple(one.name for one in frees), trust=(SHOWN, SHOWN)),
     )
     held = []
 

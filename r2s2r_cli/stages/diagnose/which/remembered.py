@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from r2s2r_cli.stages.checkpoint import Answers
 from r2s2r_cli.stages.diagnose.which.looks import Seen
 from r2s2r_cli.stages.diagnose.which.numbers import Model
 from r2s2r_cli.stages.diagnose.which.replay import Replayer
@@ -21,20 +22,10 @@ if TYPE_CHECKING:
     from r2s2r_cli.engine import State
 
 
-class Checkpoint(Protocol):
-    """Where results are kept: a `store.checkpoint_arrays.ArrayCheckpoint`."""
-
-    def recall(self, digest: bytes) -> Sequence[np.ndarray] | None:
-        """What was kept for the next question; None: it must be worked out."""
-
-    def keep(self, digest: bytes, arrays: Sequence[np.ndarray]) -> None:
-        """Keep the answer to the question that was not known."""
-
-
 class Remembered(Replayer):
     """A `Replayer` that looks into a checkpoint first. rollouts counts what was simulated before as well."""
 
-    def __init__(self, model: Model, checkpoint: Checkpoint, **how: object) -> None:
+    def __init__(self, model: Model, checkpoint: Answers, **how: object) -> None:
         super().__init__(model, **how)
         self._checkpoint = checkpoint
 

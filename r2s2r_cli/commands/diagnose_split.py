@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from schemas.config import IdentifySettings
-
 if TYPE_CHECKING:
     from r2s2r_cli.artifact import ArtifactData, Group
     from r2s2r_cli.stages.diagnose.evidence import Run
@@ -14,8 +12,6 @@ if TYPE_CHECKING:
 
 TRAIN, TEST = 1, 2
 """Codes of `schemas.identification.ROLES`."""
-TRAIN_SHARE: float = IdentifySettings.model_fields["train_share"].default
-"""Of the intervals of a run, where no identification says which are fitted."""
 
 
 def fit_and_judge(
@@ -45,7 +41,7 @@ def _split(
 
     caps = [run.caps for run in runs]
     if train or test:
-        return split(caps, train, test, TRAIN_SHARE)
+        return split(caps, train, test)
     table = found.groups["segments"]
     fit, judge = (_selected(table, role, {run.name for run in runs}) for role in (TRAIN, TEST))
     known = _runs_of(table)
@@ -67,7 +63,7 @@ def _split_anew(
 
     if not runs:
         return (), ()
-    fit, judge = split([run.caps for run in runs], (), (), TRAIN_SHARE)
+    fit, judge = split([run.caps for run in runs], (), ())
     if say is not None:
         words = (", ".join(f"{one.run}:{in_words(one.intervals)}" for one in part) for part in (fit, judge))
         table = found.groups["segments"]

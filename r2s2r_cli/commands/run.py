@@ -104,7 +104,8 @@ def run(
         went.append(RunStep(stage=step.name, state=state, artifact=name, command=shlex.join(words)))
 
     for number, step in enumerate(steps, start=1):
-        words = ("r2s2r", *step.words, "--iteration", str(place.number))
+        resumed = _resumed(step)
+        words = ("r2s2r", *step.words, "--iteration", str(place.number), *resumed)
         if step.robot and step.target.exists():
             name, again = here.relative(step.target), (*step.words, "--force")
             why = cut_off(step.target)
@@ -117,7 +118,7 @@ def run(
                 note(step, "kept", words)
                 continue
             console.say(f"[{number}/{len(steps)}] {name} was cut off ({why}): it is done again, and kept as .replaced")
-            words, step = ("r2s2r", *again, *words[-2:]), replace(step, words=again)
+            words, step = ("r2s2r", *again, "--iteration", str(place.number)), replace(step, words=again)
         if why := _kept(here, place, step, steps):
             console.say(f"[{number}/{len(steps)}] {here.relative(step.target)} is used as it is: {why}")
             note(step, "kept", words)
@@ -126,7 +127,7 @@ def run(
         note(step, "dry_run" if dry_run else "done", words)
         if dry_run:
             continue
-        carry_out((*step.words, *common, *_resumed(step)), shlex.join(words), robot=step.robot, json=json)
+        carry_out((*step.words, *common, *resumed), shlex.join(words), robot=step.robot, json=json)
         _gate(place, step, json=json)
     console.document(RunResult(iteration=place.number, stages=tuple(went)))
     if dry_run:

@@ -11,9 +11,10 @@ from r2s2r_cli.stages.identify.data import RunData, Selection
 from r2s2r_cli.stages.identify.load import require_two_intervals
 from r2s2r_cli.stages.identify.selection_hints import mended, run_of, worded
 from r2s2r_cli.stages.measures.upright import fallen, not_at_rest
+from schemas.config import IdentifySettings
 from schemas.robot import Robot
 
-TRAIN_SHARE = 2 / 3
+TRAIN_SHARE: float = IdentifySettings.model_fields["train_share"].default
 """Of the complete intervals of a run, from its start, where neither side is named: the rest is tested."""
 
 _SPANS = re.compile(r"\d+(-\d+)?(,\d+(-\d+)?)*")

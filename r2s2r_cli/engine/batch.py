@@ -32,12 +32,11 @@ def common_batch(tensors: Mapping[str, Tensor]) -> int:
                 name, "another dtype or device", expected=f"{reference.dtype} on {reference.device}, as {first}",
                 received=f"{tensor.dtype} on {tensor.device}",
             )  # fmt: skip
-        size = tensor.shape[0]  # `len` of a tensor takes five times as long
-        if size not in (1, batch):
-            if batch > 1 or size == 0:
+        if len(tensor) not in (1, batch):
+            if batch > 1 or len(tensor) == 0:
                 raise EngineInputError(
                     name, "another batch", expected=f"{batch}, as {owner}, or 1" if batch > 1 else "at least 1",
-                    received=str(size),
+                    received=str(len(tensor)),
                 )  # fmt: skip
-            batch, owner = size, name
+            batch, owner = len(tensor), name
     return batch

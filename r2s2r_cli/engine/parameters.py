@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import lru_cache
+from functools import cached_property
 
 import torch
 from torch import Tensor
@@ -78,7 +78,16 @@ class Parameters:
 
     def of(self, effect: str) -> dict[str, Tensor]:
         """The own parameters of one effect by their short names."""
-        return {own: self.extra[name] for own, name in _by_effect(tuple(self.extra)).get(effect, ())}
+        return dict(self._own.get(effect, {}))
+
+    @cached_property
+    def _own(self) -> dict[str, dict[str, Tensor]]:
+        """The parameters of effects by effect and short name: asked for by every hook of every effect."""
+        found: dict[str, dict[str, Tensor]] = {}
+        for name, tensor in self.extra.items():
+            effect, _, own = name.partition(".")
+            found.setdefault(effect, {})[own] = tensor
+        return found
 
     def map(self, function: Callable[[Tensor], Tensor]) -> Parameters:
         """The same with `function` applied to every tensor."""
@@ -89,17 +98,6 @@ class Parameters:
         """The same with fields or effect parameters (`motor_lag.tau_s`) replaced; tensors with a batch axis."""
         own = {name: value for name, value in values.items() if "." not in name}
         return replace(self, **own, extra={**self.extra, **{k: v for k, v in values.items() if "." in k}})
-
-
-@lru_cache(maxsize=256)
-def _by_effect(names: tuple[str, ...]) -> dict[str, tuple[tuple[str, str], ...]]:
-    """Of every effect the short names of its own parameters with the long ones. Every hook of every effect asks, for
-    new tensors in each batch: the names are the same ones."""
-    found: dict[str, tuple[tuple[str, str], ...]] = {}
-    for name in names:
-        effect, _, own = name.partition(".")
-        found[effect] = (*found.get(effect, ()), (own, name))
-    return found
 
 
 def shapes(structure: Structure) -> dict[str, tuple[int, ...]]:

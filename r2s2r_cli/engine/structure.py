@@ -6,10 +6,10 @@ Two robots with equal structures share one trace and one machine code; their num
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from r2s2r_cli.engine.errors import EngineInputError
 
@@ -59,18 +59,6 @@ class Structure:
 
     def __post_init__(self) -> None:
         _check(self)
-
-    def __hash__(self) -> int:
-        # Of all fields, with all effects, and asked for whenever a state is read: kept.
-        known = vars(self).get("_hash")
-        if known is None:
-            known = hash(tuple(getattr(self, one.name) for one in fields(self)))
-            object.__setattr__(self, "_hash", known)
-        return int(known)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Without the hash: another process has other ones."""
-        return {name: value for name, value in vars(self).items() if name != "_hash"}
 
     @property
     def n_cables(self) -> int:

@@ -34,7 +34,7 @@ def acting(structure: Structure, theta: Parameters, hook: str) -> Tensor:
 
 def rows_of(theta: Parameters, rows: Tensor) -> Parameters:
     """Some rows of a batch of parameters; those of batch 1 as they are."""
-    return theta.map(lambda x: x[rows] if x.shape[0] > 1 else x)
+    return theta.map(lambda x: x[rows] if len(x) > 1 else x)
 
 
 def placed(structure: Structure, theta: Parameters, whose: Tensor, start: Tensor, up: float) -> Tensor:

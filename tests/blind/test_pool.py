@@ -176,6 +176,31 @@ def test_second_verdicts_are_read_as_carefully(tmp_path: Path) -> None:
         score_published([a], again=[folder])
 
 
+@pytest.mark.parametrize(
+    ("said", "fits"),
+    [
+        ({"shrinkage": {"judged_on": ["g4:1", "g5:3"]}, "segments": [{"run": "g1"}, {"run": "g3"}]}, True),
+        ({"shrinkage": {"judged_on": ["g4:2"]}, "segments": []}, True),
+        ({"shrinkage": None, "segments": [{"run": "g3"}]}, True),
+        ({"shrinkage": {"judged_on": ["g3:1"]}, "segments": [{"run": "g1"}, {"run": "g2"}]}, False),
+        ({"shrinkage": {"judged_on": ["g6:1", "g8:3"]}, "segments": [{"run": "g5"}]}, False),
+        ({"shrinkage": None, "segments": [{"run": "g6"}]}, False),
+    ],
+)  # fmt: skip
+def test_a_second_verdict_is_on_the_same_gaits(said: dict[str, Any], fits: bool, tmp_path: Path) -> None:
+    """Of a set of five: with another --count the same key makes other worlds under the same names."""
+    labels = [one | {"gaits": 5} for one in LABELS[:3]]
+    made = Folder(tmp_path, labels, lambda label, rng: knows_by_number(label, rng) | said, names=NAMES[:3])
+    a = tmp_path / "a.json"
+    a.write_bytes(published(opened(made.bank, made.verdicts, made.key), CODE))
+    if fits:
+        rows = score_published([a], again=[made.verdicts]).rows
+        assert next(one for one in rows if one.name == "same_verdict").n == 3
+    else:
+        with pytest.raises(InputError, match="on another world"):
+            score_published([a], again=[made.verdicts])
+
+
 def test_a_set_without_d_teaches_nothing(tmp_path: Path) -> None:
     """It would teach that nothing is wrong where something is."""
     labels = [one | {"d": None} for one in LABELS[:20]]

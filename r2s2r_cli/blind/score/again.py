@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,16 +12,20 @@ from r2s2r_cli.blind.score.facts import Said, Truth, said_of
 from r2s2r_cli.blind.score.pool import Pool
 from r2s2r_cli.blind.score.published import read_published
 from r2s2r_cli.blind.score.rows import AGAIN, row
+from r2s2r_cli.blind.split import judged
 from r2s2r_cli.blind.verdict import read_verdict
 from r2s2r_cli.errors import InputError
 from schemas.results_blind import BlindRow
+
+_GAIT = re.compile(r"g(\d+)(?::|$)")
+"""Runs of a set: g1, g2, ..., and intervals of them: g1:4."""
 
 
 def same(pool: Pool, found: Sequence[tuple[str, Truth, Said]], again: Sequence[Path]) -> BlindRow:
     """How often other noise on the same world leaves the verdict as it is.
 
     again: folders of `blind run`, or published files. Raises InputError where none of them knows a set of the pool, or
-    where a published one has another world under its name.
+    where one of them has another world under its name, as far as that shows.
     """
     labels = {one.name: one.label for one in pool.sets}
     others: dict[str, Mapping[str, Any]] = {}
@@ -38,10 +43,29 @@ def same(pool: Pool, found: Sequence[tuple[str, Truth, Said]], again: Sequence[P
     return row(AGAIN, pairs, pool.tier)
 
 
+def _require_its_gaits(verdict: Mapping[str, Any], label: Mapping[str, Any], *, where: str) -> None:
+    """Names of sets come from the key alone, worlds from what `make` was asked as well, above all from --count. A
+    verdict does not know its world; but it names gaits that the set does not have, or none of those that it is judged
+    on."""
+    document = verdict.get("diagnosis") or {}
+    on = (document.get("shrinkage") or {}).get("judged_on") or ()
+    runs = [*on, *(str(one.get("run")) for one in document.get("segments") or ())]
+    seen = max((int(found[1]) for found in map(_GAIT.match, runs) if found), default=0)
+    has = int(label["gaits"])
+    if seen > has or (on and seen <= has - judged(has)):
+        raise InputError("a second verdict is on another world than the first", where=where,
+                         expected=f"a set of {has} gaits", received=f"one of {seen}",
+                         hint="r2s2r blind make --observed 1 --key SAME.key again   # all else as before")  # fmt: skip
+
+
 def _verdicts(path: Path, labels: Mapping[str, dict[str, Any]]) -> dict[str, Mapping[str, Any]]:
     """Second verdicts by name: of a folder of `blind run`, or of a published file, whose worlds can be compared."""
     if not path.is_file():
-        return {name: read_verdict(path / f"{name}.json") for name in labels if (path / f"{name}.json").exists()}
+        there = {name: path / f"{name}.json" for name in labels}
+        read: dict[str, Mapping[str, Any]] = {name: read_verdict(one) for name, one in there.items() if one.exists()}
+        for name, verdict in read.items():
+            _require_its_gaits(verdict, labels[name], where=str(there[name]))
+        return read
     found: dict[str, Mapping[str, Any]] = {}
     for one in read_published(path).sets:
         if one.name in labels:

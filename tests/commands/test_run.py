@@ -94,6 +94,7 @@ def test_a_stage_that_was_interrupted_goes_on(estimated: Path, calls: Calls, kin
         said = [line for line in invoke("run", "--dry-run").stderr.splitlines() if line.endswith("--resume")]
         assert [line.split()[2] for line in said] == resumed
 
+
 def test_a_robot_that_has_moved_is_not_moved_again(estimated: Path, calls: Calls) -> None:
     """The recording is there: the rest goes on from it."""
     result = invoke("run", "--port", "socket://nowhere:1", "--until", "plan")

@@ -10,7 +10,7 @@ import pytest
 from r2s2r_cli.artifact import ArtifactData
 from r2s2r_cli.store.read import read_artifact
 from tests.commands.conftest import document
-from tests.support.desk import QUIET, aligned_error, desk, project, read_truth
+from tests.support.desk import QUIET, aligned_error, desk, link_options, project, read_truth
 from tests.support.fake_robot import SLOPE
 
 RUN = "random-0"
@@ -32,8 +32,7 @@ WAYS = [
 
 def recorded(root: Path, link: str, protocol: str, *more: str, world: str = "") -> tuple[ArtifactData, np.ndarray]:
     """A random policy of two targets through this link; the recording, and its lengths minus the rig's [m]."""
-    options = ("--link", link, "--protocol", protocol, *(("--port", "0") if link == "udp" else ()))
-    with desk(root, *options, "--fast", world=world) as rig:
+    with desk(root, *link_options(link), "--protocol", protocol, "--fast", world=world) as rig:
         result = document(
             "record", "--project", str(root), "--random", "2", "--port", rig.address, "--protocol", protocol,
             "--no-draw", "--set", "record.rest_s=0.5", *more,

@@ -19,6 +19,7 @@ import numpy as np
 
 from r2s2r_cli.stages.init.robots import robot_toml
 from tests.support.fake_robot import OFFSET, SLOPE
+from tests.support.host_rig import free_udp_port
 
 QUIET = """
 [sensors]
@@ -57,6 +58,11 @@ def project(root: Path, name: str = "threebar") -> Path:
     text = re.sub(r"(\[\[sensors\]\].*\ncable = \d+\n)", lambda found: found[0] + line, robot_toml(name, "surface"))
     path.write_text(text)
     return root
+
+
+def link_options(link: str) -> tuple[str, ...]:
+    """Options of `r2s2r rig` for a link that no other test of this machine has: UDP's usual port is one for all."""
+    return ("--link", link, *(("--port", str(free_udp_port())) if link == "udp" else ()))
 
 
 @contextlib.contextmanager

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from r2s2r_cli.commands.typed import typed_words
 from r2s2r_cli.console import Console
 from r2s2r_cli.options import (
     DrawOption,
@@ -85,12 +84,10 @@ def compare(
     asked = Asked(here, place, tuple(model or ()), None if of is None else of.value, own)
     run = ResumableRun(
         stage="compare", kind="comparison", project=here, iteration=place, find_inputs=asked.refs,
-        report_model=CompareReport, flags=asked.flags(), dry_run=dry_run, force=force,
-        resume=resume,
+        report_model=CompareReport, flags=asked.flags(), dry_run=dry_run, force=force, resume=resume,
     )  # fmt: skip
-    again = [word for word in typed_words("compare") if word != "--resume"]
     # An effect of a package is another one in its next version.
-    checkpoint = run.checkpoint(ArrayCheckpoint, again, installed_words(), most=MOST_BYTES)
+    checkpoint = run.checkpoint(ArrayCheckpoint, installed_words(), most=MOST_BYTES)
     result, report = run.run_on(
         checkpoint,
         lambda: _compute(asked, checkpoint, console),

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from r2s2r_cli.commands.typed import typed_words
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import UsageError
 from r2s2r_cli.options import (
@@ -123,8 +122,7 @@ def diagnose(
             asked.evidence(console.say)
         elif writer(here.root) is not None:  # to wait for the other one mends no misspelt request
             asked.evidence(lambda _: None)
-        again = [word for word in typed_words("diagnose") if word != "--resume"]
-        checkpoint = run.checkpoint(ArrayCheckpoint, again)
+        checkpoint = run.checkpoint(ArrayCheckpoint)
         result, report = run.run_on(
             checkpoint,
             lambda: _compute(asked, settings, checkpoint, console, draw),

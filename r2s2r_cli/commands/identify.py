@@ -193,7 +193,7 @@ def _fit(asked: Asked, overrides: dict[str, Any], console: Console, how: _Ways) 
     if how.dry_run or writer(here.root) is not None:  # to wait for the other one mends no misspelt request
         asked.check(settings)
     outcome = Outcome(place.number, asked.typed)
-    checkpoint = run.checkpoint(CheckpointFile, ["identify", *asked.typed])
+    checkpoint = run.checkpoint(CheckpointFile, command=["identify", *asked.typed])
     result, report = run.run_on(
         checkpoint,
         lambda: compute(asked, settings, checkpoint, console),

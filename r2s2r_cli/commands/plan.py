@@ -89,10 +89,10 @@ def plan(
     asked.check(settings)
     run = ResumableRun(
         stage="plan", kind="plan", project=here, iteration=place, find_inputs=asked.refs, report_model=PlanReport,
-        overrides=overrides, flags=asked.flags(), dry_run=dry_run, force=force,
-        resume=resume,
+        overrides=overrides, flags=asked.flags(), dry_run=dry_run, force=force, resume=resume,
     )  # fmt: skip
-    checkpoint = run.checkpoint(CheckpointFile, ["plan", *_typed(behaviour, to, seed, iteration, set_, project)])
+    again = ["plan", *_typed(behaviour, to, seed, iteration, set_, project)]
+    checkpoint = run.checkpoint(CheckpointFile, command=again)
     result, report = run.run_on(
         checkpoint,
         lambda: _compute(asked, settings, checkpoint, console),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from r2s2r_cli.commands.interrupts import Kept, resumable
 from r2s2r_cli.commands.stage import Drawings, Report, StageRun
+from r2s2r_cli.commands.typed import typed_words
 from r2s2r_cli.store.checkpoint import checkpoint_key, checkpoint_of
 from schemas.results import StageResult
 
@@ -45,8 +46,13 @@ class ResumableRun(StageRun[Report]):
         self.unfinished = checkpoint_of(self.target)
         self.resumed = self.resume and self.unfinished.exists()
 
-    def checkpoint(self, kind: Callable[..., Own], command: Sequence[str], *depends: object, **how: object) -> Own:
-        """Of this request: stage, settings, robot, inputs and what else it depends on. how: as `kind` takes it."""
+    def checkpoint(
+        self, kind: Callable[..., Own], *depends: object, command: Sequence[str] | None = None, **how: object
+    ) -> Own:
+        """Of this request: stage, settings, robot, inputs and what else it depends on. command: the words that were
+        typed after `r2s2r`, without --resume; None: as they were. how: as `kind` takes it."""
+        if command is None:
+            command = [word for word in typed_words(self.stage) if word != "--resume"]
         digests = [ref.sha256 for ref in self.inputs]
         made = self.wanted
         key = checkpoint_key(made.stage_version, made.settings, made.robot, digests, *depends)

@@ -49,7 +49,7 @@ class StageRun(Generic[Report]):
     flags: Mapping[str, Any] = field(default_factory=dict)
     dry_run: bool = False
     force: bool = False
-    resumed: bool = False
+    resumed: bool = field(default=False, init=False)
     """Whether there is something to go on from: it is made, fresh or not."""
     guard: Callable[[Header | None], None] | None = None
     """Raises where the artifact in the way must not be replaced; in a dry run as well."""

@@ -19,6 +19,7 @@ from schemas.results_blind import BlindRow
 
 _GAIT = re.compile(r"g(\d+)(?::|$)")
 """Runs of a set: g1, g2, ..., and intervals of them: g1:4."""
+_MAKE = "r2s2r blind make --observed 1 --key SAME.key again"
 
 
 def same(pool: Pool, found: Sequence[tuple[str, Truth, Said]], again: Sequence[Path]) -> BlindRow:
@@ -39,7 +40,7 @@ def same(pool: Pool, found: Sequence[tuple[str, Truth, Said]], again: Sequence[P
     if not pairs:
         raise InputError("there is no second verdict on any of these sets", where=", ".join(map(str, again)),
                          expected="verdicts on a bank of the same key, made with --observed 1", received="none",
-                         hint="r2s2r blind make --observed 1 --key SAME.key again")  # fmt: skip
+                         hint=_MAKE)  # fmt: skip
     return row(AGAIN, pairs, pool.tier)
 
 
@@ -55,24 +56,24 @@ def _require_its_gaits(verdict: Mapping[str, Any], label: Mapping[str, Any], *, 
     if seen > has or (on and seen <= has - judged(has)):
         raise InputError("a second verdict is on another world than the first", where=where,
                          expected=f"a set of {has} gaits", received=f"one of {seen}",
-                         hint="r2s2r blind make --observed 1 --key SAME.key again   # all else as before")  # fmt: skip
+                         hint=f"{_MAKE}   # all else as before")  # fmt: skip
 
 
 def _verdicts(path: Path, labels: Mapping[str, dict[str, Any]]) -> dict[str, Mapping[str, Any]]:
     """Second verdicts by name: of a folder of `blind run`, or of a published file, whose worlds can be compared."""
-    if not path.is_file():
-        there = {name: path / f"{name}.json" for name in labels}
-        read: dict[str, Mapping[str, Any]] = {name: read_verdict(one) for name, one in there.items() if one.exists()}
-        for name, verdict in read.items():
-            _require_its_gaits(verdict, labels[name], where=str(there[name]))
-        return read
     found: dict[str, Mapping[str, Any]] = {}
+    if not path.is_file():
+        for name, label in labels.items():
+            if (there := path / f"{name}.json").exists():
+                found[name] = read_verdict(there)
+                _require_its_gaits(found[name], label, where=str(there))
+        return found
     for one in read_published(path).sets:
         if one.name in labels:
             mine, other = (which.get("seed") for which in (labels[one.name], one.label))
             if mine != other:
                 raise InputError("two sets of one name are of different worlds", where=f"{path}: {one.name}",
                                  expected=f"seed {mine}", received=f"seed {other}",
-                                 hint="r2s2r blind make --observed 1 --key SAME.key again")  # fmt: skip
+                                 hint=_MAKE)  # fmt: skip
             found[one.name] = one.verdict
     return found

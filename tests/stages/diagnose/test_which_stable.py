@@ -24,11 +24,14 @@ PAST = {f"{effect.name}.{name}": torch.zeros(1, size, dtype=torch.float64)
 REST = pack_state(STRUCTURE, replace(rest_state(robot()), extra=PAST))
 
 
-def about(count: int, seed: int) -> torch.Tensor:
-    """The pose of robot.toml first, then starts as far from it as those of a piece are, (count, NS)."""
-    start, sd = REST, StartSpread().sd(STRUCTURE)
-    by = np.random.default_rng(seed).standard_normal((count, len(sd))) * sd
+def about(count: int, seed: int, *, away: float = 0.0) -> torch.Tensor:
+    """A pose first, then starts as far from it as those of a piece are, (count, NS). away: of the pose from that of
+    robot.toml, times as far."""
+    rng, sd = np.random.default_rng(seed), StartSpread().sd(STRUCTURE)
+    by = rng.standard_normal((count, len(sd))) * sd
     by[0] = 0.0
+    middle = torch.as_tensor(away * rng.standard_normal((1, len(sd))) * sd)
+    start = displaced(STRUCTURE, REST.expand(1, -1), middle)
     return displaced(STRUCTURE, start.expand(count, -1), torch.as_tensor(by))
 
 
@@ -40,10 +43,11 @@ def values(count: int, seed: int) -> np.ndarray:
     return np.clip(MODEL.values0 + sd * rng.standard_normal((count, len(sd))), low, high)
 
 
+@pytest.mark.parametrize("away", [0.0, 5.0])
 @pytest.mark.parametrize("seed", range(3))
-def test_what_is_said_to_be_stable_is(seed: int) -> None:
+def test_what_is_said_to_be_stable_is(seed: int, away: float) -> None:
     """Never longer than the longest stable step of any of these robots in any of these poses."""
-    starts, theta = about(40, seed), MODEL.theta(values(40, seed))
+    starts, theta = about(40, seed, away=away), MODEL.theta(values(40, seed))
     stable = Stable(STRUCTURE, MODEL.theta(MODEL.values0))
     stable.learn("rest", starts[0])
     said = stable.step({"rest"}, theta)

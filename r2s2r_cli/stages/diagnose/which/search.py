@@ -151,7 +151,9 @@ def _said(picked: Sequence[Response], told_by: Said) -> list[Candidate]:
 
 def _kept(fits: Sequence[Fit], told_by: Said, count: int) -> list[Fit]:
     """The first fits, and those of the effects that the parity stage speaks for most."""
-    said = {name: max(told_by.get(name, {None: 0.0}).values()) for name in {fit.hypothesis.effects[0] for fit in fits}}
+    # In the order of the fits: of two effects that are spoken for alike the better fit goes on, in every process.
+    names = dict.fromkeys(fit.hypothesis.effects[0] for fit in fits)
+    said = {name: max(told_by.get(name, {None: 0.0}).values()) for name in names}
     spoken = sorted((name for name in said if said[name] >= LEAST_SAID), key=lambda name: -said[name])[:SUSPECTED]
     also = {next(id(fit) for fit in fits if fit.hypothesis.effects[0] == name) for name in spoken}
     return [fit for k, fit in enumerate(fits) if k < count or id(fit) in also]

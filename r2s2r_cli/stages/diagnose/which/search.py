@@ -43,11 +43,9 @@ def picked_of(responses: Sequence[Response], told_by: Said) -> list[Response]:
     of the others, ELEMENTS of an effect at most."""
     testable = [one for one in responses if one.testable]
     best = list(dict.fromkeys(one.candidate.effect for one in testable))
-    said = {name: max(told_by.get(name, {None: 0.0}).values()) for name in best}
-    suspected = sorted((name for name in best if said[name] >= LEAST_SAID), key=lambda name: -said[name])
     own = {name: [one for one in testable if one.candidate.effect == name] for name in best}
     found = [max(own[name], key=lambda one: told_by[name].get(one.candidate.number, 0.0))
-             for name in suspected[:SUSPECTED]]  # fmt: skip
+             for name in _suspected(best, told_by)]  # fmt: skip
     found += [own[name][0] for name in best]
     found += testable
     kept: dict[int, Response] = {}
@@ -140,6 +138,13 @@ def led(fits: Fits, one: Fit, by: Sequence[Fit], *, iterations: int) -> Fit:
     return best
 
 
+def _suspected(names: Sequence[str], told_by: Said) -> list[str]:
+    """Of these effects, better ones first, those that the parity stage speaks for most; of such as it speaks for alike
+    the better ones."""
+    said = {name: max(told_by.get(name, {None: 0.0}).values()) for name in names}
+    return sorted((name for name in names if said[name] >= LEAST_SAID), key=lambda name: -said[name])[:SUSPECTED]
+
+
 def _said(picked: Sequence[Response], told_by: Said) -> list[Candidate]:
     """Candidates that the parity stage speaks for: their first tries are at the sizes that it says."""
     return [
@@ -151,11 +156,8 @@ def _said(picked: Sequence[Response], told_by: Said) -> list[Candidate]:
 
 def _kept(fits: Sequence[Fit], told_by: Said, count: int) -> list[Fit]:
     """The first fits, and those of the effects that the parity stage speaks for most."""
-    # In the order of the fits: of two effects that are spoken for alike the better fit goes on, in every process.
-    names = dict.fromkeys(fit.hypothesis.effects[0] for fit in fits)
-    said = {name: max(told_by.get(name, {None: 0.0}).values()) for name in names}
-    spoken = sorted((name for name in said if said[name] >= LEAST_SAID), key=lambda name: -said[name])[:SUSPECTED]
-    also = {next(id(fit) for fit in fits if fit.hypothesis.effects[0] == name) for name in spoken}
+    names = list(dict.fromkeys(fit.hypothesis.effects[0] for fit in fits))
+    also = {next(id(fit) for fit in fits if fit.hypothesis.effects[0] == name) for name in _suspected(names, told_by)}
     return [fit for k, fit in enumerate(fits) if k < count or id(fit) in also]
 
 

@@ -18,8 +18,8 @@ INTERVALS = GroupSpec(
         column("t_last", "float64", ("interval",), "s", "time of the last kept frame"),
         column("target", "float64", ("interval", "actuated"), "1", "the target vector"),
         column("complete", "bool", ("interval",), "bool",
-               "another row follows it, or it has moved to its end, and a camera has not lost the robot at its first or last frame: "
-               "it may be trained on and judged"),
+               "another row follows it, or it has moved to its end, and neither a hole in the frames that hides other targets "
+               "nor a camera that lost the robot lies at its first or last frame: it may be trained on and judged"),
     ),
 )  # fmt: skip
 

@@ -118,7 +118,7 @@ def intervals_enough(run: Run) -> Iterator[Found]:
     kinds=_KINDS,
     what="within a target interval every command has the interval's target",
     why="a target interval is a time span of one constant target vector; everything is judged by intervals",
-    fix=f"{AGAIN}   # the intervals are then found anew",
+    fix=f"{AGAIN}   # the intervals are then found anew; those of an estimate are those of its recording",
 )
 def targets_constant(run: Run) -> Iterator[Found]:
     """Commands that contradict the interval they lie in."""

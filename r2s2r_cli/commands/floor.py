@@ -66,11 +66,12 @@ def floor(
     if not 0 <= numerics <= GAITS_MAX:
         raise UsageError("this is no number of gait steps", where="--numerics", expected=f"0 to {GAITS_MAX}",
                          received=str(numerics), hint="r2s2r floor --numerics 16")  # fmt: skip
-    places = wanted_places(here, iteration or ())
+    numbers = list(dict.fromkeys(iteration or ()))  # a run asked for twice does not repeat itself
+    places = wanted_places(here, numbers)
     run = StageRun(
         stage="floor", kind="floor", project=here, iteration=None, find_inputs=lambda: _refs(here, places, numerics),
         report_model=FloorReport, dry_run=dry_run, force=force,
-        flags={"iterations": list(iteration or ()), "by": by.value, "numerics": numerics},
+        flags={"iterations": numbers, "by": by.value, "numerics": numerics},
     )  # fmt: skip
     result, report = run.run(
         lambda: _compute(here, places, by, numerics, console), (lambda data, said: _draw(data, said)) if draw else None

@@ -50,7 +50,11 @@ class Lengths:
 
     def __call__(self, capacitance: np.ndarray) -> np.ndarray:
         """Lengths of all cables [m], (..., cable), of capacitances [F], (..., sensor). NaN: no sensor, no reading."""
-        reading = np.where(np.abs(capacitance - NOT_INITIALISED) < 1e-15, np.nan, capacitance)
         length = np.full((*capacitance.shape[:-1], self.cables), np.nan)
-        length[..., self.cable] = (reading - self.offset) / self.slope
+        length[..., self.cable] = (readings(capacitance) - self.offset) / self.slope
         return length
+
+
+def readings(capacitance: np.ndarray) -> np.ndarray:
+    """Capacitances [F] with NaN where a board has sent that its sensor chip is not initialised."""
+    return np.where(np.abs(capacitance - NOT_INITIALISED) < 1e-15, np.nan, capacitance)

@@ -141,10 +141,13 @@ def stamp_jitter(t: np.ndarray) -> float:
     return float(np.std(np.diff(t))) if len(t) > 2 else float("nan")
 
 
+def in_hole(t: np.ndarray) -> np.ndarray:
+    """Whether a hole lies before each kept frame, (frame,); never before the first. t: stamps [s], (frame,)."""
+    gap = np.diff(t, prepend=t[:1])
+    return np.asarray(gap > GAP_FACTOR * np.median(gap[1:])) if len(t) > 2 else np.zeros(len(t), dtype=bool)
+
+
 def holes(t: np.ndarray) -> list[tuple[float, float]]:
     """Holes in kept stamps t [s]: (time before the hole, its length), the longest first."""
-    if len(t) < 3:
-        return []
-    gap = np.diff(t)
-    found = np.flatnonzero(gap > GAP_FACTOR * np.median(gap))
-    return sorted(((float(t[i]), float(gap[i])) for i in found), key=lambda hole: -hole[1])
+    found = np.flatnonzero(in_hole(t)) - 1
+    return sorted(((float(t[i]), float(t[i + 1] - t[i])) for i in found), key=lambda hole: -hole[1])

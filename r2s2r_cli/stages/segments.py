@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2s2r_cli.artifact import Group
+from r2s2r_cli.stages.frames import in_hole
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class Intervals:
     target: np.ndarray
     """Shape (interval, actuated), 0 short .. 1 long."""
     complete: np.ndarray
-    """bool: another row follows, or it has moved to its end."""
+    """bool: another row follows, or it has moved to its end; not where its end lies in a hole (`target_intervals`)."""
 
     def __len__(self) -> int:
         return len(self.first)
@@ -81,22 +82,29 @@ def target_intervals(
     control: np.ndarray | None = None,
     position: np.ndarray | None = None,
     tolerance: float = 0.0,
+    changes: np.ndarray | None = None,
 ) -> Intervals:
     """Maximal spans of one constant target vector.
 
     t: stamps of the kept frames [s], shape (frame,). target: shape (frame, actuated); a row with NaN has no target
     and ends the interval before it. control: shape (frame, actuated), +1 reels in. position: cable positions by
-    whatever measures them, shape (frame, actuated). tolerance: of the controller, in position.
+    whatever measures them, shape (frame, actuated). tolerance: of the controller, in position. changes: of
+    `target_changes`, shape (frame,); two or more in a hole of the frames are an end that no frame shows, even where
+    the target is the same again.
 
     Every interval is stored. Those with a later row of another target are complete. The last one is complete if it
     has moved to its end: each of its cables (a) has control 0 in the last row, or (b) lies within the tolerance of
     its target, or (c) lies at least as near to it as at the end of some earlier interval of the same target (the
-    gait goes on before the slowest cable is seen to arrive). Without control and position it is not complete.
+    gait goes on before the slowest cable is seen to arrive). Without control and position it is not complete. Nor is
+    one whose end lies in a hole of the frames, with other targets that came and went there: its last frame may be
+    anywhere on its way.
     """
     has_target = np.isfinite(target).all(axis=1)
     changed = np.ones(len(t), dtype=bool)
     if len(t) > 1:
         changed[1:] = (target[1:] != target[:-1]).any(axis=1)
+    unseen = np.zeros(len(t), dtype=bool) if changes is None else (changes > 1) & in_hole(t)
+    changed |= unseen
     first = np.flatnonzero(changed & has_target)
     ends = np.flatnonzero(changed)
     following = np.append(ends, len(t))[np.searchsorted(ends, first) + 1] if len(first) else first
@@ -104,6 +112,7 @@ def target_intervals(
     complete = np.ones(len(first), dtype=bool)
     if len(first) and last[-1] == len(t) - 1:
         complete[-1] = _moved_to_end(first, last, target, control, position, tolerance)
+    complete &= ~np.append(unseen, False)[last + 1]
     return Intervals(
         first=first.astype(np.int64),
         last=last.astype(np.int64),
@@ -112,6 +121,18 @@ def target_intervals(
         target=target[first],
         complete=complete,
     )
+
+
+def target_changes(t: np.ndarray, t_command: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """How often the target changed after the frame before and up to each frame, (frame,); 0 at the first one.
+
+    t: stamps of the kept frames [s], (frame,). t_command [s], (row,), and target, (row, actuated): a log that goes on
+    where frames are left out. Rows without a whole target are passed over.
+    """
+    whole = np.isfinite(target).all(axis=1)
+    at = t_command[whole][1:][(np.diff(target[whole], axis=0) != 0).any(axis=1)]
+    before = np.searchsorted(at, t, side="right")
+    return np.diff(before, prepend=before[:1])
 
 
 def _moved_to_end(

@@ -7,29 +7,35 @@ from collections.abc import Sequence
 import numpy as np
 
 from r2s2r_cli.artifact import Group
+from r2s2r_cli.devices.lengths import readings
 from schemas.robot import Robot
 
 
 def sensed_lengths(sensors: Group, robot: Robot) -> tuple[np.ndarray, np.ndarray] | None:
     """Lengths of the samples [m], (sample, sensor), and the cable of each sensor, (sensor,). NaN: not received.
 
-    The recording's own lengths, else its capacitances, each through the line that robot.toml has of its cable. Which
-    cables they are of the recording says; one that does not has the sensors of robot.toml, in their order. None where
-    there is neither, or where nobody says of which cables they are.
+    The recording's own lengths; of a sensor for which it has not one (it was not calibrated yet, or the program that
+    recorded writes none) its capacitances, through the line that robot.toml has of its cable. Which cables they are of
+    the recording says; one that does not has the sensors of robot.toml, in their order. None where there is neither,
+    or where nobody says of which cables they are.
     """
-    name = next((name for name in ("length", "capacitance") if name in sensors), None)
-    if name is None:
+    there = {name: sensors[name] for name in ("length", "capacitance") if name in sensors}
+    length, capacitance = there.get("length"), there.get("capacitance")
+    values = capacitance if length is None else length
+    if values is None:
         return None
     cable = sensors["cable"] if "cable" in sensors else np.array([s.cable for s in robot.sensors], dtype=np.int64)
-    values = sensors[name]
     if len(cable) != values.shape[1]:
         return None
-    if name == "length":
+    if capacitance is None:
+        return values, cable
+    without = np.ones(len(cable), dtype=bool) if length is None else ~np.isfinite(length).any(axis=0)
+    if not without.any():
         return values, cable
     lines = {s.cable: (s.slope_f_per_m or np.nan, np.nan if s.offset_f is None else s.offset_f) for s in robot.sensors}
     own = [lines.get(int(one), (np.nan, np.nan)) for one in cable]
     slope, offset = np.array(own, dtype=float).reshape(-1, 2).T
-    return np.asarray((values - offset) / slope), cable
+    return np.where(without, (readings(capacitance) - offset) / slope, values), cable
 
 
 def columns_of(values: np.ndarray, cable: np.ndarray, wanted: Sequence[int]) -> np.ndarray:

@@ -21,7 +21,7 @@ def verdict(report: CompareReport) -> str:
         return f"{counted(len({run.run for run in report.runs}), 'run')}: not every simulator could be run."
     one, two = a["com_end_m"], b["com_end_m"]
     runs = counted(two.runs, "run") + f" of iteration {report.iteration}" + _in_part(report)
-    floor = "" if two.floor is None else f"; a perfect simulator would be found {1e3 * two.floor:.0f} mm away"
+    floor = "" if two.floor is None else f"; a perfect simulator would be found up to {1e3 * two.floor:.0f} mm away"
     if first.model == last.model:
         return f"{runs}: the simulated centre of mass ends {1e3 * one.rms:.0f} mm from the real one{floor}."
     seen = "from which no simulator learned" if held else "ALL trained on: no claim of accuracy rests on them"

@@ -57,3 +57,10 @@ def test_executed_runs_are_looked_at_too(estimated: Path) -> None:
         "10-record.h5", "20-estimate.h5", "50-execute.h5", "51-estimate.h5",
     }  # fmt: skip
     assert both["report"]["lengths"]["contrasts"] > alone["report"]["lengths"]["contrasts"]
+
+
+def test_an_iteration_that_is_asked_for_twice_counts_once(estimated: Path) -> None:
+    """A run beside itself would repeat itself perfectly."""
+    once = document("floor", "--no-draw", "--iteration", "1")
+    twice = document("floor", "--no-draw", "--iteration", "1", "--iteration", "1")
+    assert twice["state"] == "fresh" and twice["report"] == once["report"] and twice["report"]["runs"] == ["1:sample"]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from r2s2r_cli.stages.segments import Intervals, Segments, segments, target_intervals
+from r2s2r_cli.stages.segments import Intervals, Segments, segments, target_changes, target_intervals
 from schemas.segments import INTERVALS, SEGMENTS
 
 A, B = [0.0, 1.0], [1.0, 0.0]
@@ -52,6 +52,24 @@ def test_no_target_at_all_gives_no_interval() -> None:
     found = target_intervals(t, target)
     assert len(found) == len(segments(found, t, np.zeros((4, 2)))) == 0
     assert found.target.shape == (0, 2)
+
+
+def test_targets_that_no_frame_shows_end_an_interval() -> None:
+    """A, B, A with all of B left out: two intervals of A, the first one's end unseen. A few frames of B left out, or
+    a target that is over before the next frame of an even series (rows stamped twice have such), change nothing."""
+    t, target = run((A, 8), (B, 8), (A, 8))
+    for kept, first, complete in (
+        (np.r_[0:6, 18:24], [0, 6], [False, False]),
+        (np.r_[0:8, 10:24], [0, 8, 14], [True, True, False]),
+    ):
+        changes = target_changes(t[kept], t, target)
+        found = target_intervals(t[kept], target[kept], changes=changes)
+        assert (found.first.tolist(), found.complete.tolist()) == (first, complete)
+    brief = target.copy()
+    brief[9:] = A
+    kept = np.delete(np.arange(24), 8)
+    found = target_intervals(t[kept], brief[kept], changes=target_changes(t[kept], t, brief))
+    assert found.first.tolist() == [0]
 
 
 def test_the_last_interval_is_cut_off_unless_it_can_be_seen_to_end() -> None:

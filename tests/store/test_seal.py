@@ -20,7 +20,7 @@ from r2s2r_cli.store.write import write_artifact
 from schemas.versions import KINDS, MIGRATIONS
 from tests.support.builders import provenance, recording
 from tests.support.layouts import materialised
-from tests.support.recorder import COLOR, RUN, append, counts, head, image, write
+from tests.support.recorder import COLOR, RUN, SENSORS, append, counts, head, image, write
 
 
 def paths(folder: Path) -> tuple[Path, Path]:
@@ -226,6 +226,31 @@ def test_a_journal_of_an_older_version_is_migrated(tmp_path: Path, monkeypatch: 
     result = seal(journal, target)
     assert result.header is not None and result.header.schema_version == spec.version
     assert content(target)[RUN]["attributes"]["source"] == "migrated"
+
+
+@pytest.mark.parametrize(("rows", "kept"), [(0, False), (1, False), (2, True)])
+def test_a_torn_table_stops_no_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: int, kept: bool
+) -> None:
+    """Cut off within the table that names the cable of each sensor: every reading is sealed, the torn table is not.
+    Killed before it tidies up, it knows its own artifact again."""
+    journal, target = paths(tmp_path)
+    begun = head()
+    table = Stream(SENSORS, (Field("cable", "int64"),), {}, "table")
+    with Journal(journal, replace(begun, streams=(*begun.streams, table))) as open_journal:
+        for cable in range(rows):
+            open_journal.append(f"{SENSORS}:table", {"cable": cable + 3})
+        for number in range(6):
+            append(open_journal, number)
+    monkeypatch.setattr(module, "_remove", _killed)
+    with pytest.raises(KeyboardInterrupt):
+        seal(journal, target)
+    monkeypatch.undo()
+    assert seal(journal, target).header is not None and not journal.exists()
+    check_rows(target, 6)
+    assert ("cable" in content(target)[SENSORS]) == kept
+    if kept:
+        assert content(target)[SENSORS]["cable"].tolist() == [3, 4]
 
 
 def _killed(*_: object, **__: object) -> None:

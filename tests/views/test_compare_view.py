@@ -83,7 +83,8 @@ def test_the_verdict_says_what_got_better_and_that_the_runs_prove_it() -> None:
     said = verdict(report())
     assert "4 runs of iteration 2, from which no simulator learned" in said
     assert (
-        "30 mm from the real one with refined, 80 mm with initial; a perfect simulator would be found 4 mm away" in said
+        "30 mm from the real one with refined, 80 mm with initial; a perfect simulator would be found up to 4 mm away"
+        in said
     )
     sure = "Of 1 measure refined is better than initial in 1, in 1 beyond its 95 % interval"
     assert f"{sure}, which of so few runs holds less often." in said

@@ -11,7 +11,7 @@ from r2s2r_cli.stages.compare.repeats import ended, turned
 from r2s2r_cli.stages.compare.walk import Walk
 
 STILL_M, STILL_RAD = 1e-3, 1e-3
-"""Ways and turns that differ by less are the same."""
+"""Ways and turns are rounded to these: what lies in one step has no order, which noise would make up."""
 LEAST = 4
 """Gaits below which a rank correlation says nothing: of three, one order in six is perfect by chance."""
 

@@ -69,7 +69,7 @@ def floor(
         lengths=_length_report(lengths, groups["lengths"]) if lengths is not None else None,
         numerics=_numerics_report(numerics) if numerics is not None else None,
     )
-    return ArtifactData("floor", groups), report.model_copy(update={"warnings": tuple(_warnings(report, bool(seen)))})
+    return ArtifactData("floor", groups), report.model_copy(update={"warnings": tuple(_warnings(report, seen, sensed))})
 
 
 def basis(phases: Phases, policies: Mapping[str, str]) -> str:
@@ -164,8 +164,12 @@ def _known(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _warnings(report: FloorReport, observed: bool) -> list[str]:
-    found = []
+def _warnings(report: FloorReport, seen: Sequence[SeenRun], sensed: Sequence[SensedRun]) -> list[str]:
+    found = [
+        f"{run.name}: one value throughout from the sensors of cables {', '.join(map(str, run.frozen))}: left out"
+        for run in sensed
+        if run.frozen
+    ]
     if report.given_up:
         found.append(f"intervals left out since their target was given up: {report.given_up}")
     lengths = report.lengths
@@ -175,7 +179,7 @@ def _warnings(report: FloorReport, observed: bool) -> list[str]:
             f"{1e3 * lengths.floor_m:.2f} mm: other days, calibrations or robots; --iteration N measures one"
         )
     if report.caps is None:
-        why = "no phase of a gait comes twice" if observed else "no run has end caps with states (r2s2r estimate)"
+        why = "no phase of a gait comes twice" if seen else "no run has end caps with states (r2s2r estimate)"
         found.append(f"no floor of the end caps: {why}")
     for what, part in (("end caps", report.caps), ("cable lengths", report.lengths)):
         if part is not None and part.contrasts < FEW:

@@ -12,6 +12,9 @@ from r2s2r_cli.stages.segments import Intervals
 from r2s2r_cli.stages.sensed import columns_of, sensed_lengths
 from schemas.robot import Robot
 
+FROZEN_READINGS = 20
+"""Equal readings from which on a sensor is taken for one that hangs: some seconds of any gait."""
+
 
 @dataclass(frozen=True)
 class SeenRun:
@@ -34,7 +37,8 @@ class SeenRun:
 @dataclass(frozen=True)
 class SensedRun:
     """A run with cable sensors. t: (sample,) [s]; length: (sample, sensor) [m], NaN: not in this sample; cable: that
-    each sensor measures, (sensor,). given_up: as of `SeenRun`."""
+    each sensor measures, (sensor,). given_up: as of `SeenRun`. frozen: cables whose sensor said one value throughout;
+    their lengths are NaN here."""
 
     name: str
     t: np.ndarray
@@ -42,6 +46,7 @@ class SensedRun:
     cable: np.ndarray
     intervals: Intervals
     given_up: int = 0
+    frozen: tuple[int, ...] = ()
 
 
 def seen_run(name: str, estimate: ArtifactData, recording: ArtifactData | None, run: str) -> SeenRun | None:
@@ -73,7 +78,17 @@ def sensed_run(name: str, recording: ArtifactData, run: str, robot: Robot) -> Se
     length = columns_of(*found, cable.tolist())
     if not np.isfinite(length).any():
         return None
-    return SensedRun(name, sensors["t"], length, cable, *_reached(Intervals.from_group(intervals), recording, run))
+    stuck = _frozen(length)
+    length[:, stuck] = np.nan  # it repeats itself perfectly, and measures nothing
+    reached = _reached(Intervals.from_group(intervals), recording, run)
+    return SensedRun(name, sensors["t"], length, cable, *reached, tuple(cable[stuck].tolist()))
+
+
+def _frozen(length: np.ndarray) -> np.ndarray:
+    """Whether all readings of a sensor are one number, (sensor,); a few are no evidence."""
+    heard = np.isfinite(length)
+    low, high = (np.where(heard, length, end).T for end in (np.inf, -np.inf))
+    return (heard.sum(axis=0) >= FROZEN_READINGS) & (low.min(axis=1) == high.max(axis=1))
 
 
 def _reached(table: Intervals, recording: ArtifactData | None, run: str) -> tuple[Intervals, int]:
@@ -84,10 +99,14 @@ def _reached(table: Intervals, recording: ArtifactData | None, run: str) -> tupl
     commands = None if recording is None else recording.group(run, "commands")
     if commands is None or "done" not in commands:
         return table, 0
-    t = commands["t"]
+    t, target = commands["t"], commands["target"]
     done: np.ndarray = np.all(commands["done"], axis=1)
     ends = np.append(table.t_first[1:], np.inf)  # done flags stay until the next target
-    reached = np.array([bool(done[(t >= a) & (t < b)].any()) for a, b in zip(table.t_first, ends, strict=True)])
+    reached = np.array([
+        # Up to the frame that first shows the next target its ticks lie in this span, too, and may be done at once.
+        bool(done[(t >= a) & (t < b) & (target == own).all(axis=1)].any())
+        for a, b, own in zip(table.t_first, ends, table.target, strict=True)
+    ])  # fmt: skip
     complete = table.complete & reached
     return replace(table, complete=complete), int((table.complete & ~reached).sum())
 

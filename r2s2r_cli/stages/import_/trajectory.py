@@ -13,7 +13,7 @@ from r2s2r_cli.stages import frames
 from r2s2r_cli.stages.import_.checks import ROD_TOLERANCE, UNITS, check_handedness, check_rod_length, check_up_axis
 from r2s2r_cli.stages.import_.clock import check_stamps, few_frames
 from r2s2r_cli.stages.import_.columns import Columns, find_columns
-from r2s2r_cli.stages.import_.missing import missing_commands
+from r2s2r_cli.stages.import_.missing import missing_commands, unseen_targets
 from r2s2r_cli.stages.import_.run import (
     NO_NATURE,
     cap_noise,
@@ -25,7 +25,7 @@ from r2s2r_cli.stages.import_.run import (
 )
 from r2s2r_cli.stages.import_.sidecar import check_sidecar, run_attributes
 from r2s2r_cli.stages.import_.table import Table, read_table
-from r2s2r_cli.stages.segments import segments, target_intervals
+from r2s2r_cli.stages.segments import segments, target_changes, target_intervals
 from schemas.results_import import ImportReport
 from schemas.robot import Robot
 from schemas.sidecar import Sidecar
@@ -80,12 +80,15 @@ def import_trajectory(
     check_handedness(p_kept, robot, where)
 
     attributes = run_attributes(sidecar, robot, "trajectory_csv")
+    commands = _commands(t, reason, target, control)
+    changes = target_changes(t_kept, commands["t"], commands["target"])
     intervals = target_intervals(
         t_kept,
         target[kept],
         control=None if control is None else control[kept],
         position=_cable_position(p_kept, robot, attributes),
         tolerance=float(attributes.get("pid_tolerance", 0.0)),
+        changes=changes,
     )
     cuts = segments(intervals, t_kept, None if control is None else control[kept])
     sd, noise = cap_noise(t_kept, p_kept)
@@ -110,7 +113,7 @@ def import_trajectory(
                 noise_sd_stated=sidecar.noise_sd_m,
             ),
         ),
-        "commands": _commands(t, reason, target, control),
+        "commands": commands,
         "intervals": intervals.to_group(),
         "segments": cuts.to_group(),
     }
@@ -128,7 +131,7 @@ def import_trajectory(
     warnings += few_frames(len(t_kept), dropped_frames(reason)) + _check_control(
         groups["commands"], t_kept, p_kept, robot
     )
-    warnings += missing_commands(table, columns, reason, len(intervals))
+    warnings += missing_commands(table, columns, reason, len(intervals)) + unseen_targets(t_kept, changes)
     if sidecar.nature is None:
         warnings.append(NO_NATURE)
     if len(intervals) and not intervals.complete[-1]:

@@ -12,6 +12,7 @@ from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.floor import Numerics, SeenRun, SensedRun, floor, sensed_run
 from r2s2r_cli.stages.floor.lengths import length_repeats
 from r2s2r_cli.stages.segments import target_intervals
+from r2s2r_cli.stages.sensed import sensed_lengths
 from schemas.results_floor import FloorReport
 from tests.stages.measures.gait import FRAMES, path, run
 from tests.support.fake_robot import calibrated
@@ -201,3 +202,60 @@ def test_lengths_of_a_log_stand_under_the_sensor_of_their_cable() -> None:
         assert np.isnan(np.delete(found.length, [5, 0, 3], axis=1)).all()
         repeats = length_repeats([found])
         assert repeats is not None and repeats.sd[5] > 1e-3 and repeats.sd[[0, 3]].max() < 1e-9
+
+
+def test_a_target_that_is_met_at_once_does_not_count_for_the_one_given_up() -> None:
+    """Camera frames come after the first ticks of the next target, which lie in the span of the one before."""
+    robot = calibrated()
+    motors = len(robot.actuated)
+    t, frames = np.arange(0, 9, 0.02), np.arange(0, 9, 1 / 30) + 0.013
+    target, seen = (np.where(stamps < 6, 0.0, 0.5)[:, None] + np.zeros(motors) for stamps in (t, frames))
+    done = (t >= 6)[:, None] & np.ones(motors, dtype=bool)
+    commands = Group({"t": t, "target": target, "control": np.zeros_like(target), "done": done})
+    table = target_intervals(frames, seen, control=np.zeros_like(seen)).to_group()
+    length = 0.1 + 1e-4 * np.sin(t)[:, None] + np.zeros(len(robot.sensors))
+    groups = {"sensors": Group({"t": t, "length": length}), "intervals": table, "commands": commands}
+    found = sensed_run("1:a", ArtifactData("recording", {f"runs/a/{k}": v for k, v in groups.items()}), "a", robot)
+    assert found is not None and found.given_up == 1 and found.intervals.complete.tolist() == [False, True]
+
+
+def test_a_sensor_that_hangs_is_left_out_and_named() -> None:
+    """One value in every sample repeats itself perfectly: it would lower the floor of all."""
+    robot, n = calibrated(), 50
+    t = np.arange(10 * n) / RATE
+    level = np.repeat(np.tile([0.0, 1.0], 5), n)
+    target = np.repeat(level[:, None], len(robot.actuated), axis=1)
+    noise = np.random.default_rng(0).normal(0, 1e-3, (len(t), len(robot.sensors)))
+    length = 0.1 + 0.1 * level[:, None] + noise
+    table = target_intervals(t, target, control=np.zeros_like(target)).to_group()
+    floors = []
+    for hanging in ([], [2, 7]):
+        length[:, hanging] = 0.17
+        groups = {"runs/a/sensors": Group({"t": t, "length": length}), "runs/a/intervals": table}
+        found = sensed_run("1:a", ArtifactData("recording", groups), "a", robot)
+        assert found is not None
+        data, report = floor([], [found], policies={})
+        assert report.lengths is not None
+        floors.append(report.lengths.floor_m)
+        assert np.flatnonzero(np.isnan(data.groups["lengths"]["sd"])).tolist() == hanging
+        cables = ", ".join(str(robot.sensors[k].cable) for k in hanging)
+        said = [text for text in report.warnings if "one value throughout" in text]
+        assert said == ([f"1:a: one value throughout from the sensors of cables {cables}: left out"] if hanging else [])
+    assert floors[1] == pytest.approx(floors[0], rel=0.3)
+
+
+def test_a_sensor_without_lengths_has_those_of_its_capacitances() -> None:
+    """Each sensor by itself; what a board sends before its chip is initialised is no reading."""
+    robot = calibrated()
+    t = np.arange(30) * 0.1
+    truth = 0.15 + 0.01 * np.sin(t)[:, None] + 0.002 * np.arange(len(robot.sensors))
+    slope, offset = np.array([[s.slope_f_per_m, s.offset_f] for s in robot.sensors], dtype=float).T
+    raw, length = truth * slope + offset, truth + 0.05
+    raw[4, 3] = 0.2e-12
+    length[:, [3, 8]] = np.nan
+    for own, expected in ((length, np.where(np.isnan(length), truth, length)), (None, truth)):
+        sensors = {"t": t, "capacitance": raw} | ({} if own is None else {"length": own})
+        found = sensed_lengths(Group(sensors), robot)
+        assert found is not None and np.isnan(found[0][4, 3])
+        there = np.delete(np.arange(30), 4)
+        assert np.allclose(found[0][there], expected[there], atol=1e-12)

@@ -238,6 +238,19 @@ def test_a_hole_is_reported_with_its_place() -> None:
     assert [(gap.after_s, gap.length_s) for gap in report.gaps] == [pytest.approx((1.1, 1.1))]
 
 
+def test_targets_within_a_hole_of_the_caps_are_told() -> None:
+    """One cap is hidden while two other targets hold: they are no intervals, the two of the same target around them
+    are not one, and the first of them has no key frame."""
+    t = np.arange(40) * 0.1
+    caps, target = glide(t), steps(40, [CYCLE[0], CYCLE[1], CYCLE[2], CYCLE[0]])
+    caps[8:33, 0] = np.nan
+    groups, report = read(csv_text(t, caps, target))
+    assert report.intervals == 2 and groups["intervals"]["complete"].tolist() == [False, False]
+    assert groups["intervals"]["t_last"].tolist() == pytest.approx([0.7, 3.9])
+    (said,) = [warning for warning in report.warnings if "came and went" in warning]
+    assert said.startswith("2 targets") and "from 0.70 to 3.30 s" in said
+
+
 def test_a_table_height_is_a_warning_and_a_turned_frame_is_refused() -> None:
     """A ground 0.7 m up is a frame with z up; one with y up is not, whichever way the robot moves."""
     t = np.arange(40) * 0.1

@@ -73,6 +73,14 @@ PARAMETERS = GroupSpec(
         column("identifiable", "bool", ("parameter",), "bool", "the runs determine it"),
         column("trust", "uint8", ("parameter",), "code", "what the number is worth", codes=TRUST),
         column("reason", "str", ("parameter",), "1", "why, in words"),
+        column("first_mean", "float64", ("parameter",), "1", "mean of the prior before any run (--online)", required=False,
+               nan_means="flat"),
+        column("first_sd", "float64", ("parameter",), "1", "its standard deviation, in the coordinate", required=False,
+               nan_means="flat"),
+        column("known", "float64", ("parameter",), "1", "what the next --online goes on from", required=False,
+               nan_means="nothing is known"),
+        column("known_sd", "float64", ("parameter",), "1", "its standard deviation, in the coordinate", required=False,
+               nan_means="nothing is known"),
     ),
 )  # fmt: skip
 

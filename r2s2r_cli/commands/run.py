@@ -87,6 +87,11 @@ def run(
     # Whoever imports a log named no robot, and none is to move by surprise.
     link = link_of(here, port, protocol)
     asked = port or (None if source else link.port)
+    if asked is None and camera is not None:
+        words = [*map(str, source)] if source else ["--port", "/dev/ttyUSB0", "--camera", camera]
+        raise UsageError("a camera looks at a robot, and none is named", where=f"--camera {camera}",
+                         expected="--port PORT beside it, or no camera", received="no port",
+                         hint=shlex.join(["r2s2r", "run", *words, "--iteration", str(place.number)]))  # fmt: skip
     robot: tuple[str, ...] = () if asked is None else ("--port", asked, "--protocol", link.protocol)
     robot += () if camera is None else ("--camera", camera)
     names = tuple(policy or ())
@@ -172,7 +177,8 @@ def _steps(
     logs an iteration learns from the runs before it."""
     seeded = ("--seed", str(random[1])) if random[1] else ()
     recording, executed = place.artifact("recording"), place.artifact("recording", executed=True)
-    earlier = any(one.artifact("estimate").exists() for one in project.iterations() if one.number < place.number)
+    before = [one for one in project.iterations() if one.number < place.number]
+    earlier = any(one.artifact("estimate", executed=ran).exists() for one in before for ran in (False, True))
     if source:
         yield Step("record", ("import", *map(str, source)), recording)
     elif robot and not earlier:

@@ -39,6 +39,9 @@ OWN  :=
 endif
 endif
 
+# What earlier iterations know: `compare` sets their simulators beside the last one, and effects are kept from them.
+EARLIER := $(shell ls iterations/*/30-identify.h5 2>/dev/null | awk '$$0 < "$(I)"')
+
 # A plan is executed where there is a robot; runs that were executed are compared, else those of the iteration itself.
 REAL := $(OWN)
 ifneq ($(strip $(PORT))$(wildcard $(EXECUTE)),)
@@ -64,7 +67,8 @@ help:
 iterate: $(ARTIFACTS)
 
 ifneq ($(strip $(SOURCE)),)
-$(RECORD): $(SOURCE) $(SETTINGS)
+# With the sidecar of each log.
+$(RECORD): $(SOURCE) $(wildcard $(addsuffix .toml,$(basename $(SOURCE)))) $(SETTINGS)
 	"$(R2S2R)" import --iteration $(ITER) $(SOURCE)
 else ifneq ($(strip $(PORT)),)
 # Nothing stands behind the colon: a robot that has moved is not asked to do it again.
@@ -80,7 +84,7 @@ endif
 $(ESTIMATE): $(RECORD) $(SETTINGS)
 	"$(R2S2R)" estimate --iteration $(ITER)
 
-$(IDENTIFY): $(FROM) $(SETTINGS)
+$(IDENTIFY): $(FROM) $(EARLIER) $(SETTINGS)
 	"$(R2S2R)" identify --iteration $(ITER)
 
 $(PLAN): $(IDENTIFY) $(SETTINGS)
@@ -94,7 +98,7 @@ $(EXECUTE): | $(PLAN)
 $(EXECUTED): $(EXECUTE) $(SETTINGS)
 	"$(R2S2R)" estimate --iteration $(ITER) --of execute
 
-$(COMPARE): $(lastword $(REAL)) $(IDENTIFY) $(SETTINGS)
+$(COMPARE): $(lastword $(REAL)) $(IDENTIFY) $(EARLIER) $(wildcard floor.h5) $(SETTINGS)
 	"$(R2S2R)" compare --iteration $(ITER)
 
 floor:

@@ -82,6 +82,29 @@ def test_a_log_needs_no_robot(project: Path, calls: Calls) -> None:
     assert stages(Child.calls) == ["import", "estimate", "identify"]
 
 
+@pytest.mark.parametrize("log", [("sample.csv",), ()])
+def test_a_camera_names_no_robot(project: Path, calls: Calls, log: tuple[str, ...]) -> None:
+    """Whoever imports a log and looks on moves none, though the project knows one: refused, before anything is done."""
+    if log:
+        text = (project / "project.toml").read_text()
+        assert '\nport = ""' in text
+        (project / "project.toml").write_text(text.replace('\nport = ""', '\nport = "socket://nowhere:1"'))
+    result = invoke("run", *log, "--camera", "rig://nowhere:2", "--yes")
+    assert result.exit_code == 2 and "none is named" in result.stderr
+    assert Child.calls == []
+    words = result.stderr.splitlines()[-1].removeprefix("hint: ").split()[1:]
+    assert ("--port" in words) != bool(log) and ("--camera" in words) != bool(log)
+
+
+def test_executed_runs_are_enough_to_learn_from(estimated: Path, calls: Calls) -> None:
+    """An iteration before that has only these: the next one identifies and plans, as `identify` and make would."""
+    place = estimated / "iterations" / "001"
+    for source, target in (("10-record.h5", "50-execute.h5"), ("20-estimate.h5", "51-estimate.h5")):
+        (place / source).rename(place / target)
+    assert invoke("run", "--iteration", "2").exit_code == 0
+    assert stages(Child.calls) == ["identify", "plan"]
+
+
 @pytest.mark.parametrize("kind", ["identification", "plan", "comparison"])
 def test_a_stage_that_was_interrupted_goes_on(estimated: Path, calls: Calls, kind: str) -> None:
     """The stage that left a checkpoint takes it up, no other one; what is damaged is not taken up."""

@@ -76,6 +76,29 @@ def test_a_changed_robot_runs_what_depends_on_it(project: Path) -> None:
     assert calls(project)[5:7] == ["estimate --iteration 001", "identify --iteration 001"]
 
 
+def test_what_stands_beside_the_runs_counts_too(project: Path) -> None:
+    """A new sidecar is imported, a new floor compared with, and what an earlier iteration learned anew goes into the
+    next one: `status` would call all of these stale."""
+    (project / "a.toml").write_text("")
+    make(project, "iterate", "SOURCE=a.csv")
+    (project / "floor.h5").write_text("")
+    os.utime(project / "floor.h5", (4e9, 4e9))
+    assert make(project, "iterate", "SOURCE=a.csv").returncode == 0
+    assert calls(project)[5:] == ["compare --iteration 001"]
+    os.utime(project / "floor.h5", (0, 0))
+    os.utime(project / "a.toml", (4e9, 4e9))
+    assert make(project, "-q", "iterate").returncode == 0, "without the log there is nothing to import again"
+    assert make(project, "iterate", "SOURCE=a.csv").returncode == 0
+    assert calls(project)[6] == "import --iteration 001 a.csv"
+    os.utime(project / "a.toml", (0, 0))
+    make(project, "iterate", "ITER=2")
+    assert make(project, "-q", "iterate", "ITER=2").returncode == 0
+    os.utime(project / IDENTIFY, (5e9, 5e9))
+    count = len(calls(project))
+    assert make(project, "iterate", "ITER=2").returncode == 0
+    assert calls(project)[count:] == ["identify --iteration 2", "plan --iteration 2"]
+
+
 def test_an_iteration_without_runs_learns_from_the_one_before(project: Path) -> None:
     """Without a log of its own iteration 2 only identifies and plans, and again when the estimate before it is new;
     iteration 3 learns from the same, there being none in between."""

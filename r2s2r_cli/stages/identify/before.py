@@ -11,13 +11,15 @@ from schemas.robot import Robot
 
 
 def specs_of(before: ArtifactData, robot: Robot) -> dict[str, str]:
-    """What was free there, as after --free, by name. An effect's number that nobody gave a start gets none here."""
+    """What was free there, as after --free, by name, with the prior before any run. An effect's number that nobody gave
+    a start gets none here."""
     group, own = before.groups["parameters"], entries(robot)
+    prior_mean, prior_sd = ("first_mean", "first_sd") if "first_sd" in group else ("prior_mean", "prior_sd")
     found = {}
     for k, name in enumerate(names_of(before)):
         if int(group["trust"][k]) == FIXED_BY_HAND:
             continue
-        mean, sd = float(group["prior_mean"][k]), float(group["prior_sd"][k])
+        mean, sd = float(group[prior_mean][k]), float(group[prior_sd][k])
         low, high = (float(end) for end in group["bounds"][k])
         start = mean if math.isfinite(mean) else float(group["start"][k])
         known = own[name].free if name in own else None

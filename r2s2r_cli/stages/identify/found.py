@@ -143,6 +143,17 @@ class FreeRunFound:
 
 
 @dataclass(frozen=True)
+class Course:
+    """What the next `--online` goes on from, by name of parameter. first_mean, first_sd: the prior before any run, in
+    the unit and in the coordinate. value, sd_z: what is known after the last one, in the unit and in the coordinate."""
+
+    first_mean: Mapping[str, float]
+    first_sd: Mapping[str, float]
+    value: Mapping[str, float]
+    sd_z: Mapping[str, float]
+
+
+@dataclass(frozen=True)
 class Update:
     """Online: the estimate after one more run, value and sd (n,) in units."""
 
@@ -189,6 +200,7 @@ class Found:
     profiles: tuple[ProfileFound, ...] = ()
     windows: tuple[WindowFound, ...] = ()
     updates: tuple[Update, ...] = ()
+    course: Course | None = None
     p_RS: np.ndarray | None = None
     sensing: Sensing | None = None
     command_delay: float = 0.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group, Scalar
 from r2s2r_cli.stages.identify.columns import floats, texts
-from r2s2r_cli.stages.identify.found import Found, ParameterFound
+from r2s2r_cli.stages.identify.found import Course, Found, ParameterFound
 from r2s2r_cli.stages.identify.free.base import Coordinate
 from r2s2r_cli.stages.identify.groups_judged import judged_groups
 from r2s2r_cli.stages.identify.trust.identifiability import THRESHOLD, Trust
@@ -23,7 +23,7 @@ def identification(found: Found) -> ArtifactData:
     """The artifact; groups of parts that were not made are left out."""
     groups: dict[str, Group | None] = {
         "fit": _fit(found),
-        "parameters": _parameters(found.parameters),
+        "parameters": _parameters(found.parameters, found.course),
         "covariance": _covariance(found),
         "identifiability": _identifiability(found),
         "trace": _trace(found),
@@ -58,7 +58,7 @@ def _sensing(found: Found) -> Group | None:
     return Group({"bias": found.sensing.bias}, facts)
 
 
-def _parameters(parameters: Sequence[ParameterFound]) -> Group:
+def _parameters(parameters: Sequence[ParameterFound], course: Course | None) -> Group:
     frees = [one.free for one in parameters]
     bounds = np.array([[free.lower, free.upper] for free in frees]).reshape(-1, 2)
     intervals = floats([one.interval for one in parameters]).reshape(-1, 3)
@@ -80,8 +80,18 @@ def _parameters(parameters: Sequence[ParameterFound]) -> Group:
             "identifiable": np.array([one.identifiable for one in parameters], dtype=bool),
             "trust": np.array([_TRUST[one.trust] for one in parameters], np.uint8),
             "reason": texts([one.reason for one in parameters]),
+            **({} if course is None else _course(course, [free.name for free in frees])),
         }
     )
+
+
+def _course(course: Course, names: Sequence[str]) -> dict[str, np.ndarray]:
+    columns = {"first_mean": course.first_mean, "first_sd": course.first_sd, "known": course.value,
+               "known_sd": course.sd_z}  # fmt: skip
+    return {
+        column: np.array([value if math.isfinite(value := by_name.get(name, _NAN)) else _NAN for name in names])
+        for column, by_name in columns.items()
+    }
 
 
 def _covariance(found: Found) -> Group | None:

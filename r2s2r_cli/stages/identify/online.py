@@ -20,7 +20,7 @@ from r2s2r_cli.stages.identify.conclude import Assured, Fitted, assured, conclud
 from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.identify.default_method import loss_words
 from r2s2r_cli.stages.identify.fit import fit
-from r2s2r_cli.stages.identify.found import Found, TraceStep, Update
+from r2s2r_cli.stages.identify.found import Course, Found, TraceStep, Update
 from r2s2r_cli.stages.identify.free import Free, select
 from r2s2r_cli.stages.identify.free.base import Coordinate
 from r2s2r_cli.stages.identify.holding import fitted_to_shown, holding_effects, not_identifiable, undetermined
@@ -76,7 +76,15 @@ def find_online(task: Task) -> Found:
     remarks = (*_remarks(learned_twice(before, task.runs, order)), *_dropped(known_of(before), task, wide))
     words = f"{loss_words(task)}; run after run, the cost is of the last"
     made = replace(last.made, trace=tuple(kept.steps), loss=words, updates=tuple(updates), remarks=remarks)
-    return concluded(task, predictor, replace(last, made=made))
+    return replace(concluded(task, predictor, replace(last, made=made)), course=_course(wide, known))
+
+
+def _course(wide: Sequence[Free], known: Known) -> Course:
+    """The state for the next `--online`: with nothing but the last prior it would forget the first one, beyond which
+    nothing becomes wider, and what the last run did not determine would stay as it was instead of drifting on."""
+    first = {free.name: free for free in wide}
+    return Course({name: free.mean for name, free in first.items() if math.isfinite(free.prior_sd)},
+                  {name: free.prior_sd for name, free in first.items()}, known.value, known.sd_z)  # fmt: skip
 
 
 def _fit_to(task: Task, frees: Sequence[Free], kept: Kept, place: tuple[int, Sequence[Selection]]) -> Assured:
@@ -132,9 +140,13 @@ def first_free(task: Task) -> tuple[Free, ...]:
 def known_of(before: ArtifactData) -> Known:
     """The numbers that an earlier identification determined, and how well.
 
-    Those without an interval (not identifiable, fixed by hand, method paper) are left out.
+    Those without an interval (not identifiable, fixed by hand, method paper) are left out; after `--online`, those that
+    no run so far has determined.
     """
     group = before.groups["parameters"]
+    if "known_sd" in group:
+        there = [(name, k) for k, name in enumerate(names_of(before)) if math.isfinite(float(group["known_sd"][k]))]
+        return Known(*({name: float(group[column][k]) for name, k in there} for column in ("known", "known_sd")))
     covariance = before.groups["covariance"]["covariance"] if "covariance" in before.groups else None
     known = Known({}, {})
     for k, name in enumerate(names_of(before)):

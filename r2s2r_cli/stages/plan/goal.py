@@ -71,7 +71,7 @@ def way_to(moves: Moves, goal: Goal) -> Paths:
     that may go wrong count as slower.
 
     Where none leads there within NODES poses, the one that comes nearly there; raises NumericalError where none does,
-    with the nearest place.
+    or none comes nearer than where the robot stands, with the nearest place that one leads to.
     """
     turn_by = np.abs(wrapped(moves.yaw + moves.axis[moves.element] - moves.axis[0]))
     # Of a robot that cannot turn, or cannot travel, no time is foretold for that.
@@ -84,7 +84,7 @@ def way_to(moves: Moves, goal: Goal) -> Paths:
         return np.asarray(time)
 
     begun = start_paths()
-    count, best = 0, (math.inf, begun)
+    count, best, still = 0, (math.inf, begun), float(goal.miss(begun)[0])
     queue: list[tuple[float, int, float, Paths, int]] = [(GREED * float(time_left(begun)[0]), 0, 0.0, begun, 0)]
     done: set[tuple[int, ...]] = set()
     while queue and len(done) < NODES:
@@ -96,7 +96,8 @@ def way_to(moves: Moves, goal: Goal) -> Paths:
         done.add(key)
         if goal.reached(paths.xy[0, -1], paths.heading[0, -1]):
             return paths
-        best = min(best, (float(goal.miss(paths)[0]), paths), key=lambda pair: pair[0])
+        if paths.picks.shape[1]:
+            best = min(best, (float(goal.miss(paths)[0]), paths), key=lambda pair: pair[0])
         after = extended(moves, paths)
         time = time_left(after)
         for k, cell in enumerate(_cells(after)):
@@ -105,10 +106,11 @@ def way_to(moves: Moves, goal: Goal) -> Paths:
                 cost = spent + float(moves.duration[k] * (1.0 + SLOWER * moves.risk[k]))
                 heapq.heappush(queue, (cost + GREED * float(time[k]), count, cost, after, k))
     near = best[1]
-    if best[0] <= NEARLY:
+    if best[0] <= NEARLY and best[0] < still:
         return near
+    where = "there" if best[0] < still else "nearer to it than the robot stands"
     raise NumericalError(
-        "no sequence of the gaits leads there", where=f"--to {goal.typed}".rstrip(),
+        f"no sequence of the gaits leads {where}", where=f"--to {goal.typed}".rstrip(),
         expected=f"({goal.xy[0]:g}, {goal.xy[1]:g}) m, "
         f"{math.degrees(goal.heading):g} deg, within {goal.within_m:g} m and {math.degrees(goal.within_rad):.0f} deg",
         received=f"nearest ({near.xy[0, -1, 0]:.2f}, {near.xy[0, -1, 1]:.2f}) m, "

@@ -19,6 +19,7 @@ from r2s2r_cli.stages.identify.groups import identification
 from r2s2r_cli.stages.identify.online import (
     DRIFT,
     Known,
+    _course,
     _dropped,
     by_run,
     drift_of,
@@ -82,6 +83,25 @@ def test_what_was_free_is_free_again() -> None:
     speed, bounce = select(tuple(specs.values()), subject().robot)
     assert (speed.name, speed.start, speed.lower, speed.upper, speed.prior_sd) == ("motor_speed", 1.0, 0.1, 2.0, 0.3)
     assert (bounce.name, bounce.start, bounce.upper) == ("restitution", 0.3, 0.95)
+
+
+def test_what_was_gone_on_from_keeps_its_first_prior() -> None:
+    """After --online the artifact has the last prior, the first one and what is known: the next one begins from what
+    is known, though the last run determined none of it, and becomes as wide as the first again, not as the last."""
+    first = (SPEED, BOUNCE)
+    known = Known({"motor_speed": 0.8, "restitution": 0.4}, {"motor_speed": 0.04, "restitution": 0.06})
+    last = tuple(
+        ParameterFound(drifted(free, known), 0.5, 9.0, 0.1, 0.9, NAN, Trust.NOT_IDENTIFIABLE) for free in first
+    )
+    plain = {"information": None, "updates": (), "starts": (), "trace": (), "profiles": ()}
+    before = identification(found(parameters=last, course=_course(first, known), **plain))
+    assert before.groups["parameters"]["prior_sd"].max() < 0.2
+    assert known_of(before) == known
+    again = select(tuple(specs_of(before, subject().robot).values()), subject().robot)
+    assert [free.mean for free in again] == [SPEED.mean, 0.4]  # a flat prior has no mean: it begins at the last start
+    assert [free.prior_sd for free in again] == [0.3, select(("restitution",), subject().robot)[0].prior_sd]
+    alone = identification(found(parameters=last, **plain))
+    assert known_of(alone) == Known({}, {})
 
 
 def test_a_winch_whose_likes_came_out_equal_can_be_gone_on_with() -> None:

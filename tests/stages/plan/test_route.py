@@ -210,3 +210,13 @@ def test_a_goal_out_of_reach_is_answered_with_one_that_is_reached() -> None:
     option, text = caught.value.hint.split()
     x, y, heading = map(float, text.split(","))
     assert option == "--to" and way_near(moves, Goal((x, y), np.radians(heading))).picks.shape[0] == 1
+
+
+def test_standing_still_is_no_way() -> None:
+    """Gaits of 0.2 m, and a goal 0.11 m away that none comes nearer to: no empty sequence stands for a policy. One
+    that a gait does come nearer to, though not near enough, is gone to as far as that."""
+    moves = simple((0.0, 0.2, 0.0))
+    with pytest.raises(NumericalError, match="nearer to it than the robot stands") as caught:
+        way_near(moves, Goal((0.11, 0.0), 0.0))
+    assert caught.value.hint == "--to 0.00,0.20,0"
+    assert way_near(moves, Goal((0.11, 0.2), 0.0)).picks.shape[1] == 1

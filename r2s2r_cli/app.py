@@ -91,8 +91,9 @@ def _run_guarded(call: Callable[[], object], as_json: bool, arguments: Sequence[
     except typer.TyperException as error:
         from r2s2r_cli.commands.parsing import usage_error
 
-        print_error(usage_error(error, arguments), as_json=as_json)
-        return ExitCode.USAGE
+        said = usage_error(error, arguments)
+        print_error(said, as_json=as_json)
+        return said.exit_code
     except (KeyboardInterrupt, typer.Abort):
         tell("interrupted: nothing is half-written; run the command again")
         return ExitCode.INTERRUPTED

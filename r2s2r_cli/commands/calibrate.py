@@ -96,6 +96,7 @@ def calibrate(
         report_model=CalibrationReport, overrides=overrides, flags=flags, dry_run=dry_run, force=force,
         not_applied=lambda said: _not_applied(here, said),
     )  # fmt: skip
+    before = _source(here.robot_path).data
     result, report = run.run(
         # What an earlier run chose is chosen again with its points; what is typed now must have its points with it.
         lambda: _compute(here, asked, flags.get("use") if "points" in asked else use, overrides, kept),
@@ -104,7 +105,7 @@ def calibrate(
     )
     show_outcome(result, console)
     if report is not None:
-        _show(report, console, applied=result.state == "done")
+        _show(report, console, done=result.state == "done", changed=_source(here.robot_path).data != before)
 
 
 def _merge_with_earlier(
@@ -211,7 +212,7 @@ def _draw(data: ArtifactData, report: CalibrationReport, robot: Robot) -> Iterat
     yield ".html", calibration_page(report, pictures)
 
 
-def _show(report: CalibrationReport, console: Console, *, applied: bool) -> None:
+def _show(report: CalibrationReport, console: Console, *, done: bool, changed: bool) -> None:
     from r2s2r_cli.views.calibration_page import report_tables
 
     for table in report_tables(report):
@@ -222,11 +223,12 @@ def _show(report: CalibrationReport, console: Console, *, applied: bool) -> None
         if report.sets and report.used is None:
             console.hint(_with_set(report.sets))
         return
-    if applied:
+    if done:
         what = [f"{len(report.changes.sensors)} sensor lines" if report.changes.sensors else "",
                 "the tendon curve" if report.changes.tendon else "",
                 f"the parts of {len(report.changes.rods)} rods" if report.changes.rods else ""]  # fmt: skip
-        console.say(f"robot.toml has new numbers: {', '.join(filter(None, what))}")
+        has = "has new numbers" if changed else "had these numbers already"
+        console.say(f"robot.toml {has}: {', '.join(filter(None, what))}")
 
 
 def _with_set(sets: Sequence[SensorSet]) -> str:

@@ -125,6 +125,11 @@ class Asked:
         from r2s2r_cli.store.staleness import artifact_ref
 
         number = self.iteration.number
+        recorded, executed = (self.iteration.artifact("recording", executed=one).exists() for one in (False, True))
+        if self.of == "record" and executed and not recorded and not self.estimate(self.iteration).exists():
+            raise UsageError("this iteration has no recorded runs", where="--of record", expected="--of execute",
+                             received=f"iteration {number}, whose robot has only executed its plan",
+                             hint="--of execute")  # fmt: skip
         require_input(
             self.estimate(self.iteration),
             f"r2s2r estimate --iteration {number}" + " --of execute" * self.executed,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -77,7 +78,7 @@ def execute(
     Example: r2s2r execute straight --port /dev/ttyUSB0 --protocol legacy --camera realsense
     """  # fmt: skip
     from r2s2r_cli.commands.asking import answered, require_answer
-    from r2s2r_cli.commands.cameras import stored_camera
+    from r2s2r_cli.commands.cameras import camera_of, stored_camera
     from r2s2r_cli.commands.execute_outcome import expect
     from r2s2r_cli.commands.outcome import require_model
     from r2s2r_cli.commands.record_look import look
@@ -93,7 +94,10 @@ def execute(
     robot, link = here.robot(), link_of(here, port, protocol)
     chosen, inputs = _chosen(here, place, policies or [], console)
     settings = here.config(place, overrides).record
-    runs = plans(chosen, repeats=repeats, rest=settings.rest_s, again="execute straight")
+    again = ["execute", *(policies or ["straight"])[:1], "--iteration", str(place.number), *["--dry-run"] * dry_run]
+    runs = plans(chosen, repeats=repeats, rest=settings.rest_s, again=shlex.join(again))
+    if camera is not None:
+        camera_of(camera)  # whether it names one: it is opened after the simulation, which takes its time
     own = place.artifact("identification")
     numbers = model if model is not None else own if own.exists() else None
     if numbers is not None:

@@ -168,7 +168,7 @@ def _plant(asked: Asked, overrides: dict[str, Any], console: Console, dry_run: b
 
     settings = asked.project.config(asked.iteration, overrides).identify
     if dry_run:
-        asked.check(settings)
+        asked.check(settings, planted=True)
         console.say("would plant and fit, and write nothing")
     else:
         plant(asked, settings, console)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import os
 import re
 import shlex
@@ -137,7 +138,10 @@ def _replaces(new: Option, old: Option, error: R2S2RError) -> bool:
         return True
     if name == "--set" and _about(value).rpartition(".")[2] == error.received:
         return True
-    return _about(new[1]) == _about(value) or value == error.received or _about(value) in error.received.split(", ")
+    received = error.received.split(", ")
+    if "*" in _about(value) and fnmatch.filter(received, _about(value)):
+        return True
+    return _about(new[1]) == _about(value) or (value or "nothing") == error.received or _about(value) in received
 
 
 def _as_typed(new: Option, replaced: Sequence[Option], error: R2S2RError) -> Option:
@@ -171,5 +175,6 @@ def require_starts(asked: Asked, overrides: dict[str, Any]) -> None:
     try:
         asked.project.config(asked.iteration, overrides)
     except UsageError as error:
+        error.where = "--starts"
         error.hint = error.hint.replace("--set identify.starts=", "--starts ")
         raise

@@ -163,15 +163,20 @@ class Asked:
         """Recordings and estimates that are read, those of the main iteration first."""
         return [path for source in self.sources for path in (source.recording, source.estimate)]
 
-    def check(self, settings: IdentifySettings) -> None:
+    def check(self, settings: IdentifySettings, *, planted: bool = False) -> None:
         """Find what is wrong with the request before any work: names, bounds, intervals, runs, what goes together.
+        planted: a self-test is asked for.
 
         Raises UsageError, InputError or ArtifactError, as the fit would.
         """
         from r2s2r_cli.stages.identify.identify import require_possible
+        from r2s2r_cli.stages.identify.task import require_replay
 
         runs = self.runs()
-        require_possible(self.project.robot(), runs, self.request(runs, settings), settings)
+        request = self.request(runs, settings)
+        if planted:
+            require_replay(request)
+        require_possible(self.project.robot(), runs, request, settings)
 
     def request(self, runs: Sequence[RunData], settings: IdentifySettings) -> Request:
         """The request, its intervals resolved. Raises UsageError for runs and intervals that do not exist."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import re
 import shlex
@@ -14,16 +15,22 @@ from r2s2r_cli.errors import R2S2RError, UsageError
 from r2s2r_cli.nearest import nearest
 
 _EXTRA = re.compile(r"Got unexpected extra arguments?\(?s?\)? \((?P<words>.*)\)")
+_UNREADABLE = re.compile(r"[Pp]ath '(?P<path>.*)' is not readable")
 _COMMAND = re.compile(r"No such command '(?P<name>.*?)'")
 
 
-def usage_error(error: Any, arguments: Sequence[str]) -> UsageError:
-    """Of an exception of the parser. arguments: as typed after `r2s2r`; they stay in the hint but for what was wrong,
-    where it is known what would have been right."""
+def usage_error(error: Any, arguments: Sequence[str]) -> R2S2RError:
+    """Of an exception of the parser; ArtifactError for a file that may not be read, UsageError for all else. arguments:
+    as typed after `r2s2r`; they stay in the hint but for what was wrong, where it is known what would have been right.
+    """
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else _path(arguments)
     message = error.format_message() if hasattr(error, "format_message") else str(error)
     command = None if context is None else context.command
+    if closed := _UNREADABLE.search(message):
+        from r2s2r_cli.store.header import unreadable
+
+        return unreadable(Path(closed["path"]), PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
     for reads, say in _KINDS:
         if reads(error, message):
             return _in_words(path, *say(error, message, command, list(arguments)))

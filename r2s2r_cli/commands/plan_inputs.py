@@ -86,7 +86,9 @@ class Asked:
     def check(self, settings: PlanSettings) -> None:
         """Find what is wrong with the request before any work. Raises UsageError, InputError, ArtifactError."""
         from r2s2r_cli.stages.plan.rewards import try_out
+        from r2s2r_cli.stages.ticks import whole_steps
 
+        whole_steps(self.project.robot(), settings.step_s, "plan.step_s")
         for reward in self.request(settings).rewards.values():
             try_out(reward)
 
@@ -134,10 +136,11 @@ class Asked:
 
         try:
             x, y, heading = (float(part) for part in text.split(","))
-            if not all(map(math.isfinite, (x, y, heading))):
+            if not (math.hypot(x, y) <= FARTHEST_M and abs(heading) <= MOST_TURNED_DEG):  # NaN is not, either
                 raise ValueError
         except ValueError as error:
-            raise UsageError("this is no place to go to", where="--to", expected="X,Y,HEADING: metres and degrees",
+            raise UsageError("this is no place to go to", where="--to",
+                             expected=f"X,Y,HEADING: metres, {FARTHEST_M:g} m away at most, and degrees",
                              received=text, hint="--to 0.5,1,90") from error  # fmt: skip
         goal = Goal((x, y), math.radians(heading), settings.goal_within_m, math.radians(settings.goal_within_deg), text)
         if goal.reached(np.zeros(2), np.zeros(())):
@@ -158,6 +161,10 @@ def _importable(root: Path) -> Iterator[None]:
         yield
     finally:
         sys.path.remove(str(root))
+
+
+FARTHEST_M, MOST_TURNED_DEG = 1000.0, 36000.0
+"""Of a goal: beyond any way of a crawling robot, it is a slip of the keyboard."""
 
 
 def last_estimate(project: Project, iteration: Iteration) -> Path | None:

@@ -88,10 +88,10 @@ def run(
     link = link_of(here, port, protocol)
     asked = port or (None if source else link.port)
     if asked is None and camera is not None:
-        words = [*map(str, source)] if source else ["--port", "/dev/ttyUSB0", "--camera", camera]
+        instead = [*map(str, source)] if source else ["--port", "/dev/ttyUSB0", "--camera", camera]
         raise UsageError("a camera looks at a robot, and none is named", where=f"--camera {camera}",
                          expected="--port PORT beside it, or no camera", received="no port",
-                         hint=shlex.join(["r2s2r", "run", *words, "--iteration", str(place.number)]))  # fmt: skip
+                         hint=shlex.join(["r2s2r", "run", *instead, "--iteration", str(place.number)]))  # fmt: skip
     robot: tuple[str, ...] = () if asked is None else ("--port", asked, "--protocol", link.protocol)
     robot += () if camera is None else ("--camera", camera)
     names = tuple(policy or ())

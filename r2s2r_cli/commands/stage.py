@@ -179,7 +179,11 @@ class StageRun(Generic[Report]):
         names = []
         for suffix, content in pictures:
             path = self.target.with_name(self.target.stem + suffix)
-            write_bytes(path, content)
+            try:
+                write_bytes(path, content)
+            except R2S2RError as error:
+                error.what += f"; {self.target.name} is whole, and pictures that it lacks are drawn by the same command"
+                raise
             names.append(self.project.relative(path))
         return names
 

@@ -7,10 +7,11 @@ import stat
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from r2s2r_cli.commands.latest_gap import latest_gap
 from r2s2r_cli.commands.mend import Mending, mending
 from r2s2r_cli.commands.next_command import explained, forward
 from r2s2r_cli.commands.unfinished import UNDER_WAY, Kept, checkpoints, interrupted, unsealed
@@ -20,15 +21,13 @@ from r2s2r_cli.measured import MEASURED, itself_unfresh
 from r2s2r_cli.options import JsonOption, ProjectOption, QuietOption
 from r2s2r_cli.store.again import stage_at
 from r2s2r_cli.store.brief import brief
+from r2s2r_cli.store.from_here import typed_here
 from r2s2r_cli.store.header import CutOff, NotAnArtifact, read_header, sealed_header, whole_header
 from r2s2r_cli.store.lock import writer
 from r2s2r_cli.store.project import Iteration, Project
 from schemas.header import Header, Provenance
 from schemas.results import ArtifactState, StatusResult
 from schemas.versions import KINDS
-
-if TYPE_CHECKING:
-    from schemas.results_compare import CompareReport
 
 
 def status(
@@ -48,7 +47,7 @@ def status(
     """
     console = Console(json=json, quiet=quiet)
     here = Project.find(project)
-    result = survey(here, thorough=check)
+    result = _typed_here(survey(here, thorough=check), here.root)
     console.document(result)
     console.data(f"project {result.project}   robot {result.robot}   {_size(result.bytes)}")
     rows = [
@@ -63,7 +62,7 @@ def status(
             console.say("\n".join(["to mend what is damaged, one by one:", *(f"  {mend}" for mend in mends)]))
         if not check:
             console.say("heads and sizes were read, contents were not; to compare every byte: r2s2r status --check")
-    gap = _gap(here)
+    gap = latest_gap(here)
     if gap is not None:
         from r2s2r_cli.views.compare_history import history_table
 
@@ -83,6 +82,12 @@ def status(
             received=f"{first.state}: {'; '.join(brief(first.reasons))}",
             hint=result.next or "r2s2r status",
         )
+
+
+def _typed_here(result: StatusResult, root: Path) -> StatusResult:
+    """With its commands as they are typed where this runs."""
+    artifacts = tuple(one.model_copy(update={"mend": typed_here(one.mend, root)}) for one in result.artifacts)
+    return result.model_copy(update={"artifacts": artifacts, "next": typed_here(result.next, root)})
 
 
 LATER = {KINDS["floor"].filename: 1, KINDS["policy"].filename: 1, KINDS["comparison"].filename: 2,
@@ -125,7 +130,7 @@ def survey(project: Project, *, thorough: bool = False) -> StatusResult:
         artifacts=tuple(states),
         bytes=sum(_bytes_of(path) for path in project.root.rglob("*")),
         next=again[0] if again else forward(project) or next(iter(runs), explained(project)),
-        history=gap.history if (gap := _gap(project)) else (),
+        history=gap.history if (gap := latest_gap(project)) else (),
     )  # fmt: skip
 
 
@@ -136,22 +141,6 @@ def _bytes_of(path: Path) -> int:
     except FileNotFoundError:
         return 0
     return found.st_size if stat.S_ISREG(found.st_mode) else 0
-
-
-def _gap(project: Project) -> CompareReport | None:
-    """What the latest comparison says; None where there is none that can be read."""
-    from pydantic import ValidationError
-
-    from schemas.results_compare import CompareReport
-
-    for place in reversed(project.iterations()):
-        path = place.artifact("comparison")
-        if path.exists():
-            try:
-                return CompareReport.model_validate(whole_header(path).provenance.report)
-            except (ArtifactError, ValidationError):
-                return None  # damaged: said above; of an older version: nothing is said of it
-    return None
 
 
 def _state(

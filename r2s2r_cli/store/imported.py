@@ -55,8 +55,12 @@ def look_at(path: Path) -> str:
     """The hint for a file in which there is nothing of ours, and that no known command makes again."""
     if path.suffix.lower() in TEXTS:
         return f"r2s2r validate {quoted(path)}"
-    recording = path.name == KINDS["recording"].filename and root_of(path.absolute()) is not None
-    return f"file {quoted(path)}" + "   # if it was imported: r2s2r import LOG --force" * recording
+    if root_of(path.absolute()) is None or path.name not in {name for kind in KINDS.values() for name in kind.filenames}:
+        return f"file {quoted(path)}"
+    if path.name == KINDS["recording"].filename:
+        return f"file {quoted(path)}   # if it was imported: r2s2r import LOG --force"
+    # While it is there `status` sends its reader here again.
+    return f"mv -n {quoted(path)} {quoted(f'{path}.lost')}   # nothing in it can be brought back"
 
 
 def _found_again(made: Provenance, root: Path) -> Provenance | None:

@@ -180,3 +180,15 @@ def test_the_command_of_a_place(estimated: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.chdir(estimated.parent)
     assert command_at(folder / "30-identify.h5") == "r2s2r identify --iteration 7 --project robot"
     assert command_at(Path("30-identify.h5")) == ""
+
+
+def test_the_way_out_of_a_file_with_nothing_in_it_ends(estimated: Path) -> None:
+    """No stage makes policies.h5 again by its name, and nothing is left in it: it goes out of the way, whole, and what
+    is asked for next is another thing."""
+    (estimated / "policies.h5").write_bytes(b"garbage")
+    assert document("status")["next"] == "r2s2r recover policies.h5"
+    last = invoke("recover", "policies.h5").stderr.splitlines()[-1]
+    assert last == "hint: mv -n policies.h5 policies.h5.lost   # nothing in it can be brought back"
+    (estimated / "policies.h5").rename(estimated / "policies.h5.lost")
+    assert "policies" not in document("status")["next"]
+    assert invoke("recover", "other.h5").stderr.splitlines()[-1].startswith("hint: ls -la")

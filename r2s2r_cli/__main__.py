@@ -9,15 +9,15 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from r2s2r_cli.stopping import STOP
+from r2s2r_cli.stopping import POLITE, STOP
 
 SOON_S = 0.02
 """After which a swallowed interrupt comes again."""
 
 
 def main() -> None:
-    """Load the app and run it. Ctrl-C and SIGTERM count as an interrupt from the first moment to the last, without
-    a traceback.
+    """Load the app and run it. Ctrl-C, SIGTERM and SIGHUP count as an interrupt from the first moment to the last,
+    without a traceback.
 
     Matrices are small here: threads of BLAS and torch cost more than they bring (48 s of processor time instead of 39 s
     for one diagnosis by those of BLAS, 3.4 s become 8.5 s for its probes by those of torch, and ten times as long where
@@ -28,7 +28,7 @@ def main() -> None:
         os.environ.setdefault(name, "1")
     try:
         early: list[int] = []
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in (signal.SIGINT, *POLITE):
             if number == signal.SIGINT or signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, lambda told, _: early.append(told))
         from r2s2r_cli.app import app  # compiled modules do not take an exception out of the blue while they load

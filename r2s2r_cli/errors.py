@@ -29,8 +29,8 @@ EXIT_CODE_MEANING: dict[ExitCode, str] = {
     ExitCode.INPUT: "artifact, project or input missing, unreadable, damaged, or of the wrong kind or version",
     ExitCode.HARDWARE: "hardware or link failure, emergency stop",
     ExitCode.NUMERICAL: "numerical failure: not finite, not converged, not identifiable",
-    ExitCode.INTERRUPTED: "interrupted (Ctrl-C, SIGTERM); nothing is half-written, long work can be resumed; "
-    "with --json stdout stays empty",
+    ExitCode.INTERRUPTED: "interrupted (Ctrl-C, SIGTERM, a closed terminal); nothing is half-written, long work can be "
+    "resumed; with --json stdout stays empty",
 }
 
 

@@ -18,6 +18,7 @@ from multiprocessing.connection import Connection, wait
 from typing import TypeVar
 
 from r2s2r_cli.errors import HardwareError, R2S2RError, UsageError, install_extra
+from r2s2r_cli.stopping import POLITE
 
 LOCAL, DASK = "local", "dask://"
 WHOLE = threading.Lock()
@@ -64,8 +65,10 @@ def open_executor(spec: str, workers: int) -> Iterator[Executor]:
 def _listen(heard: Connection) -> None:
     """In a worker: nobody waits for what it computes once who asked for it has given it up, or is gone, killed for
     instance."""
-    # The pool sends this to all workers as soon as one has ended: to one that writes a file, too.
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    # The pool sends SIGTERM to all workers as soon as one has ended, a closed terminal SIGHUP: to one that writes a
+    # file, too.
+    for number in POLITE:
+        signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_until_closed, args=(heard,), daemon=True).start()
 
 

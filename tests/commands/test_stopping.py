@@ -1,4 +1,4 @@
-"""SIGTERM is an interrupt like Ctrl-C, a stop that is told twice is one, and a job behind `&` hears it."""
+"""SIGTERM and SIGHUP are an interrupt like Ctrl-C, a stop that is told twice is one, and a job behind `&` hears it."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ main()
 """A command whose work must not be interrupted in its midst, nor its end by a second stop."""
 
 
-@pytest.mark.parametrize("first", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("first", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 @pytest.mark.parametrize("deaf", [False, True], ids=["foreground", "background"])
 def test_a_kill_is_an_interrupt_and_counts_once(tmp_path: Path, first: signal.Signals, deaf: bool) -> None:
     """The item is finished, the end is not disturbed by the SIGTERM that comes after either signal, and the command
@@ -58,14 +58,15 @@ def test_a_kill_is_an_interrupt_and_counts_once(tmp_path: Path, first: signal.Si
     assert (child.returncode, said) == (130, "ended\ninterrupted: nothing is half-written; run the command again\n")
 
 
-def test_a_kill_that_is_ignored_stays_so(tmp_path: Path) -> None:
-    """Whoever starts a command with SIGTERM ignored wants that."""
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_kill_that_is_ignored_stays_so(tmp_path: Path, number: signal.Signals) -> None:
+    """Whoever starts a command with SIGTERM ignored, or with nohup, wants that."""
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAM], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGTERM, signal.SIG_IGN),
+        preexec_fn=lambda: signal.signal(number, signal.SIG_IGN),
     ) as child:  # fmt: skip
         assert child.stderr is not None
         child.stderr.readline()
-        child.send_signal(signal.SIGTERM)
+        child.send_signal(number)
         said = child.stderr.read()
     assert (child.returncode, said) == (0, "item whole\n")

@@ -239,9 +239,10 @@ def _planned_anew(project: Project, place: Iteration, plan: Path, header: Header
 
 def _ask(console: Console) -> None:
     """Raises UsageError where the answer is no."""
+    from r2s2r_cli.commands.record_live import way_to_stop
     from r2s2r_cli.commands.typed import typed_again
 
-    console.say("the robot will move now; the space bar stops it")
+    console.say(f"the robot will move now; {way_to_stop()}")
     if not typer.confirm("run these policies on the robot?", err=True):
         raise UsageError("nothing moved", where="r2s2r execute", expected="yes", received="no",
                          hint=typed_again("execute", "--dry-run"))  # fmt: skip

@@ -68,7 +68,7 @@ class Live:
             zip(now.length, now.position, now.aim, now.done, strict=True)
         ):
             shown.append(f"cable {i} {1e3 * length:6.1f} mm {_bar(position, aim)} {'done' if there else ''}".rstrip())
-        return [*shown, "space: emergency stop"]
+        return [*shown, *["space: emergency stop"] * hears_keys()]
 
 
 def _count(value: int | None) -> str:
@@ -133,6 +133,20 @@ def _spoken(live: Live, console: Console) -> Iterator[None]:
         over.set()
 
 
+def hears_keys(stream: Any = None) -> bool:
+    """Whether somebody at a terminal can press a key. stream: instead of stdin (tests)."""
+    source = sys.stdin if stream is None else stream
+    try:
+        return source is not None and bool(source.isatty())
+    except ValueError:  # closed
+        return False
+
+
+def way_to_stop() -> str:
+    """How whoever sits here stops the robot at once, in words."""
+    return "space is the emergency stop" if hears_keys() else "no terminal: Ctrl-C or kill stops it, no key does"
+
+
 @contextlib.contextmanager
 def stop_key(halt: Callable[[], None], *, stream: Any = None) -> Iterator[None]:
     """Call `halt` when the space bar is pressed, from a thread of its own; nothing where stdin is no terminal.
@@ -140,11 +154,7 @@ def stop_key(halt: Callable[[], None], *, stream: Any = None) -> Iterator[None]:
     stream: read instead of stdin (tests).
     """
     source = sys.stdin if stream is None else stream
-    try:
-        terminal = source is not None and source.isatty()
-    except ValueError:  # closed
-        terminal = False
-    if not terminal:
+    if not hears_keys(source):
         yield
         return
     import select

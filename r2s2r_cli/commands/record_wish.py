@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from r2s2r_cli.commands.record_journal import Recording
+from r2s2r_cli.commands.record_live import way_to_stop
 from r2s2r_cli.console import Console
 from r2s2r_cli.reached import RIG_REMARK, camera, virtual
 
@@ -68,4 +69,4 @@ def remarks(facts: LinkFacts, console: Console) -> None:
     """Say who has answered at the port, and what is to be known of it."""
     for text in facts.remarks:
         console.warn(text)
-    console.say(f"{facts.robot or 'robot'} at {facts.port}, protocol {facts.protocol}; space is the emergency stop")
+    console.say(f"{facts.robot or 'robot'} at {facts.port}, protocol {facts.protocol}; {way_to_stop()}")

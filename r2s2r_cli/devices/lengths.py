@@ -10,10 +10,13 @@ import numpy as np
 from r2s2r_cli.errors import InputError
 
 if TYPE_CHECKING:
-    from schemas.robot import Robot
+    from schemas.robot import Limits, Robot
 
 NOT_INITIALISED = 0.20e-12
 """Capacitance [F] that the boards send while their sensor chip is not initialised: no reading."""
+LIMIT_MARGIN = 0.02
+"""[m] beyond the robot's limits up to which a length is believed. Assumption: 90 % of recalibrations a day later differ
+by less than 18 mm."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,13 @@ class Lengths:
         length = np.full((*capacitance.shape[:-1], self.cables), np.nan)
         length[..., self.cable] = (readings(capacitance) - self.offset) / self.slope
         return length
+
+
+def believed(length: np.ndarray, limits: Limits) -> np.ndarray:
+    """Lengths [m] with NaN where none can be: beyond the robot's limits by more than LIMIT_MARGIN. A digit lost on the
+    way makes metres of one: a controller that sums it up would pull the wrong way for seconds."""
+    low, high = limits.cable_length_min_m - LIMIT_MARGIN, limits.cable_length_max_m + LIMIT_MARGIN
+    return np.where((length >= low) & (length <= high), length, np.nan)
 
 
 def readings(capacitance: np.ndarray) -> np.ndarray:

@@ -33,6 +33,10 @@ class LinkState(Enum):
     LOST = "lost"
 
 
+EMERGENCY = "emergency stop"
+"""The reason of a stop that the device latches as well, where it can."""
+
+
 class LinkError(HardwareError):
     """The port died, the robot does not answer, or it answers something else. Exit code 5.
 

@@ -23,7 +23,8 @@ def say_stop(link: Link) -> None:
     """On a link that works: until it is acknowledged or has been said often enough; on one that dies: `rescue`."""
     try:
         for _ in range(STOPS):
-            line = link.codec.stop()
+            # Of an emergency stop the first line may be lost like any other, and the device is to be latched.
+            line = link.codec.emergency() if link.latched_here else link.codec.stop()
             link.routes.silence()
             link.send(line)
             if link.lock_step:

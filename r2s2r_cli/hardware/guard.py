@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from r2s2r_cli.devices.lengths import Lengths
-from r2s2r_cli.devices.link import LinkFacts, LinkState, LinkStatistics, RobotLink, SafetyStop, Sample
+from r2s2r_cli.devices.link import EMERGENCY, LinkFacts, LinkState, LinkStatistics, RobotLink, SafetyStop, Sample
 from r2s2r_cli.hardware.look import look_at
 from r2s2r_cli.hardware.pace import Pace
 from r2s2r_cli.hardware.watch import STALE, Watch
@@ -44,8 +44,6 @@ BACKLOG = 100_000
 """Messages that are thrown away at the beginning of a run at most."""
 SILENT = 5.0
 """[s] of the wall's clock without any message in lock-step, where the world's clock stands still."""
-EMERGENCY = "emergency stop"
-"""The reason that the device may have latched as well."""
 
 
 class GuardedLink:

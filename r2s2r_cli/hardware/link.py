@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from r2s2r_cli.devices.link import LinkError, LinkFacts, LinkState, LinkStatistics, SafetyStop, Sample
+from r2s2r_cli.devices.link import EMERGENCY, LinkError, LinkFacts, LinkState, LinkStatistics, SafetyStop, Sample
 from r2s2r_cli.hardware import farewell, handshake
 from r2s2r_cli.hardware.codec.base import Codec, Greeting, Outgoing
 from r2s2r_cli.hardware.inbox import Inbox
@@ -120,6 +120,8 @@ class Link:
             self._state = LinkState.HANDSHAKE
             self.stop()
             begin(self)
+            if self.lock_step is None and not self.facts.stops_by_itself:
+                self.stop()  # now that it is known where each board is: one may still do what a host that died told it
         except BaseException as error:
             self.stop()
             self.transport.close()
@@ -169,7 +171,7 @@ class Link:
 
     def emergency_stop(self) -> None:
         """Stop and latch, here and on the device where it can. Never raises; from any thread."""
-        self._latched = "emergency stop"
+        self._latched = EMERGENCY
         self._say(self.codec.emergency)
 
     def reset(self) -> None:
@@ -201,6 +203,11 @@ class Link:
         """Bytes to the sender of a message. Raises LinkError."""
         with self._lock:
             self.transport.send(data, place)
+
+    @property
+    def latched_here(self) -> bool:
+        """Whether the emergency stop was pressed on this side."""
+        return self._latched == EMERGENCY
 
     def latched_there(self) -> None:
         """The device says that its emergency stop is latched. Raises SafetyStop."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from r2s2r_cli.devices.link import LinkError
 from r2s2r_cli.hardware.codec.base import Outgoing
 from r2s2r_cli.hardware.transport import Address
 
@@ -15,18 +16,30 @@ class Routes:
 
     def __init__(self) -> None:
         self._address: dict[int, Address] = {}
+        self._heard: dict[int, dict[Address, None]] = {}
         self._any: Address | None = None
         self._may: set[Address] = set()
         self._owed: set[Address] = set()
         self._now: Outgoing | None = None
 
     def heard(self, source: Address | None, board: int | None = None) -> bytes | None:
-        """A line came, from a board where it is a measurement; what to answer to it at once, if anything."""
+        """A line came, from a board where it is a measurement; what to answer to it at once, if anything.
+
+        Raises LinkError where a board speaks from an address that it had before it spoke from another: there are two.
+        """
         if source is None:
             return None
         self._any = source
         if board is None:
             return None
+        known = self._heard.setdefault(board, {})
+        if source in known and self._address[board] != source:
+            raise LinkError(
+                f"two robots send to this host: board {board} is heard from two addresses", where=f"board {board}",
+                expected="one robot", received=f"{_place(self._address[board])} and {_place(source)}",
+                hint="r2s2r doctor ports   # once the other robot is switched off",
+            )  # fmt: skip
+        known[source] = None
         self._address[board] = source
         if self._now is not None and source in self._owed:
             self._owed.discard(source)
@@ -35,14 +48,16 @@ class Routes:
         return None
 
     def everywhere(self, line: Outgoing) -> list[Address | None]:
-        """All places that a line must reach, at once."""
-        if line.every_board and self._address:
-            return list(dict.fromkeys(self._address.values()))
+        """All places that a line must reach, at once: wherever a board was ever heard from."""
+        if line.every_board and self._heard:
+            return list(dict.fromkeys(place for places in self._heard.values() for place in places))
         return [self._any]
 
     def command(self, line: Outgoing, *, at_once: bool = False) -> list[Address | None]:
         """Places that may be sent a command now; the others get it as an answer. at_once: all of them."""
-        places = self.everywhere(line)
+        places: list[Address | None] = [self._any]
+        if line.every_board and self._address:
+            places = [*dict.fromkeys(self._address.values())]
         if not line.every_board or at_once:
             return places
         self._now = line
@@ -55,3 +70,8 @@ class Routes:
         """No answers until the next command."""
         self._now = None
         self._owed.clear()
+
+
+def _place(address: Address) -> str:
+    host, port = address
+    return f"{host}:{port}"

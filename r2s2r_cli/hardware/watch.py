@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from r2s2r_cli.devices.lengths import NOT_INITIALISED, Lengths
+from r2s2r_cli.devices.lengths import NOT_INITIALISED, Lengths, believed
 from r2s2r_cli.devices.link import Sample
 
 if TYPE_CHECKING:
@@ -28,8 +28,6 @@ OUT_FOR = 3
 """Messages in a row: one bad number is no reason."""
 _ROUNDING = 1e-9
 """[s]: ticks of 20 ms add up to a little less or more."""
-MARGIN = 0.02
-"""[m] beyond the limits. Assumption: 90 % of recalibrations a day later differ by less than 18 mm."""
 
 
 class Watch:
@@ -100,8 +98,7 @@ class Watch:
 
     def _range(self, capacitance: np.ndarray, good: np.ndarray) -> str:
         length = self._lengths(capacitance)[self._cables]
-        low, high = self._limits.cable_length_min_m - MARGIN, self._limits.cable_length_max_m + MARGIN
-        out = good & ~((length >= low) & (length <= high))
+        out = good & np.isnan(believed(length, self._limits))
         self._out = np.where(good, np.where(out, self._out + 1, 0), self._out)
         over = self._out >= OUT_FOR
         if not over.any():

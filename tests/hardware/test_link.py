@@ -204,6 +204,28 @@ def test_a_stop_that_gets_lost_is_said_again() -> None:
     assert sum(line.split("*")[0].endswith(",X") for line in robot.heard[before:]) >= 5
 
 
+def test_an_emergency_stop_that_was_lost_is_said_again() -> None:
+    """Until the robot says that it has heard it: else the next host would drive it without a reset."""
+
+    class Lossy(FakeRobot):
+        lost = 0
+
+        def send(self, data: bytes, to: tuple[str, int] | None = None) -> None:
+            if b",E*" in data and not self.lost:
+                self.lost += 1
+                return
+            super().send(data, to)
+
+    robot = Lossy()
+    with link_to(robot) as link:
+        link.command(np.ones(6))
+        link.emergency_stop()
+        assert robot.lost == 1 and not robot.latched
+    assert robot.latched and robot.emergencies == 1
+    with pytest.raises(SafetyStop, match="latched"):
+        link_to(robot).__enter__()
+
+
 def test_the_emergency_stop_is_latched_until_it_is_reset() -> None:
     """Here and on the device; everything is refused; only `reset` goes on, also after a new start of the host."""
     robot = FakeRobot()

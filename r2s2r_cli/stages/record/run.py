@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from r2s2r_cli.devices.lengths import Lengths
+from r2s2r_cli.devices.lengths import Lengths, believed
 from r2s2r_cli.devices.link import LinkStatistics, RobotLink, Sample
 from r2s2r_cli.devices.pid import WirePid, WireSteps, ticks
 from r2s2r_cli.stages.record.camera import Pictures
@@ -131,7 +131,7 @@ class RunLoop:
             return
         target = self._sequence.target[self.steps.index]
         lengths = self._lengths(sample.capacitance)
-        length = lengths[self.winched]
+        length = believed(lengths[self.winched], self._robot.limits)
         doubt = sample.doubt or ("" if pictures is None else pictures.doubt)
         # Held: what is recorded is what the motors were told, and the controller has not seen this tick.
         control = np.zeros(len(self.winched)) if doubt else self._pid.tick(length, target)
@@ -142,7 +142,7 @@ class RunLoop:
             self._put(stream, row)
         self._put("commands", {"t": t, "target": target, "control": control, "done": done})
         self.tally.turned(control, self._encoder)
-        self._put("motors", {"t": t, "position": self._pid.position(length), "speed": control,
+        self._put("motors", {"t": t, "position": self._pid.position(lengths[self.winched]), "speed": control,
                              "encoder": self._encoder, "voltage": self._voltage})  # fmt: skip
         number = self._interval.count + 1
         changed, gave_up = self.steps.advance(done)

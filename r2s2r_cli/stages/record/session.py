@@ -14,6 +14,7 @@ from r2s2r_cli.errors import R2S2RError
 from r2s2r_cli.stages.record.camera import LATE_S, Pictures
 from r2s2r_cli.stages.record.plan import RunPlan
 from r2s2r_cli.stages.record.run import RunLoop, Watch
+from r2s2r_cli.stages.record.still import Still
 from r2s2r_cli.stages.record.writer import Sink, Writer
 from schemas.config import RecordSettings
 from schemas.results_record import CameraCounts, RecordReport, RecordRun
@@ -62,8 +63,8 @@ class Session:
         recorded is with the sink. InputError for a policy of another robot or a robot that is not calibrated.
         """
         for plan in self.plans:
-            with Writer(sink, lossless=self.link.facts.lock_step) as writer:
-                self._one(plan, writer)
+            with Still(self.link) as still, Writer(sink, lossless=self.link.facts.lock_step) as writer:
+                self._one(plan, writer, still)
 
     def _stamp(self, loop: RunLoop) -> Callable[[Frame], float]:
         """From a frame to its time in the run [s]: when it came; in lock-step by the camera's clock.
@@ -95,7 +96,7 @@ class Session:
             not_begun=tuple(plan.name for plan in self.plans if plan.name not in begun),
         )  # fmt: skip
 
-    def _one(self, plan: RunPlan, writer: Writer) -> None:
+    def _one(self, plan: RunPlan, writer: Writer, still: Still) -> None:
         self.begin()
         loop = RunLoop(plan, self.robot, self.link, writer, self.watch)
         if not self.link.facts.lock_step:
@@ -112,10 +113,10 @@ class Session:
                     )  # fmt: skip
                     stack.enter_context(pictures)
                 # Left before the pictures, whose end waits for all that is to be encoded: the robot would drive on.
-                stack.callback(self.link.stop)
+                stack.callback(still.begin)
                 loop.run(pictures)
         except BaseException as error:
-            self.link.stop()
+            still.begin()
             ended = error.what if isinstance(error, R2S2RError) else "interrupted"
             raise
         finally:

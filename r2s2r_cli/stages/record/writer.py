@@ -39,6 +39,7 @@ class Writer:
         self._waiting_bytes = 0
         self._lock = threading.Lock()
         self._error: BaseException | None = None
+        self._ended = threading.Event()
         self._thread = threading.Thread(target=self._work, name="record-writer", daemon=True)
 
     def put(self, stream: str, row: Mapping[str, Any]) -> None:
@@ -78,17 +79,34 @@ class Writer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        while self._thread.is_alive():  # a dead writer empties no queue
+        try:
+            self._drain()
+        except KeyboardInterrupt:  # what was received is written down all the same; who presses again insists
+            if isinstance(error, KeyboardInterrupt):
+                raise
+            self._drain()
+            if error is None:
+                raise
+        if error is None:
+            self.check()
+
+    def _drain(self) -> None:
+        while not self._ended.is_set():  # a dead writer empties no queue
             try:
                 self._rows.put(None, timeout=0.2)
                 break
             except queue.Full:
                 continue
-        self._thread.join()
-        if error is None:
-            self.check()
+        while not self._ended.wait(1.0):  # a `join` that was interrupted once takes the thread for ended
+            pass
 
     def _work(self) -> None:
+        try:
+            self._write()
+        finally:
+            self._ended.set()
+
+    def _write(self) -> None:
         while (item := self._rows.get()) is not None:
             stream, row = item
             if self._error is None:  # after a refusal the rest is only taken off: nobody must wait for room

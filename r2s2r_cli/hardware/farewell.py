@@ -15,8 +15,9 @@ STOPS = 5
 """How often a stop is said at the end, where nobody acknowledges it."""
 STOP_PAUSE = 0.02
 """[s] between them: a board reads one datagram a turn."""
-RESCUE = 0.2
-"""[s] for which a dead port is tried again, to say stop."""
+RESCUE = 2.0
+"""[s] for which a dead port is tried again, to say stop to a robot that does not stop by itself: a host that changes
+from one radio cell to the next is without a network for about a second."""
 
 
 def say_stop(link: Link) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 from binascii import crc_hqx
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from r2s2r_cli.devices.link import LinkError, LinkState, RobotLink, SafetyStop
 from r2s2r_cli.errors import ExitCode
+from r2s2r_cli.hardware import farewell
 from r2s2r_cli.hardware.codec import codec
 from r2s2r_cli.hardware.link import Link
 from tests.support.wire_robot import OFFSET, SLOPE, FakeRobot, calibrated
@@ -133,8 +135,9 @@ def test_a_dead_port_is_an_error_that_tells_of_the_motors_and_can_be_mended() ->
 
 
 @pytest.mark.parametrize(("ms", "said"), [(0, "watchdog is off"), (5000, "watchdog is 5000 ms")])
-def test_a_watchdog_is_what_the_robot_says_of_it(ms: int, said: str) -> None:
+def test_a_watchdog_is_what_the_robot_says_of_it(monkeypatch: pytest.MonkeyPatch, ms: int, said: str) -> None:
     """None, or one that takes seconds: it does not stop by itself. It is remarked, and no dead link claims it."""
+    monkeypatch.setattr(farewell, "RESCUE", 0.1)
     robot = FakeRobot()
     robot.watchdog_ms = ms
     with link_to(robot) as link:
@@ -150,7 +153,32 @@ def test_a_watchdog_is_what_the_robot_says_of_it(ms: int, said: str) -> None:
         assert link.facts.stops_by_itself and link.facts.remarks == ()
 
 
-def test_without_a_watchdog_a_stop_is_said_on_a_new_connection() -> None:
+@pytest.mark.parametrize("back", [0.5, None])
+def test_a_network_that_is_away_for_a_while_is_waited_for(monkeypatch: pytest.MonkeyPatch, back: float | None) -> None:
+    """Half a second without one: the stop arrives when it is back. One that stays away is not waited for long."""
+
+    class Away(FakeRobot):
+        until = 0.0
+
+        def send(self, data: bytes, to: tuple[str, int] | None = None) -> None:
+            if time.monotonic() < self.until:
+                raise LinkError("the link to the robot broke", where="fake", received="no network", hint="wait")
+            self.heard.append(data.decode())
+
+    monkeypatch.setattr(farewell, "RESCUE", 1.0)
+    robot = Away()
+    robot.out.extend([b"S" + b" 0x28c" * 9] * 2)
+    robot.open = lambda: None  # type: ignore[method-assign]
+    with link_to(robot, protocol="legacy") as link:
+        robot.until = time.monotonic() + (back or 60.0)
+        robot.heard.clear()
+        with pytest.raises(LinkError) as caught:
+            link.command(np.ones(6))
+        assert ("SWITCH THE ROBOT OFF" in caught.value.received) == (back is None)
+        assert bool(robot.heard) == (back is not None)
+
+
+def test_without_a_watchdog_a_stop_is_said_on_a_new_connection(monkeypatch: pytest.MonkeyPatch) -> None:
     """The authors' robots keep their last command: the port is opened again for the stop, else: switch it off."""
 
     class Flaky(FakeRobot):
@@ -163,6 +191,7 @@ def test_without_a_watchdog_a_stop_is_said_on_a_new_connection() -> None:
         def obey(self, line: str) -> None:
             self.heard.append(line)
 
+    monkeypatch.setattr(farewell, "RESCUE", 0.1)
     robot = Flaky()
     with link_to(robot, protocol="legacy") as link:
         link.command(np.ones(6))

@@ -10,6 +10,7 @@ import typer
 
 from r2s2r_cli.commands.blind_follow import follow
 from r2s2r_cli.commands.blind_score import calibrate, publish, score
+from r2s2r_cli.commands.blind_settings import require_settings
 from r2s2r_cli.commands.blind_worth import worth
 from r2s2r_cli.console import Console
 from r2s2r_cli.errors import UsageError
@@ -216,6 +217,7 @@ def _settings(items: list[str] | None, without: str | None) -> dict[str, object]
     # No bare words: a word in place of a number would be noticed when the first set is diagnosed, not here.
     parsed = (parse_override(item, hint=lambda key: "--set with_parity=false", words=False) for item in items or [])
     found: dict[str, object] = dict(parsed)
+    require_settings(found)
     if without is not None:
         from r2s2r_cli.effects import looked_for
 

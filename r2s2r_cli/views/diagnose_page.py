@@ -101,18 +101,20 @@ def _shrinkage(report: DiagnoseReport) -> PageTable:
         ["as identified", _mm(s.nominal), ""],
         ["refit", _mm(s.refit), ""],
         *(
-            [[f"refit + {' + '.join(s.effects)}", _mm(s.refit_plus_effect), _share(s.own_share, s.ci90)]]
+            [[f"refit + {' + '.join(s.effects)}", _mm(s.refit_plus_effect),
+              "-" if s.refit_plus_effect is None else _share(s.own_share, s.ci90)]]
             if s.effects
             else ()
         ),
         ["refit + a black box" + learned, _mm(s.ceiling), ""],
         ["floor of held-out intervals", _mm(s.floor), ""],
-        [
-            "predicted before it was looked at",
-            "",
-            AT_FLOOR if s.predicted is None else _predicted(s.predicted),
-        ],
-    ]
+        # Without an effect nothing was foretold of one.
+        *(
+            [["predicted before it was looked at", "", AT_FLOOR if s.predicted is None else _predicted(s.predicted)]]
+            if s.effects
+            else ()
+        ),
+    ]  # fmt: skip
     where = "; within the run that was fitted" if s.within_run else ""
     if s.set_aside:
         where += f"; without {', '.join(s.set_aside)}, as the floor was measured without the worst intervals"
@@ -139,7 +141,9 @@ def _where(report: DiagnoseReport) -> Iterator[list[str]]:
     yield ["intervals with a gap", ", ".join(where.segments) or "none stands out"]
     yield [
         "begins with",
-        "no beginning stands out" if where.onset_segment is None else where.onset or f"interval {where.onset_segment}",
+        "no beginning stands out"
+        if where.onset_segment is None
+        else _seat(where.onset or f"interval {where.onset_segment}", report),
     ]
     yield ["channel", _seat(where.channel or "", report)]
     yield ["element", _seat(element_words(where.element), report)]

@@ -50,7 +50,16 @@ def test_pictures_have_no_noise_of_their_own(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "extra",
-    [("--set", "with_parity"), ("--set", "=3"), ("--set", "x=]"), ("--set", "x=1\ny=2"), ("--without", "ghosts")],
+    [
+        ("--set", "with_parity"),
+        ("--set", "=3"),
+        ("--set", "x=]"),
+        ("--set", "x=1\ny=2"),
+        ("--set", "with_partiy=false"),
+        ("--set", "with_parity=3"),
+        ("--set", "step=true"),
+        ("--without", "ghosts"),
+    ],
 )
 def test_settings_that_are_none_are_refused(bank: Path, extra: tuple[str, str]) -> None:
     """No value, no name, no TOML, two values, no such effect: exit code 2."""

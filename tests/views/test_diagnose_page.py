@@ -166,6 +166,9 @@ def test_where_a_cause_sits_is_said_as_surely_as_the_verdict(
     made = report().model_copy(update={"verdict": verdict, "ranking": ranking})
     rows = [row for table in diagnose_tables(made) for row in table.rows]
     assert ["channel", channel] in rows and ["element", element] in rows
+    begun = made.model_copy(update={"where": made.where.model_copy(update={"onset_segment": 3, "onset": "g2:3"})})
+    rows = [row for table in diagnose_tables(begun) for row in table.rows]
+    assert ["begins with", element.replace("rod 1", "g2:3")] in rows
     nowhere = made.where.model_copy(update={"channel": None, "element": None})
     rows = [row for table in diagnose_tables(made.model_copy(update={"where": nowhere})) for row in table.rows]
     assert ["element", "undecided" if verdict == "ambiguous" else "-"] in rows
@@ -203,3 +206,17 @@ def test_what_the_logs_shout_and_the_replay_gains_nothing_by_is_said(
     words = f" Simulating it does not help: the runs are predicted no better with sensor_bias ({gain:+.1f} nats)."
     assert loud_words(made).endswith(words) == said
     assert ("Simulating" in loud_words(made)) == said
+
+
+def test_what_was_not_measured_is_not_at_the_floor() -> None:
+    """Without an effect nothing was foretold; of one that could not be simulated there is no share."""
+    made = report()
+    assert made.shrinkage is not None
+    for changes, rows in (
+        ({"effects": (), "refit_plus_effect": None, "own_share": None, "ci90": None, "predicted": None}, 0),
+        ({"refit_plus_effect": None, "own_share": None, "ci90": None}, 2),
+    ):
+        other = made.model_copy(update={"shrinkage": made.shrinkage.model_copy(update=changes)})
+        table = next(one for one in diagnose_tables(other) if one.title.startswith("how far"))
+        assert not any("at the floor" in cell for row in table.rows for cell in row)
+        assert sum(row[0].startswith(("refit + p", "predicted")) for row in table.rows) == rows

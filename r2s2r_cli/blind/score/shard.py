@@ -79,6 +79,10 @@ def opened(bank: Path, verdicts: Path, key: bytes, *, follow: Path | None = None
     if not found:
         raise InputError("there is no verdict to score", where=str(verdicts), expected="<set>.json of `blind run`",
                          received="none", hint=f"r2s2r blind run {bank} --out {verdicts}")  # fmt: skip
+    if follow is not None and not any(one.follow for one in found):
+        raise InputError("nothing was followed up there", where=str(follow), expected="<set>.json of `blind follow`",
+                         received="none of these sets",
+                         hint=f"r2s2r blind follow {bank} --verdicts {verdicts} --out {follow}")  # fmt: skip
     asked = _asked(found, verdicts)
     said = {json.dumps(one.verdict["code"], sort_keys=True) for one in found if one.verdict.get("code")}
     return Shard(tuple(found), tuple(missing), index, data.decode(), own, asked, str(verdicts),

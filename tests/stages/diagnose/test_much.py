@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from r2s2r_cli.errors import NumericalError
+from r2s2r_cli.stages.diagnose.much import much
 from r2s2r_cli.stages.diagnose.much.blackbox import corrected
 from r2s2r_cli.stages.diagnose.much.much import _likely
 from r2s2r_cli.stages.diagnose.much.shrink import Shrinkage, foretold, share_with_interval, squared_of
 from r2s2r_cli.stages.diagnose.which.calibration import Calibration
+from r2s2r_cli.stages.identify.data import Selection
 from r2s2r_cli.stages.measures.gap import counting, own_share
 
 
@@ -193,3 +197,19 @@ def test_probabilities_are_a_softmax_and_the_set_is_never_empty() -> None:
     assert p["c"] == 0.0 and sum(p.values()) == pytest.approx(1.0)
     assert Calibration(conformal=0.99).within(p) == ("a",)
     assert Calibration(conformal=0.2).within(p) == ("a", "b")
+
+
+def test_a_run_without_a_whole_interval_is_passed_over() -> None:
+    """One that was broken off: where there is no other, it is said that nothing can be judged, not that max() of
+    nothing is no number; starts are asked for of the others alone."""
+    asked: list[tuple[str, dict[str, int]]] = []
+
+    def at(runs: Any, replayer: Any, values: Any, last: dict[str, int]) -> dict[Any, Any]:
+        asked.append((",".join(run.name for run in runs), last))
+        return {}
+
+    broken = SimpleNamespace(name="broken")
+    with pytest.raises(NumericalError, match="no judged interval"):
+        much._errors((broken,), [Selection("broken", ())], SimpleNamespace(replayer=None), None, None,
+                     SimpleNamespace(at=at))  # type: ignore[arg-type]  # fmt: skip
+    assert asked == [("", {})]

@@ -184,6 +184,7 @@ def _errors(
 ) -> tuple[np.ndarray, tuple[Stretch, ...]]:
     """Errors (segment, cap, 3) [m] at the key frames of the intervals of a part of the split, from causal starts, and
     the intervals. Raises NumericalError where none can be simulated."""
+    part = [one for one in part if one.intervals]  # of a run that was broken off nothing may be whole
     named = {one.run for one in part}
     runs = tuple(run for run in runs if run.name in named)
     last = {one.run: max(one.intervals) for one in part}

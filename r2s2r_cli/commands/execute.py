@@ -96,7 +96,7 @@ def execute(
     settings = here.config(place, overrides).record
     again = ["execute", *(policies or ["straight"])[:1], "--iteration", str(place.number), *["--dry-run"] * dry_run]
     runs = plans(chosen, repeats=repeats, rest=settings.rest_s, again=shlex.join(again))
-    if camera is not None:
+    if camera is not None and not camera.startswith("replay:"):
         camera_of(camera)  # whether it names one: it is opened after the simulation, which takes its time
     own = place.artifact("identification")
     numbers = model if model is not None else own if own.exists() else None

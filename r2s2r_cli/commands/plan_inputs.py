@@ -130,8 +130,6 @@ class Asked:
         return identified(robot, read_numbers(self.project, self.identified), self.project.relative(self.identified))
 
     def _goal(self, text: str, settings: PlanSettings) -> Goal:
-        import numpy as np
-
         from r2s2r_cli.stages.plan.goal import Goal
 
         try:
@@ -142,14 +140,8 @@ class Asked:
             raise UsageError("this is no place to go to", where="--to",
                              expected=f"X,Y,HEADING: metres, {FARTHEST_M:g} m away at most, and degrees",
                              received=text, hint="--to 0.5,1,90") from error  # fmt: skip
-        goal = Goal((x, y), math.radians(heading), settings.goal_within_m, math.radians(settings.goal_within_deg), text)
-        if goal.reached(np.zeros(2), np.zeros(())):
-            raise UsageError("the robot stands there already", where=f"--to {text}",
-                             expected=f"a place {settings.goal_within_m:g} m away, or a turn of "
-                             f"{settings.goal_within_deg:g} deg (plan.goal_within_m, plan.goal_within_deg), or more",
-                             received=f"{math.hypot(x, y):.2g} m and {heading:g} deg",
-                             hint="--to 0.5,1,90")  # fmt: skip
-        return goal
+        return Goal((x, y), math.radians(heading), settings.goal_within_m, math.radians(settings.goal_within_deg),
+                    text)  # fmt: skip
 
 
 @contextmanager

@@ -72,6 +72,7 @@ def test_it_is_fresh_and_its_policies_run(planned: Path) -> None:
     """The same command has nothing to do, and made again it gives the same bits; `simulate 40-plan.h5:NAME` runs a
     policy, and comes as far as in the plan."""
     again = document(*small("--to", "0.1,0,0", goal_within_m=1.0))
+    assert any(text.startswith("to: the robot stands there already") for text in again["report"]["warnings"])
     assert again["state"] == "fresh"
     forced = document(*small("--to", "0.1,0,0", goal_within_m=1.0), "--force", "--no-draw")
     assert forced["state"] == "done" and forced["content_sha256"] == again["content_sha256"]

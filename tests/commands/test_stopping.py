@@ -44,9 +44,14 @@ def test_a_kill_is_an_interrupt_and_counts_once(tmp_path: Path, first: signal.Si
     """The item is finished, the end is not disturbed by the SIGTERM that comes after either signal, and the command
     leaves with 130 and its line; so it does where a shell began it with SIGINT ignored."""
     begun = signal.SIG_IGN if deaf else signal.SIG_DFL
+
+    def prepare() -> None:
+        signal.signal(signal.SIGINT, begun)
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)  # these tests may have been begun with nohup
+
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAM], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, begun),
+        preexec_fn=prepare,
     ) as child:  # fmt: skip
         assert child.stderr is not None
         assert child.stderr.readline() == "at work\n"

@@ -99,6 +99,8 @@ def _warnings(
     named = {one.name for one in policies}
     said += [f"{name}: no sequence of the gaits turns that way: there is no such policy"
              for name in SIGNS if name not in named]  # fmt: skip
+    said += [f"{name}: the robot stands there already (--to {goal.typed}): there is no such policy"
+             for name, goal in request.goals.items() if name not in named]  # fmt: skip
     for one in policies:
         if one.name in SIGNS and one.reached.mean(axis=0)[2] * SIGNS[one.name] <= 0:
             said.append(f"{one.name}: simulated whole, it turns the other way")

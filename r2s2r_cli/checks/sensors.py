@@ -8,16 +8,12 @@ import numpy as np
 
 from r2s2r_cli.checks.base import AGAIN, Found, beyond, check, number, worst
 from r2s2r_cli.checks.subjects import Run
+from r2s2r_cli.devices.lengths import FROZEN_SAMPLES, NOT_INITIALISED, frozen
 
-UNINITIALISED_F = 0.20e-12
-"""What the firmware sends while its sensor chip is not initialised: exactly 0.20 pF (firmware of
-ChemStud24/tensegrity)."""
 _EXACT_F = 1e-18
 """Rounding of 0.20 pF read as text and scaled."""
 CAPACITANCE_F = (0.1e-12, 1e-9)
 """Stretch sensors have 10-40 pF; outside this the numbers are not farads (pF and nF stored as they came)."""
-FROZEN_SAMPLES = 20
-"""At 10 Hz two seconds: a live sensor's last digit has moved by then."""
 FROZEN_TIMES = 10
 """So many times as long as ever before: a sensor of few digits says the same now and then, too."""
 LOST_SHARE = 0.5
@@ -37,7 +33,7 @@ _KINDS = ("recording",)
 def sensor_chip_initialised(run: Run) -> Iterator[Found]:
     """Sensors that say 0.20 pF."""
     for sensor, values in _columns(run, "capacitance"):
-        bad = np.abs(values - UNINITIALISED_F) < _EXACT_F
+        bad = np.abs(values - NOT_INITIALISED) < _EXACT_F
         if bad.any():
             yield Found(run.at("sensors", "capacitance"), f"the chip of sensor {sensor} was not initialised",
                         "a measurement", f"0.20 pF in {int(bad.sum())} of {len(values)} samples")  # fmt: skip
@@ -73,11 +69,11 @@ def sensors_move(run: Run) -> Iterator[Found]:
     """Sensors that stand still throughout the run, or from some sample on."""
     for name in ("capacitance", "length"):
         columns = dict(_columns(run, name))
-        still = [n for n, values in columns.items() if len(values) >= FROZEN_SAMPLES and np.ptp(values) == 0]
+        still = [n for n, values in columns.items() if frozen(values)]
         if len(still) == len(columns):
             continue  # nothing moved: the robot stood still
         for sensor, values in columns.items():
-            if name == "capacitance" and abs(values[-1] - UNINITIALISED_F) < _EXACT_F:
+            if name == "capacitance" and abs(values[-1] - NOT_INITIALISED) < _EXACT_F:
                 continue  # sensor_chip_initialised says it better
             count, before = _held(values)
             if sensor in still:

@@ -34,6 +34,12 @@ def camera_of(spec: str, *, now: Callable[[], float] = time.monotonic) -> Camera
     return ReplayCamera(recorded_film(data, run or None), now=now)
 
 
+def require_named(spec: str | None) -> None:
+    """Raises UsageError for words that name no camera. Pictures to play back are looked for when they are opened."""
+    if spec is not None and _split(spec)[0] != _REPLAY:
+        camera_of(spec)
+
+
 def stored_camera(project: Project, spec: str | None) -> str | None:
     """The camera as typed here, for the provenance: as it would be typed in the project's directory.
 

@@ -78,7 +78,7 @@ def execute(
     Example: r2s2r execute straight --port /dev/ttyUSB0 --protocol legacy --camera realsense
     """  # fmt: skip
     from r2s2r_cli.commands.asking import answered, require_answer
-    from r2s2r_cli.commands.cameras import camera_of, stored_camera
+    from r2s2r_cli.commands.cameras import require_named, stored_camera
     from r2s2r_cli.commands.execute_outcome import expect
     from r2s2r_cli.commands.outcome import require_model
     from r2s2r_cli.commands.record_look import look
@@ -96,8 +96,7 @@ def execute(
     settings = here.config(place, overrides).record
     again = ["execute", *(policies or ["straight"])[:1], "--iteration", str(place.number), *["--dry-run"] * dry_run]
     runs = plans(chosen, repeats=repeats, rest=settings.rest_s, again=shlex.join(again))
-    if camera is not None and not camera.startswith("replay:"):
-        camera_of(camera)  # whether it names one: it is opened after the simulation, which takes its time
+    require_named(camera)  # it is opened after the simulation, which takes its time
     own = place.artifact("identification")
     numbers = model if model is not None else own if own.exists() else None
     if numbers is not None:

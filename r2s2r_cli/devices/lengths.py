@@ -13,7 +13,10 @@ if TYPE_CHECKING:
     from schemas.robot import Limits, Robot
 
 NOT_INITIALISED = 0.20e-12
-"""Capacitance [F] that the boards send while their sensor chip is not initialised: no reading."""
+"""Capacitance [F] that the boards send while their sensor chip is not initialised (firmware of ChemStud24/tensegrity):
+no reading."""
+FROZEN_SAMPLES = 20
+"""At 10 Hz two seconds: a live sensor's last digit has moved by then."""
 LIMIT_MARGIN = 0.02
 """[m] beyond the robot's limits up to which a length is believed. Assumption: 90 % of recalibrations a day later differ
 by less than 18 mm."""
@@ -67,4 +70,14 @@ def believed(length: np.ndarray, limits: Limits) -> np.ndarray:
 
 def readings(capacitance: np.ndarray) -> np.ndarray:
     """Capacitances [F] with NaN where a board has sent that its sensor chip is not initialised."""
-    return np.where(np.abs(capacitance - NOT_INITIALISED) < 1e-15, np.nan, capacitance)
+    return np.where(not_initialised(capacitance), np.nan, capacitance)
+
+
+def not_initialised(capacitance: np.ndarray) -> np.ndarray:
+    """Which capacitances [F] say that a sensor chip is not initialised; NaN says nothing."""
+    return np.abs(capacitance - NOT_INITIALISED) < 1e-15
+
+
+def frozen(values: np.ndarray) -> bool:
+    """Whether a sensor hangs: all that was heard of it, finite, is one number; a few are no evidence."""
+    return len(values) >= FROZEN_SAMPLES and bool(np.ptp(values) == 0)

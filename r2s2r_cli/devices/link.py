@@ -33,6 +33,10 @@ class LinkState(Enum):
     LOST = "lost"
 
 
+STOPS = 5
+"""How often a stop is said at the end, where nobody acknowledges it: one that is lost leaves the motors as they are."""
+STOP_PAUSE = 0.02
+"""[s] between them: a board reads one datagram a turn."""
 EMERGENCY = "emergency stop"
 """The reason of a stop that the device latches as well, where it can."""
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from r2s2r_cli.devices.lengths import NOT_INITIALISED
+from r2s2r_cli.devices.lengths import not_initialised
 from r2s2r_cli.devices.link import LinkFacts, LinkStatistics, RobotLink
 
 
@@ -52,6 +52,6 @@ def examine(link: RobotLink, motors: int, seconds: float) -> LinkHealth:
         median=np.array([np.median(column) if len(column) else np.nan for column in columns]),
         noise=np.array([np.diff(column).std() / np.sqrt(2) if len(column) > 2 else np.nan for column in columns]),
         not_set_up=tuple(i for i, column in enumerate(columns)
-                         if len(column) and (np.abs(column - NOT_INITIALISED) < 1e-15).all()),
+                         if len(column) and not_initialised(column).all()),
         voltage=voltage,
     )  # fmt: skip

@@ -5,16 +5,12 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from r2s2r_cli.devices.link import LinkError
+from r2s2r_cli.devices.link import STOP_PAUSE, STOPS, LinkError
 from r2s2r_cli.hardware.codec.base import Ack, Outgoing
 
 if TYPE_CHECKING:
     from r2s2r_cli.hardware.link import Link
 
-STOPS = 5
-"""How often a stop is said at the end, where nobody acknowledges it."""
-STOP_PAUSE = 0.02
-"""[s] between them: a board reads one datagram a turn."""
 RESCUE = 2.0
 """[s] for which a dead port is tried again, to say stop to a robot that does not stop by itself: a host that changes
 from one radio cell to the next is without a network for about a second."""

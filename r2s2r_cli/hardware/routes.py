@@ -15,8 +15,7 @@ class Routes:
     """
 
     def __init__(self) -> None:
-        self._address: dict[int, Address] = {}
-        self._heard: dict[int, dict[Address, None]] = {}
+        self._heard: dict[int, list[Address]] = {}
         self._any: Address | None = None
         self._may: set[Address] = set()
         self._owed: set[Address] = set()
@@ -32,15 +31,15 @@ class Routes:
         self._any = source
         if board is None:
             return None
-        known = self._heard.setdefault(board, {})
-        if source in known and self._address[board] != source:
+        known = self._heard.setdefault(board, [])  # the last one is where it is
+        if source in known[:-1]:
             raise LinkError(
                 f"two robots send to this host: board {board} is heard from two addresses", where=f"board {board}",
-                expected="one robot", received=f"{_place(self._address[board])} and {_place(source)}",
+                expected="one robot", received=f"{_place(known[-1])} and {_place(source)}",
                 hint="r2s2r doctor ports   # once the other robot is switched off",
             )  # fmt: skip
-        known[source] = None
-        self._address[board] = source
+        if source not in known:
+            known.append(source)
         if self._now is not None and source in self._owed:
             self._owed.discard(source)
             return self._now.data
@@ -56,8 +55,8 @@ class Routes:
     def command(self, line: Outgoing, *, at_once: bool = False) -> list[Address | None]:
         """Places that may be sent a command now; the others get it as an answer. at_once: all of them."""
         places: list[Address | None] = [self._any]
-        if line.every_board and self._address:
-            places = [*dict.fromkeys(self._address.values())]
+        if line.every_board and self._heard:
+            places = [*dict.fromkeys(known[-1] for known in self._heard.values())]
         if not line.every_board or at_once:
             return places
         self._now = line

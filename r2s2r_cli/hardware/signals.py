@@ -13,11 +13,9 @@ from collections.abc import Iterator
 from types import FrameType
 from typing import Any
 
-from r2s2r_cli.stopping import STOP
+from r2s2r_cli.stopping import POLITE, STOP
 
-ENDING = tuple(
-    getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP") if hasattr(signal, name)
-)  # fmt: skip
+ENDING = (*POLITE, *(getattr(signal, name) for name in ("SIGQUIT", "SIGTSTP") if hasattr(signal, name)))
 """Those that this system has."""
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from r2s2r_cli.devices.lengths import NOT_INITIALISED, Lengths, believed
+from r2s2r_cli.devices.lengths import Lengths, believed, not_initialised
 from r2s2r_cli.devices.link import Sample
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class Watch:
         """Look at a sample that came while the motors had these speeds, (actuated,). A reason to stop, or ""."""
         now, value, fresh = sample.t_host, sample.capacitance[self._sensors], sample.fresh[self._sensors]
         self._raw = np.where(fresh, value, self._raw)
-        good = fresh & (np.abs(value - NOT_INITIALISED) > 1e-15)
+        good = fresh & ~np.isnan(value) & ~not_initialised(value)
         self._good = np.where(good, now, self._good)
         frozen = self._frozen(now, value, good, np.abs(moving[self._motor]))
         if frozen.any():
@@ -91,7 +91,7 @@ class Watch:
         late = now - self._good > STALE
         if not late.any():
             return ""
-        stuck = late & (np.abs(self._raw - NOT_INITIALISED) < 1e-15)
+        stuck = late & not_initialised(self._raw)
         if stuck.any():
             return f"sensor not set up: that of cable {self._name(stuck)} sends 0.20 pF"
         return f"stale sensors: no good reading of cable {self._name(late)} for {STALE * 1e3:.0f} ms"

@@ -82,15 +82,15 @@ def target_intervals(
     control: np.ndarray | None = None,
     position: np.ndarray | None = None,
     tolerance: float = 0.0,
-    changes: np.ndarray | None = None,
+    hidden: np.ndarray | None = None,
 ) -> Intervals:
     """Maximal spans of one constant target vector.
 
     t: stamps of the kept frames [s], shape (frame,). target: shape (frame, actuated); a row with NaN has no target
     and ends the interval before it. control: shape (frame, actuated), +1 reels in. position: cable positions by
-    whatever measures them, shape (frame, actuated). tolerance: of the controller, in position. changes: of
-    `target_changes`, shape (frame,); two or more in a hole of the frames are an end that no frame shows, even where
-    the target is the same again.
+    whatever measures them, shape (frame, actuated). tolerance: of the controller, in position. hidden: of
+    `hidden_targets`, shape (frame,); where there are any, the interval before ends in the hole, even where the target
+    is the same again.
 
     Every interval is stored. Those with a later row of another target are complete. The last one is complete if it
     has moved to its end: each of its cables (a) has control 0 in the last row, or (b) lies within the tolerance of
@@ -103,7 +103,7 @@ def target_intervals(
     changed = np.ones(len(t), dtype=bool)
     if len(t) > 1:
         changed[1:] = (target[1:] != target[:-1]).any(axis=1)
-    unseen = np.zeros(len(t), dtype=bool) if changes is None else (changes > 1) & in_hole(t)
+    unseen = np.zeros(len(t), dtype=bool) if hidden is None else hidden > 0
     changed |= unseen
     first = np.flatnonzero(changed & has_target)
     ends = np.flatnonzero(changed)
@@ -123,16 +123,17 @@ def target_intervals(
     )
 
 
-def target_changes(t: np.ndarray, t_command: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """How often the target changed after the frame before and up to each frame, (frame,); 0 at the first one.
+def hidden_targets(t: np.ndarray, t_command: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """How many targets came and went in the hole before each frame, (frame,); 0 where there is none.
 
     t: stamps of the kept frames [s], (frame,). t_command [s], (row,), and target, (row, actuated): a log that goes on
-    where frames are left out. Rows without a whole target are passed over.
+    where frames are left out. Rows without a whole target are passed over, and so is what is over between two frames of
+    an even series: rows that were stamped twice have such.
     """
     whole = np.isfinite(target).all(axis=1)
     at = t_command[whole][1:][(np.diff(target[whole], axis=0) != 0).any(axis=1)]
     before = np.searchsorted(at, t, side="right")
-    return np.diff(before, prepend=before[:1])
+    return np.where(in_hole(t), np.maximum(np.diff(before, prepend=before[:1]) - 1, 0), 0)
 
 
 def _moved_to_end(

@@ -55,9 +55,7 @@ def look_at(path: Path) -> str:
     """The hint for a file in which there is nothing of ours, and that no known command makes again."""
     if path.suffix.lower() in TEXTS:
         return f"r2s2r validate {quoted(path)}"
-    if root_of(path.absolute()) is None or path.name not in {
-        name for kind in KINDS.values() for name in kind.filenames
-    }:
+    if root_of(path.absolute()) is None or not any(path.name in kind.filenames for kind in KINDS.values()):
         return f"file {quoted(path)}"
     if path.name == KINDS["recording"].filename:
         return f"file {quoted(path)}   # if it was imported: r2s2r import LOG --force"

@@ -145,12 +145,14 @@ def _sealed_before(
     if _with_late(read_header(target).provenance, _NOTHING_LATE) != _with_late(provenance, _NOTHING_LATE):
         return None
     header = checked_header(target)
-    expected = {f"{head.streams[n].path}/{f.name}": (len(r), head.streams[n].name != "") for n, r in rows.items()
-                for f in head.streams[n].fields}  # fmt: skip
-    found = {path: length(target, path) for path in expected}
-    # A second stream of a group may be a torn table, which was left out.
-    return header if all(found[path] in ((count, None) if second else (count,))
-                         for path, (count, second) in expected.items()) else None  # fmt: skip
+    whole = all(_holds(target, head.streams[number], len(found)) for number, found in rows.items())
+    return header if whole else None
+
+
+def _holds(target: Path, stream: Stream, count: int) -> bool:
+    """Whether an artifact has all rows of a stream. A second one of its group may be a torn table, which it lacks."""
+    there = (count, None) if stream.name else (count,)
+    return all(length(target, f"{stream.path}/{column.name}") in there for column in stream.fields)
 
 
 _NOTHING_LATE = Late(0.0, {})

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from r2s2r_cli.stages.segments import Intervals, Segments, segments, target_changes, target_intervals
+from r2s2r_cli.stages.segments import Intervals, Segments, hidden_targets, segments, target_intervals
 from schemas.segments import INTERVALS, SEGMENTS
 
 A, B = [0.0, 1.0], [1.0, 0.0]
@@ -62,13 +62,13 @@ def test_targets_that_no_frame_shows_end_an_interval() -> None:
         (np.r_[0:6, 18:24], [0, 6], [False, False]),
         (np.r_[0:8, 10:24], [0, 8, 14], [True, True, False]),
     ):
-        changes = target_changes(t[kept], t, target)
-        found = target_intervals(t[kept], target[kept], changes=changes)
+        hidden = hidden_targets(t[kept], t, target)
+        found = target_intervals(t[kept], target[kept], hidden=hidden)
         assert (found.first.tolist(), found.complete.tolist()) == (first, complete)
     brief = target.copy()
     brief[9:] = A
     kept = np.delete(np.arange(24), 8)
-    found = target_intervals(t[kept], brief[kept], changes=target_changes(t[kept], t, brief))
+    found = target_intervals(t[kept], brief[kept], hidden=hidden_targets(t[kept], t, brief))
     assert found.first.tolist() == [0]
 
 

@@ -18,7 +18,7 @@ from r2s2r_cli.stages.estimate.rigid import Rods, is_rigid, make_rigid
 from r2s2r_cli.stages.estimate.smooth import MIN_FRAMES, OUTLIER, Tracks, smooth, switched
 from r2s2r_cli.stages.estimate.unseen import Unseen
 from r2s2r_cli.stages.frames import KEPT, fit_rod_length
-from r2s2r_cli.stages.segments import Intervals, Segments, segments, target_changes, target_intervals
+from r2s2r_cli.stages.segments import Intervals, Segments, hidden_targets, segments, target_intervals
 from schemas.estimate import EstimateSettings
 from schemas.robot import Robot
 
@@ -179,8 +179,8 @@ def intervals_of(streams: dict[str, Group], t: np.ndarray) -> tuple[Intervals | 
     if target is None:
         return None, None
     commands = streams["commands"]
-    changes = target_changes(t, commands["t"], commands["target"])
-    found = target_intervals(t, target, control=control, changes=changes)
+    hidden = hidden_targets(t, commands["t"], commands["target"])
+    found = target_intervals(t, target, control=control, hidden=hidden)
     return found, segments(found, t, control)
 
 

@@ -7,13 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from r2s2r_cli.artifact import ArtifactData, Group
+from r2s2r_cli.devices.lengths import frozen
 from r2s2r_cli.errors import InputError
 from r2s2r_cli.stages.segments import Intervals
 from r2s2r_cli.stages.sensed import columns_of, sensed_lengths
 from schemas.robot import Robot
-
-FROZEN_READINGS = 20
-"""Equal readings from which on a sensor is taken for one that hangs: some seconds of any gait."""
 
 
 @dataclass(frozen=True)
@@ -78,17 +76,10 @@ def sensed_run(name: str, recording: ArtifactData, run: str, robot: Robot) -> Se
     length = columns_of(*found, cable.tolist())
     if not np.isfinite(length).any():
         return None
-    stuck = _frozen(length)
+    stuck = np.array([frozen(column[np.isfinite(column)]) for column in length.T])
     length[:, stuck] = np.nan  # it repeats itself perfectly, and measures nothing
     reached = _reached(Intervals.from_group(intervals), recording, run)
     return SensedRun(name, sensors["t"], length, cable, *reached, tuple(cable[stuck].tolist()))
-
-
-def _frozen(length: np.ndarray) -> np.ndarray:
-    """Whether all readings of a sensor are one number, (sensor,); a few are no evidence."""
-    heard = np.isfinite(length)
-    low, high = (np.where(heard, length, end).T for end in (np.inf, -np.inf))
-    return (heard.sum(axis=0) >= FROZEN_READINGS) & (low.min(axis=1) == high.max(axis=1))
 
 
 def _reached(table: Intervals, recording: ArtifactData | None, run: str) -> tuple[Intervals, int]:

@@ -32,21 +32,19 @@ def missing_commands(table: Table, columns: Columns, reason: np.ndarray, interva
     return warnings
 
 
-def unseen_targets(t: np.ndarray, changes: np.ndarray) -> list[str]:
+def unseen_targets(t: np.ndarray, hidden: np.ndarray) -> list[str]:
     """The warning about targets that came and went in a hole of the kept frames.
 
-    t: stamps of the kept frames [s] since the first, (frame,). changes: of `segments.target_changes`.
+    t: stamps of the kept frames [s] since the first, (frame,). hidden: of `segments.hidden_targets`.
     """
-    at = np.flatnonzero((changes > 1) & frames.in_hole(t))
+    at = np.flatnonzero(hidden)
     if not len(at):
         return []
     longest = int(at[np.argmax(t[at] - t[at - 1])])
-    where = f"from {t[longest - 1]:.2f} to {t[longest]:.2f} s" + (
-        f" and {len(at) - 1} times more" if len(at) > 1 else ""
-    )
+    more = f" and {len(at) - 1} times more" if len(at) > 1 else ""
     text = (
-        f"{int((changes[at] - 1).sum())} targets came and went while no frame was kept, {where}: they are no target "
-        "intervals, and the one before such a hole is not complete"
+        f"{int(hidden.sum())} targets came and went while no frame was kept, from {t[longest - 1]:.2f} to "
+        f"{t[longest]:.2f} s{more}: they are no target intervals, and the one before such a hole is not complete"
     )
     return [text]
 

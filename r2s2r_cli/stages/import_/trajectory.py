@@ -25,7 +25,7 @@ from r2s2r_cli.stages.import_.run import (
 )
 from r2s2r_cli.stages.import_.sidecar import check_sidecar, run_attributes
 from r2s2r_cli.stages.import_.table import Table, read_table
-from r2s2r_cli.stages.segments import segments, target_changes, target_intervals
+from r2s2r_cli.stages.segments import hidden_targets, segments, target_intervals
 from schemas.results_import import ImportReport
 from schemas.robot import Robot
 from schemas.sidecar import Sidecar
@@ -81,14 +81,14 @@ def import_trajectory(
 
     attributes = run_attributes(sidecar, robot, "trajectory_csv")
     commands = _commands(t, reason, target, control)
-    changes = target_changes(t_kept, commands["t"], commands["target"])
+    hidden = hidden_targets(t_kept, commands["t"], commands["target"])
     intervals = target_intervals(
         t_kept,
         target[kept],
         control=None if control is None else control[kept],
         position=_cable_position(p_kept, robot, attributes),
         tolerance=float(attributes.get("pid_tolerance", 0.0)),
-        changes=changes,
+        hidden=hidden,
     )
     cuts = segments(intervals, t_kept, None if control is None else control[kept])
     sd, noise = cap_noise(t_kept, p_kept)
@@ -131,7 +131,7 @@ def import_trajectory(
     warnings += few_frames(len(t_kept), dropped_frames(reason)) + _check_control(
         groups["commands"], t_kept, p_kept, robot
     )
-    warnings += missing_commands(table, columns, reason, len(intervals)) + unseen_targets(t_kept, changes)
+    warnings += missing_commands(table, columns, reason, len(intervals)) + unseen_targets(t_kept, hidden)
     if sidecar.nature is None:
         warnings.append(NO_NATURE)
     if len(intervals) and not intervals.complete[-1]:

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import threading
+import time
 from types import TracebackType
 from typing import Self
 
-from r2s2r_cli.devices.link import RobotLink
-
-PAUSE_S = 0.02
-"""Between two stops: a board reads one datagram a turn."""
-FEWEST = 5
-"""How often a stop is said at least: one that is lost on the way leaves the motors as they are."""
+from r2s2r_cli.devices.link import STOP_PAUSE, STOPS, RobotLink
 
 
 class Still:
@@ -24,7 +20,6 @@ class Still:
     def __init__(self, link: RobotLink) -> None:
         self._link = link
         self._over = threading.Event()
-        self._said = 0
         self._thread: threading.Thread | None = None
 
     def begin(self) -> None:
@@ -46,7 +41,8 @@ class Still:
             self._thread.join()
 
     def _again(self) -> None:
-        while self._said < FEWEST or not self._over.is_set():
+        said = 0
+        while said < STOPS or not self._over.is_set():
             self._link.stop()
-            self._said += 1
-            threading.Event().wait(PAUSE_S)
+            said += 1
+            time.sleep(STOP_PAUSE)

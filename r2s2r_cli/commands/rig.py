@@ -101,8 +101,8 @@ def rig(
     if device is not None and link is not Link.PTY:
         raise UsageError("only a pty has a device", where="--device", expected="--link pty", received=f"--link {link}",
                          hint=f"r2s2r rig --link {link}")  # fmt: skip
+    require_mujoco("r2s2r rig")  # before the world, whose model is the rig's and imports it
     body, surroundings = _robot(robot, project), _world(world, seed)
-    require_mujoco("r2s2r rig")
     if points is not None:
         _measure(console, body, surroundings, points)
         return

@@ -96,6 +96,18 @@ def test_lock_step_from_end_to_end(project: Path, times: int) -> None:
         assert (project / "a.csv").read_bytes() == (project / "b.csv").read_bytes()
 
 
+def test_without_mujoco_it_says_what_to_install(tmp_path: Path) -> None:
+    """The README's first installation is without the extra `rig`; no part of the command imports MuJoCo before it asks."""
+    code = "import sys; sys.modules['mujoco'] = None; from r2s2r_cli.__main__ import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "rig", "--link", "tcp", "--world", "none.toml"], cwd=tmp_path, capture_output=True,
+        text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == ExitCode.INPUT
+    assert "MuJoCo is not installed" in done.stderr
+    assert "[rig]'" in done.stderr
+    assert "Traceback" not in done.stderr
+
 def test_what_cannot_be_is_refused(project: Path, tmp_path: Path) -> None:
     """Unknown keys, robots without a place in a protocol, ports that are taken: codes, and what to do."""
     (tmp_path / "w.toml").write_text("sead = 3\n")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from r2s2r_cli.console import Console
-from r2s2r_cli.errors import ArtifactError, UsageError
+from r2s2r_cli.errors import ArtifactError, UsageError, require_mujoco
 from r2s2r_cli.options import DrawOption, DryRunOption, ForceOption, JsonOption, ProjectOption, QuietOption
 from r2s2r_cli.store.project import Iteration, Project
 
@@ -66,6 +66,8 @@ def floor(
     if not 0 <= numerics <= GAITS_MAX:
         raise UsageError("this is no number of gait steps", where="--numerics", expected=f"0 to {GAITS_MAX}",
                          received=str(numerics), hint="r2s2r floor --numerics 16")  # fmt: skip
+    if numerics:
+        require_mujoco("floor --numerics")
     numbers = list(dict.fromkeys(iteration or ()))  # a run asked for twice does not repeat itself
     places = wanted_places(here, numbers)
     run = StageRun(

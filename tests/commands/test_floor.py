@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -33,6 +34,17 @@ def test_nothing_to_measure_with_is_said(project: Path) -> None:
     result = invoke("floor", "--json")
     assert result.exit_code == 4 and json.loads(result.stdout)["hint"] == "r2s2r import sample.csv"
     assert not (project / "floor.h5").exists()
+
+
+@pytest.mark.parametrize("dry", [(), ("--dry-run",)])
+def test_numerics_without_mujoco_say_what_to_install(
+    estimated: Path, dry: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before anything is computed, and in a dry run too."""
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    result = invoke("floor", "--numerics", "3", *dry)
+    assert result.exit_code == 4 and "MuJoCo is not installed" in result.stderr and "[rig]'" in result.stderr
+    assert not (estimated / "floor.h5").exists()
 
 
 @pytest.mark.slow

@@ -108,6 +108,7 @@ def test_without_mujoco_it_says_what_to_install(tmp_path: Path) -> None:
     assert "[rig]'" in done.stderr
     assert "Traceback" not in done.stderr
 
+
 def test_what_cannot_be_is_refused(project: Path, tmp_path: Path) -> None:
     """Unknown keys, robots without a place in a protocol, ports that are taken: codes, and what to do."""
     (tmp_path / "w.toml").write_text("sead = 3\n")

@@ -25,7 +25,8 @@ def numerics(robot: Robot, gaits: int, cache: Path | None = None) -> Numerics:
     """`gaits` random gait steps of one second from common states in mid-gait (seeds 0, 1, ...).
 
     The settings are those of docs/concepts/mujoco.md: the engine at 0.25 ms, MuJoCo with contacts nearly as hard.
-    Friction is the robot's. The caller sees to MuJoCo (`require_mujoco`). Raises NumericalError where one of both diverges.
+    Friction is the robot's. The caller sees to MuJoCo (`require_mujoco`). Raises NumericalError where one of both
+    diverges.
     """
     import torch
 

@@ -97,7 +97,7 @@ def test_lock_step_from_end_to_end(project: Path, times: int) -> None:
 
 
 def test_without_mujoco_it_says_what_to_install(tmp_path: Path) -> None:
-    """The README's first installation is without the extra `rig`; no part of the command imports MuJoCo before it asks."""
+    """The README's first installation is without the extra `rig`; nothing imports MuJoCo before it asks."""
     code = "import sys; sys.modules['mujoco'] = None; from r2s2r_cli.__main__ import main; main()"
     done = subprocess.run(
         [sys.executable, "-c", code, "rig", "--link", "tcp", "--world", "none.toml"], cwd=tmp_path, capture_output=True,
